@@ -46,6 +46,13 @@ typedef struct {
 RTS_RESULT AppStartApplication(void);
 /* Returns when no task is in its cycle any more; outputs are set to zero, retain variables saved. */
 RTS_RESULT AppStopApplication(void);
+/* One cycle of each task of an application that is stopped, and stays so: outputs are set to zero after it, as by
+ * AppStopApplication. Returns when it is done. ERR_APP_NOT_LOADED; ERR_CALL_AGAIN while it runs; ERR_INVALID_STATE
+ * after an exception; ERR_EXCEPTION when there was one. With SRV_OTHER_CLIENTS. */
+RTS_RESULT AppSingleCycle(void);
+/* Loads and starts the boot project, as after a start-up: what is in RAM is lost, retain variables are kept. Nothing
+ * runs when that fails. ERR_APP_NOT_LOADED without one. */
+RTS_RESULT AppReload(void);
 /* Warm keeps retain variables, cold initialises them too, origin deletes the application and its boot project. After
  * warm and cold the application is in AS_STOP. */
 RTS_RESULT AppReset(RTS_UI32 option);

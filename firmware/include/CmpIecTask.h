@@ -25,6 +25,10 @@ RTS_RESULT IecTaskCreateAll(const CDL_TASK *tasks, RTS_UI32 count, const IEC_CON
 RTS_RESULT IecTaskStartAll(void);
 void IecTaskStopAll(void);
 
+/* One cycle of each task in main, while the scheduling is stopped: first those that run by themselves, then those whose
+ * event has come meanwhile, the highest priority first. After an exception no other one begins. */
+void IecTaskRunOnce(void);
+
 /* ERR_INVALIDID when there is no such task. */
 RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
 

@@ -29,6 +29,9 @@ typedef struct {
     RTS_UI8 point_to_point; /* 1: everything that arrives is for this node, whatever its receiver address */
     RTS_UI8 address_words;  /* own network address, 1..ROUTER_MAX_ADDRESS */
     RTS_UI8 address[2 * ROUTER_MAX_ADDRESS];
+#if SRV_OTHER_CLIENTS
+    RTS_UI8 address_bits; /* of it that are used, from the last byte on; 0: all */
+#endif
 #if COMM_ENDPOINTS
     bool reliable; /* what it takes arrives, once and in order, or the peer is gone */
     bool gone;     /* its only peer has gone; true for one pass of CH_COMM_CYCLE at least */

@@ -134,6 +134,7 @@ enum {
     SG_DEVICE = 1,
     SG_APPLICATION = 2,
     SG_LOG = 5,
+    SG_SETTINGS = 6,
     SG_FILE_TRANSFER = 8,
     SG_IOMGR = 0x0B,
     SG_USERMGR = 0x0C,
@@ -149,6 +150,7 @@ enum {
     SRV_DEV_ECHO = 5,
     SRV_DEV_SET_OPERATION_MODE = 6,
     SRV_DEV_GET_OPERATION_MODE = 7,
+    SRV_DEV_SET_NODE_NAME = 9,
     SRV_DEV_SESSION_CREATE = 0x0A,
     TAG_DEV_LOGOUT_REPLY = 0x00,
     TAG_DEV_LOGOUT_SESSION = 0x01,
@@ -161,6 +163,7 @@ enum {
     TAG_DEV_FLAGS = 0x07,
     TAG_DEV_MAX_CHANNELS = 0x08,
     TAG_DEV_SERIAL_NUMBER = 0x09,
+    TAG_DEV_NETWORKS = 0x0A,
     TAG_DEV_STACK = 0x60,     /* own */
     TAG_DEV_CHALLENGE = 0x61, /* own */
     TAG_DEV_PROOF = 0x62,     /* own */
@@ -176,6 +179,7 @@ enum {
     TAG_DEV_ECHO_REPLY_LENGTH = 0x52,
     TAG_DEV_ECHO_DATA = 0x53,
     TAG_DEV_OPERATION_MODE = 0x54,
+    TAG_DEV_NEW_NODE_NAME = 0x58,
     TAG_DEV_ONLINE_ACCESS = 0xFF82,
     TAG_DEV_CLIENT_INFO = 0x83,
     DEV_CRYPT_XOR = 1,
@@ -190,13 +194,16 @@ enum {
     SRV_APP_LOGIN = 0x01,
     SRV_APP_LOGOUT = 0x02,
     SRV_APP_CREATE = 0x03,
+    SRV_APP_DELETE = 0x04,
     SRV_APP_START = 0x10,
     SRV_APP_STOP = 0x11,
     SRV_APP_RESET = 0x12,
     SRV_APP_READ_STATUS = 0x14,
     SRV_APP_READ_APPLICATION_LIST = 0x18,
+    SRV_APP_SINGLE_CYCLE = 0x22,
     SRV_APP_READ_APPLICATION_INFO = 0x29,
     SRV_APP_DOWNLOAD_COMPACT = 0x30,
+    SRV_APP_GET_AREA_ADDRESS = 0x38,
     SRV_APP_READ_TASK_INFO = 0x70, /* own */
     TAG_APP_LOGOUT = 0x00,
     TAG_APP_LOGIN_NAME = 0x01,
@@ -206,6 +213,8 @@ enum {
     TAG_APP_STATUS = 0x82,
     TAG_APP_OPERATION_MODE = 0x32,
     TAG_APP_STATE = 0x13,
+    TAG_APP_AREA = 0x13,
+    TAG_APP_AREA_ADDRESS = 0x14,
     TAG_APP_EXECUTION_POSITION = 0x14,
     TAG_APP_LAST_EXCEPTION = 0x40, /* own */
     TAG_APP_IMAGE = 0x41,          /* own */
@@ -234,6 +243,17 @@ enum {
 /* Task information (own). */
 enum { TAG_TASK_INFO = 0x42 };
 
+/* Settings (4.11). */
+enum {
+    SRV_SETTG_GET_INT = 1,
+    SRV_SETTG_SET_INT = 2,
+    SRV_SETTG_GET_STRING = 3,
+    SRV_SETTG_SET_STRING = 4,
+    SRV_SETTG_REMOVE = 5,
+    SRV_SETTG_READ_ALL = 6,
+    SRV_SETTG_WRITE = 7,
+};
+
 /* Monitoring (4.9). */
 enum {
     SRV_MON2_READ = 1,
@@ -253,7 +273,7 @@ enum {
     TAG_MON2_CONSISTENT = 0x43,  /* own */
     MON2_POINTER_SIZE = APP_POINTER_SIZE,
     MON2_ONE_STEP_SIZE = 64,
-    MON2_ID_FAILED = 0x8000, /* own */
+    MON2_ID_FAILED = 0x8000,
     MON2_OP_HALT = 0x01,
     MON2_OP_LD16 = 0x02,
     MON2_OP_LD32 = 0x03,

@@ -165,7 +165,7 @@ typedef struct {
     RTS_UI32 flags; /* CDL_IMAGE_* */
 } CDL_IMAGE;
 
-enum { CDL_TASK_NAME_SIZE = 32 };
+enum { CDL_TASK_NAME_SIZE = 32, CDL_PRIORITY_LOWEST = 31 };
 
 enum { KIND_CYCLIC = 0, KIND_EVENT = 1, KIND_EXTERNAL = 2, KIND_FREEWHEELING = 3 };
 
@@ -176,7 +176,7 @@ typedef struct {
     RTS_UI32 interval_us; /* cyclic tasks */
     RTS_UI32 watchdog_us; /* 0: none */
     RTS_UI16 watchdog_sensitivity;
-    RTS_UI8 priority; /* 0 highest .. 31 */
+    RTS_UI8 priority; /* 0 highest .. CDL_PRIORITY_LOWEST */
     RTS_UI8 kind;
     RTS_UI32 entry_offset; /* of the task's code in the code segment */
     RTS_UI16 event_area;   /* event tasks; APP_AREA_NONE otherwise */

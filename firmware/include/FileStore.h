@@ -42,6 +42,8 @@ RTS_RESULT FileStoreBegin(const char *name, RTS_UI32 size, RTS_UI32 crc);
 RTS_RESULT FileStoreWrite(const RTS_UI8 *data, RTS_UI32 size);
 /* Bytes written of the file that has begun. */
 RTS_UI32 FileStorePosition(void);
+/* Whether one has begun and not ended. */
+bool FileStoreIsWriting(void);
 /* Puts the file in place of the previous one of its name. ERR_FT_FILE_SIZE_MISMATCH bytes are missing,
  * ERR_FT_CRC_MISMATCH, ERR_DEVICE: the previous one stays. */
 RTS_RESULT FileStoreEnd(void);

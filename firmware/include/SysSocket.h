@@ -20,6 +20,11 @@ typedef struct {
     RTS_UI16 port;
 } SOCKADDRESS;
 
+typedef struct {
+    RTS_UI32 ip;
+    RTS_UI32 mask;
+} SOCKNETWORK;
+
 typedef enum {
     SYSSOCK_TCP,           /* listens */
     SYSSOCK_UDP,           /* sends and receives */
@@ -40,6 +45,11 @@ RTS_RESULT SysSockGetConnected(RTS_HANDLE socket);
 
 /* The local address of a socket, and the length of its network prefix in bits (0..32). ERR_INVALID_HANDLE. */
 RTS_RESULT SysSockGetOwn(RTS_HANDLE socket, SOCKADDRESS *own, RTS_UI32 *prefix);
+
+/* Network `index` (0..) at which the device can be programmed, all interfaces but loopback where a socket has no
+ * address of its own: the address and mask of the device there. ERR_NO_OBJECT past the last one. Only for what
+ * SRV_NETWORKS says. */
+RTS_RESULT SysSockGetNetwork(RTS_UI32 index, SOCKNETWORK *network);
 
 /* Accepts a connection and returns the address of its peer; RTS_INVALID_HANDLE if none is waiting, or there is no room.
  * It sends without delay (TCP_NODELAY). */

@@ -467,10 +467,16 @@
 #define SRV_INFORMATION 1
 #endif
 
-/* 1: what clients of others ask for, and plctool does not: operation mode, names of loggers and components, refusals in
- * the places where they look for them (docs/compatibility.md); 400 bytes of flash. */
+/* 1: what clients of others ask for (docs/compatibility.md): single cycle, deletion, addresses of areas, operation
+ * mode, node name, names of loggers and components, refusals in the places where they look for them; 1.5 KiB of
+ * flash. */
 #ifndef SRV_OTHER_CLIENTS
 #define SRV_OTHER_CLIENTS 0
+#endif
+
+/* How many networks the identity names, where the port has them (SysSocket.h). */
+#ifndef SRV_NETWORKS
+#define SRV_NETWORKS 0
 #endif
 
 /* Whether a password can be set (CmpUserMgr; docs/security.md): 1.8 KiB of flash, 60 bytes of RAM and 44 of each client, 52

@@ -180,10 +180,14 @@ class Controller(ABC):
         """As `start`, just after the controller has replied."""
         self.start()
 
+    def _loaded_crc(self) -> int:
+        """CRC of the image that the controller has just taken."""
+        return self.raw_status().image_crc
+
     def _check_downloaded(self, crc: int) -> None:
-        found = self.raw_status()
-        if found.image_crc != crc:
-            message = f"The device has image {found.image_crc:08X} instead of {crc:08X}; flash again."
+        found = self._loaded_crc()
+        if found != crc:
+            message = f"The device has image {found:08X} instead of {crc:08X}; flash again."
             raise DeviceError(message, "verify")
 
     def _kept_changes(self, before: int, after: int) -> KeptChanges | None:

@@ -227,11 +227,19 @@ class Plc(Controller):
     def start(self) -> None:
         services.start(self._session)
 
+    def _loaded_crc(self) -> int:
+        return services.loaded_crc(self._session)  # by a request that the start needs too
+
     def _start_checked(self) -> None:
         services.start(self._session, checked=True)
 
     def stop(self) -> None:
         services.stop(self._session)
+
+    def cycle(self) -> None:
+        """Runs one cycle of each task of a stopped program, which is stopped again then. Raises DeviceError when it
+        runs, had an exception, or there is none."""
+        services.cycle(self._session)
 
     def _reset(self, option: int) -> None:
         services.reset(self._session, option)

@@ -25,6 +25,7 @@
 #include "CmpRouterEmbedded.h"
 #include "CmpSrv.h"
 #include "CmpUserMgr.h"
+#include "NodeName.h"
 #include "Sim.h"
 #include "SimLink.h"
 #include "SysCom.h"
@@ -51,6 +52,19 @@ const SYS_TARGET *SysTargetGet(void)
 {
     return &fakes.target;
 }
+
+#if NODE_NAME_CAN_CHANGE
+const char *NodeNameOf(const SYS_TARGET *target)
+{
+    return fakes.node_name[0] != '\0' ? fakes.node_name : target->node_name;
+}
+
+RTS_RESULT NodeNameSet(const char *name)
+{
+    strncpy(fakes.node_name, name, NS_MAX_NODE_NAME);
+    return ERR_OK;
+}
+#endif
 
 RTS_UI32 SysTargetRandom(void)
 {
@@ -223,6 +237,18 @@ RTS_RESULT AppReset(RTS_UI32 option)
 {
     fakes.resets++;
     fakes.reset_option = option;
+    return control();
+}
+
+RTS_RESULT AppSingleCycle(void)
+{
+    fakes.single_cycles++;
+    return control();
+}
+
+RTS_RESULT AppReload(void)
+{
+    fakes.reloads++;
     return control();
 }
 

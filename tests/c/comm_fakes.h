@@ -11,6 +11,7 @@
 #include "CmpIecTask.h"
 #include "CmpItf.h"
 #include "CmpLog.h"
+#include "CmpSrvNumbers.h"
 #include "SysTarget.h"
 
 enum { FAKE_LINE_SIZE = 16384, FAKE_AREA_SIZE = 1024, FAKE_IMAGE_SIZE = 16384, FAKE_LOG_SIZE = 40, FAKE_TASKS = 3 };
@@ -43,6 +44,9 @@ typedef struct {
     RTS_UI32 stops;
     RTS_UI32 resets;
     RTS_UI32 reset_option;
+    RTS_UI32 single_cycles;
+    RTS_UI32 reloads;
+    char node_name[NS_MAX_NODE_NAME + 1]; /* given; "": none */
 
     RTS_UI8 image[FAKE_IMAGE_SIZE];
     bool download_open;

@@ -365,6 +365,56 @@ static void tasks_are_reported_with_their_times(void)
     CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_END_OF_OBJECT);
 }
 
+/* ---- what clients of others ask for ---- */
+
+static void a_single_cycle_and_deletion_need_the_session_of_the_application(void)
+{
+    setup();
+    put_descriptor(client.app_session + 1, NULL);
+    CHECK(call(SRV_APP_SINGLE_CYCLE) && reply_number(&reply, TAG_SERVICE_RESULT) == ERR_APP_INVALID_SESSIONID);
+    CHECK(call(SRV_APP_DELETE) && reply_number(&reply, TAG_SERVICE_RESULT) == ERR_APP_INVALID_SESSIONID);
+    CHECK(fakes.single_cycles == 0 && fakes.resets == 0);
+    put_descriptor(client.app_session, NULL);
+    CHECK(call(SRV_APP_SINGLE_CYCLE) && reply_number(&reply, TAG_SERVICE_RESULT) == ERR_OK);
+    CHECK(fakes.single_cycles == 1 && fakes.starts == 0);
+    fakes.control_result = ERR_CALL_AGAIN;
+    CHECK(call(SRV_APP_SINGLE_CYCLE) && reply_number(&reply, TAG_SERVICE_RESULT) == ERR_CALL_AGAIN);
+    fakes.control_result = ERR_OK;
+    CHECK(call(SRV_APP_DELETE) && reply_number(&reply, TAG_SERVICE_RESULT) == ERR_OK);
+    CHECK(fakes.resets == 1 && fakes.reset_option == RESET_OPTION_ORIGIN);
+    begin_content();
+    CHECK(call(SRV_APP_DELETE) && reply_error(&reply) == ERR_L7_TAG_MISSING);
+}
+
+static void ask_area(RTS_UI32 session, RTS_UI32 area)
+{
+    begin_content();
+    BTagWrite32(&writer, TAG_APP_SESSION, session);
+    BTagWrite32(&writer, TAG_APP_AREA, area);
+    CHECK(call(SRV_APP_GET_AREA_ADDRESS));
+}
+
+static void the_address_of_an_area_is_that_which_pointers_have(void)
+{
+    uintptr_t address = 0;
+    BTAG tag;
+
+    setup();
+    fakes.area_size[APP_AREA_MEMORY] = 0;
+    ask_area(client.app_session, APP_AREA_RETAIN);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_APP_AREA_ADDRESS, sizeof(address), sizeof(address), &tag), ERR_OK);
+    memcpy(&address, tag.data, sizeof(address));
+    CHECK(address == (uintptr_t)fakes_area(APP_AREA_RETAIN));
+    ask_area(client.app_session, APP_AREA_MEMORY);
+    CHECK_EQUAL(reply_error(&reply), ERR_APP_MAPPED_AREA_NOT_FOUND);
+    ask_area(client.app_session, APP_AREA_COUNT);
+    CHECK_EQUAL(reply_error(&reply), ERR_APP_MAPPED_AREA_NOT_FOUND);
+    ask_area(client.app_session, 0xFFFFFFFF);
+    CHECK_EQUAL(reply_error(&reply), ERR_APP_MAPPED_AREA_NOT_FOUND);
+    ask_area(client.app_session + 1, APP_AREA_RETAIN);
+    CHECK_EQUAL(reply_error(&reply), ERR_APP_INVALID_SESSIONID);
+}
+
 int main(void)
 {
     RUN(login_gives_a_session_and_the_image_crc_as_guids);
@@ -384,5 +434,7 @@ int main(void)
     RUN(list_names_the_application);
     RUN(info_reports_the_strings_of_the_image);
     RUN(tasks_are_reported_with_their_times);
+    RUN(a_single_cycle_and_deletion_need_the_session_of_the_application);
+    RUN(the_address_of_an_area_is_that_which_pointers_have);
     return test_result();
 }

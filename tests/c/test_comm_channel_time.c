@@ -31,10 +31,10 @@ static void silent_client_loses_the_channel_after_thirty_seconds(void)
     CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
-static void keepalives_of_the_client_keep_the_channel(void)
+static void keepalives_keep_the_channel(RTS_UI8 flags)
 {
     setup();
-    RTS_UI8 keepalive[] = {CHANNEL_PKG_KEEPALIVE, CHANNEL_FLAG_TO_SERVER, 0, 0};
+    RTS_UI8 keepalive[] = {CHANNEL_PKG_KEEPALIVE, flags, 0, 0};
     BytesPut16(keepalive + 2, client.channel);
     for (int i = 0; i < 50; i++) {
         fakes_cycle(1000);
@@ -43,6 +43,16 @@ static void keepalives_of_the_client_keep_the_channel(void)
             CHECK_EQUAL(package[0], CHANNEL_PKG_KEEPALIVE);
     }
     CHECK(works(&client));
+}
+
+static void keepalives_of_the_client_keep_the_channel(void)
+{
+    keepalives_keep_the_channel(CHANNEL_FLAG_TO_SERVER);
+}
+
+static void so_do_those_without_a_direction(void)
+{
+    keepalives_keep_the_channel(0);
 }
 
 static void shutdown_closes_the_channel(void)
@@ -121,6 +131,7 @@ int main(void)
     RUN(keepalives_are_sent_when_there_is_nothing_else);
     RUN(silent_client_loses_the_channel_after_thirty_seconds);
     RUN(keepalives_of_the_client_keep_the_channel);
+    RUN(so_do_those_without_a_direction);
     RUN(shutdown_closes_the_channel);
     RUN(restart_of_the_runtime_forgets_the_channel);
     RUN(messages_survive_random_loss);

@@ -215,13 +215,15 @@ static void there_are_no_services_but_those_of_the_documentation(void)
     start();
     for (RTS_UI16 group = 0; group < L7_REPLY; group++) {
         bool known = group == SG_DEVICE || group == SG_APPLICATION || group == SG_LOG || group == SG_PLCSHELL ||
-                     group == SG_MONITORING2 || (COMM_PASSWORD && group == SG_USERMGR);
+                     group == SG_MONITORING2 || (COMM_PASSWORD && group == SG_USERMGR) ||
+                     (SRV_OTHER_CLIENTS && group == SG_SETTINGS);
         CHECK(client_request(&client, group, 0xFE, NULL, 0, &answer));
         CHECK_EQUAL(reply_error(&answer), known ? ERR_L7_UNKNOWNCMD : ERR_L7_UNKNOWNCMDGROUP);
     }
 }
 
-static const RTS_UI16 groups[] = {SG_DEVICE, SG_APPLICATION, SG_LOG, SG_PLCSHELL, SG_USERMGR, SG_MONITORING2};
+static const RTS_UI16 groups[] = {SG_DEVICE,   SG_APPLICATION, SG_LOG,        SG_SETTINGS,
+                                  SG_PLCSHELL, SG_USERMGR,     SG_MONITORING2};
 enum { LAST_TAG = 0x90, LONG_CONTENT = 1000 };
 
 /* One element after another in a container, or none of them: of this tag, and of `size` bytes. */

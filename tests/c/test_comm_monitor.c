@@ -68,9 +68,11 @@ static const RTS_UI8 *take_value(RTS_UI32 id, RTS_UI32 size)
 
 static bool take_failure(RTS_UI32 id, RTS_UI8 error)
 {
-    const RTS_UI8 *value = take_value(id | MON2_ID_FAILED, 1);
-
-    return value != NULL && *value == error;
+    if (values_size < 6 || BytesGet16(values) != (id | MON2_ID_FAILED) || BytesGet32(values + 2) != error)
+        return false;
+    values += 6;
+    values_size -= 6;
+    return true;
 }
 
 /* Reads one variable by program and returns its error (0: it was read). */
@@ -82,8 +84,8 @@ static RTS_UI32 read_error(const RTS_UI8 *code, RTS_UI32 code_size, RTS_UI32 siz
     CHECK_EQUAL(reply_error(&reply), ERR_OK);
     if (take_value(5, size) != NULL)
         return 0;
-    CHECK(values_size == 7 && BytesGet16(values) == (5 | MON2_ID_FAILED) && BytesGet32(values + 2) == 1);
-    return values[6];
+    CHECK(values_size == 8 && BytesGet16(values) == (5 | MON2_ID_FAILED) && BytesGet16(values + 6) == 0);
+    return BytesGet32(values + 2);
 }
 
 #define READ_ERROR(code, size) read_error((const RTS_UI8 *)(code), sizeof(code) - 1, size)
@@ -107,7 +109,7 @@ static void variables_of_all_sizes_are_read(void)
     CHECK((value = take_value(4, 8)) != NULL && memcmp(value, fakes_area(APP_AREA_OUTPUT) + 16, 8) == 0);
     CHECK((value = take_value(5, 13)) != NULL && memcmp(value, fakes_area(APP_AREA_MEMORY) + 5, 13) == 0);
     CHECK((value = take_value(6, 4)) != NULL && memcmp(value, fakes_area(APP_AREA_CODE) + 1, 4) == 0);
-    CHECK_EQUAL(values_size, 0);
+    CHECK(values_size < 4); /* padding */
 }
 
 static void every_alignment_and_size_is_read_right(void)
@@ -276,7 +278,7 @@ static void large_value_leaves_room_for_the_answers_after_it(void)
             CHECK(take_failure(id, MONITORING_ERR_BUFFERSIZE_EXCEEDED));
             failures++;
         }
-        CHECK_EQUAL(values_size, 0);
+        CHECK(values_size < 4); /* padding */
     }
     CHECK(failures > 0);
 }

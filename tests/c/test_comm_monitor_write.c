@@ -95,6 +95,19 @@ static void program_of_the_programming_system_is_recognised(void)
     CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x20, "\xAA\xBB", 2) == 0);
 }
 
+static void that_of_64_bit_systems_is_recognised(void)
+{
+    setup();
+    CHECK_EQUAL(WRITE_PROGRAM("\x15\x10\x00\x02\x10\x00\x06\x00\x17\x10\x09\x04\x1B\x06\x00\x01\x00\x00\x17\x08\x09\x08"
+                              "\x17\x0C\x09\x04\x04"),
+                ERR_OK);
+    CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x10, "\xAA\xBB", 2) == 0);
+    CHECK_EQUAL(WRITE_PROGRAM("\x15\x10\x00\x02\x20\x00\x06\x00\x17\x0C\x09\x04\x1B\x06\x00\x01\x00\x00\x17\x04\x09\x04"
+                              "\x17\x08\x09\x04\x04"), /* the head of one, the tail of the other */
+                MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x20, "\x20\x21", 2) == 0);
+}
+
 static void every_other_write_program_is_refused(void)
 {
     RTS_UI8 code[] = {0x15, 0x0C, 0x00, 0x02, 0x10, 0x00, 0x06, 0x00, 0x17, 0x0C, 0x09, 0x04, 0x1B, 0x06,
@@ -266,6 +279,7 @@ int main(void)
     RUN(variables_of_all_sizes_and_alignments_are_written);
     RUN(several_variables_are_written_by_one_request);
     RUN(program_of_the_programming_system_is_recognised);
+    RUN(that_of_64_bit_systems_is_recognised);
     RUN(every_other_write_program_is_refused);
     RUN(every_bit_is_written_and_no_other_changes);
     RUN(bits_are_written_through_pointers);

@@ -60,8 +60,8 @@ static const char *ask(const char *command)
 
 static void help_names_every_command(void)
 {
-    static const char *const names[] = {"?",        "rtsinfo",      "applist",  "getprgstat", "startprg",   "stopprg",
-                                        "resetprg", "resetprgcold", "tasklist", "plcload",    "channelinfo"};
+    static const char *const names[] = {"?",        "rtsinfo",      "applist", "getprgstat", "startprg", "stopprg",
+                                        "resetprg", "resetprgcold", "reload",  "tasklist",   "plcload",  "channelinfo"};
     char line[64];
 
     setup();
@@ -108,7 +108,8 @@ static void commands_that_change_something_do_it_once(void)
     CHECK_EQUAL(fakes.reset_option, RESET_OPTION_WARM);
     ask("resetprgcold");
     CHECK_EQUAL(fakes.reset_option, RESET_OPTION_COLD);
-    CHECK(fakes.starts == 1 && fakes.stops == 1 && fakes.resets == 2);
+    CHECK(strcmp(ask("reload"), "reload: done\r\n") == 0);
+    CHECK(fakes.starts == 1 && fakes.stops == 1 && fakes.resets == 2 && fakes.reloads == 1);
     CHECK_EQUAL(ask_part("startprg", 1), TAG_SHELL_LAST);
     CHECK_EQUAL(fakes.starts, 1);
 }

@@ -249,6 +249,22 @@ static void asymmetric_login_is_refused(void)
     CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
+static void settings_are_refused_to_everyone(void)
+{
+    setup();
+    for (RTS_UI16 service = SRV_SETTG_GET_INT; service <= SRV_SETTG_WRITE; service++) {
+        CHECK(client_request(&client, SG_SETTINGS, service, NULL, 0, &reply));
+        CHECK_EQUAL(reply_error(&reply), ERR_INVALID_SESSION_ID);
+    }
+    CHECK(client_login(&client));
+    for (RTS_UI16 service = SRV_SETTG_GET_INT; service <= SRV_SETTG_WRITE; service++) {
+        CHECK(client_request(&client, SG_SETTINGS, service, NULL, 0, &reply));
+        CHECK_EQUAL(reply_error(&reply), ERR_NO_ACCESS_RIGHTS);
+    }
+    CHECK(client_request(&client, SG_SETTINGS, SRV_SETTG_WRITE + 1, NULL, 0, &reply));
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_UNKNOWNCMD);
+}
+
 static void login_without_type_is_an_error(void)
 {
     setup();
@@ -553,6 +569,7 @@ int main(void)
     RUN(login_reply_tells_the_settings);
     RUN(malformed_empty_user_of_a_real_client_does_not_hurt);
     RUN(asymmetric_login_is_refused);
+    RUN(settings_are_refused_to_everyone);
     RUN(login_without_type_is_an_error);
     RUN(second_login_replaces_the_session);
     RUN(logout_ends_the_session);

@@ -96,6 +96,27 @@ static void a_scan_finds_it_from_near_and_by_broadcast(void)
     net_end();
 }
 
+/* Width 26: 24 bits of the host, 2 of the index. */
+static void ones_alone_are_the_address_of_all(void)
+{
+    static const RTS_UI8 ones[][4] = {{0xFF, 0xFF, 0xFF, 0xFF}, {0x03, 0xFF, 0xFF, 0xFF}};
+    RTS_UI8 to_ones[] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x12, 0, 0, 0, 0,
+                         0x12, 0x34, 0x02, 0xC2, 0x00, 0x04, 1, 2, 3, 4};
+
+    net_start("", "@");
+    int file = net_udp(0);
+    for (RTS_UI32 i = 0; i < RTS_COUNT(ones); i++) {
+        memcpy(to_ones + 6, ones[i], sizeof(ones[i]));
+        net_send_to(file, to_all(), to_ones, sizeof(to_ones));
+        CHECK(take_from_device(file) > 60);
+    }
+    to_ones[6] = 0x01;
+    net_send_to(file, to_all(), to_ones, sizeof(to_ones));
+    CHECK_EQUAL(take_from_device(file), 0);
+    close(file);
+    net_end();
+}
+
 static void an_answer_to_a_broadcast_comes_from_the_own_address_of_the_device(void)
 {
     net_start("", "@");
@@ -273,6 +294,7 @@ int main(void)
 {
     RUN(an_address_is_the_host_part_and_the_index_of_the_port);
     RUN(a_scan_finds_it_from_near_and_by_broadcast);
+    RUN(ones_alone_are_the_address_of_all);
     RUN(an_answer_to_a_broadcast_comes_from_the_own_address_of_the_device);
     RUN(what_is_sent_to_us_is_for_us_and_what_is_sent_to_all_need_not_be);
     RUN(it_reflects_nothing);

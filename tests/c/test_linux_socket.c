@@ -1,5 +1,5 @@
 /*
- * test_linux_socket.c - SysSocket: what a closed connection still sends, and one that is reset does not.
+ * test_linux_socket.c - SysSocket: what a closed connection still sends, and one that is reset does not; networks.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -104,9 +104,30 @@ static void one_that_is_reset_sends_nothing_more(void)
     end(&peer);
 }
 
+/* ---- the networks of the device ---- */
+
+static void the_networks_are_those_that_tools_reach_it_by(void)
+{
+    PORT_REASON reason;
+    SOCKNETWORK network;
+
+    CHECK_EQUAL(SysSockGetNetwork(0, &network), ERR_NO_OBJECT); /* none is served */
+    CHECK(PortTcpOpen("127.0.0.5:0", &reason));
+    CHECK(PortUdpOpen("127.0.0.5", &reason));
+    CHECK_EQUAL(SysSockGetNetwork(0, &network), ERR_OK);
+    CHECK(network.ip == 0x7F000005 && network.mask == 0xFF000000);
+    CHECK_EQUAL(SysSockGetNetwork(1, &network), ERR_NO_OBJECT); /* one for both */
+    PortSockClose();
+    CHECK(PortTcpOpen("0.0.0.0:0", &reason));
+    for (RTS_UI32 i = 0; SysSockGetNetwork(i, &network) == ERR_OK; i++)
+        CHECK(network.ip >> 24 != 127);
+    PortSockClose();
+}
+
 int main(void)
 {
     RUN(a_closed_connection_sends_what_was_taken);
     RUN(one_that_is_reset_sends_nothing_more);
+    RUN(the_networks_are_those_that_tools_reach_it_by);
     return test_result();
 }

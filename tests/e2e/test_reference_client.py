@@ -55,7 +55,6 @@ def test_it_does_what_published_clients_do(client, tool, device):
     assert u32(find(client.call(2, 0x14), 0x32)) == 1
     assert find(client.call(5, 3), 1).rstrip(b"\0") == b"PlcLog"
     assert find(client.call(5, 2, client.tag(5, struct.pack("<I", 2))), 5).rstrip(b"\0") == b"CmpAppEmbedded"
-    assert u16(find(client.call(6, 2), 0xFF7F)) == 0x301
     assert client.list_files() == ["Application.cdl", "PlcLog.txt", "recipe"]
     assert client.get_file("recipe") == bytes(range(256)) * 150
     assert client.get_file("Application.cdl") == (tool.folder / "app.cdl").read_bytes()

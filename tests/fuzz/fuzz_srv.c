@@ -93,6 +93,18 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
         return SEED(0x11, 1, "\x13\x04\x01\0\0\0\x10\x02" "?\0");
     case 19:
         return SEED(0x1B, 2, APP "\x03\x14" "\0\0\x01\0\0\0\x55\x0B\x00\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E");
+    case 24:
+        return SEED(1, 9, "\x58\x08" "M\0i\0x\0\0\0");
+    case 25:
+        return SEED(2, 0x22, "\x81\x01\x06\x11\x04" "SSSS");
+    case 26:
+        return SEED(2, 0x38, "\x11\x04" "SSSS" "\x13\x04\x01\0\0\0");
+    case 27:
+        return SEED(0x1B, 2, APP "\x03\x23" "\0\0\x02\0\0\0\x55\xAA\x1B\x00"
+                                 "\x15\x10\x00\x02\x10\x00\x06\x00\x17\x10\x09\x04\x1B\x06\x00\x01\x00\x00"
+                                 "\x17\x08\x09\x08\x17\x0C\x09\x04\x04");
+    case 28:
+        return SEED(6, 2, "\x81\x01\x08\x10\x02" "A\0" "\x11\x02" "B\0");
     default:
         return 0;
     }

@@ -507,7 +507,7 @@ class FakePlc:
             area, offset, followed = self._address(variable.bytes(lib.TAG_MON2_VAR_CODE))
             if area not in self.memory or offset + size > len(self.memory[area]):
                 error = lib.MONITORING_ERR_INVALID_POINTER if followed else lib.MONITORING_ERR_INVALID_INDEX
-                values += struct.pack("<HIB", index | lib.MON2_ID_FAILED, 1, error)
+                values += struct.pack("<HI", index | lib.MON2_ID_FAILED, error)
             else:
                 values += struct.pack("<HI", index, size) + self.memory[area][offset : offset + size]
         consistent = [bintag.u16(lib.TAG_MON2_CONSISTENT, 1)] if self.disturbed < 0 else []

@@ -129,9 +129,23 @@ def test_wrong_packed_data_are_refused(data: bytes) -> None:
 
 
 @settings(deadline=None)
-@given(image=CODE, start=st.integers(0, 8000), room=st.integers(33, 400), longest=st.integers(2, 9000))
-def test_blocks_keep_to_their_limits(image: bytes, start: int, room: int, longest: int) -> None:
+@given(
+    image=CODE,
+    start=st.integers(0, 8000),
+    room=st.integers(33, 400),
+    first=st.integers(33, 500) | st.just(0),
+    longest=st.integers(2, 9000),
+)
+def test_blocks_keep_to_their_limits(image: bytes, start: int, room: int, first: int, longest: int) -> None:
     start %= len(image)
-    blocks = list(Packer(image).blocks(start, room, longest))
+    blocks = list(Packer(image).blocks(start, room, longest, first))
     assert sum(block.size for block in blocks) == len(image) - start
     assert all(len(block.data) <= room and 0 < block.size <= longest for block in blocks)
+    assert len(blocks[0].data) <= (first or room)
+
+
+def test_the_first_block_does_not_wait_for_a_search_of_the_whole_image() -> None:
+    image = random.Random(3).randbytes(100_000)
+    packer = Packer(image)
+    next(packer.blocks(0, 4000, 65536, 900))
+    assert len(packer._same.previous) <= 2 * 900

@@ -88,6 +88,13 @@ def test_a_service_error_becomes_a_device_error_with_its_name() -> None:
     assert caught.value.result == lib.ERR_L7_UNKNOWNCMD
 
 
+def test_a_firmware_without_single_cycles_is_named_with_what_to_do() -> None:
+    bench = Bench()
+    with pytest.raises(DeviceError, match="SRV_OTHER_CLIENTS") as caught:
+        services.cycle(bench.session)
+    assert caught.value.code == "no-single-cycle"
+
+
 @settings(max_examples=50)
 @given(st.binary(max_size=60))
 def test_random_answers_are_errors_of_ours(content: bytes) -> None:

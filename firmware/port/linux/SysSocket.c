@@ -82,8 +82,22 @@ static SOCKADDRESS own_address(int file)
 typedef struct {
     RTS_UI32 ip;
     RTS_UI32 mask;
+    bool loopback;
     bool can_broadcast;
 } NETWORK;
+
+/* False when it has no IPv4 address. */
+static bool read_network(const struct ifaddrs *from, NETWORK *network)
+{
+    if (from->ifa_addr == NULL || from->ifa_addr->sa_family != AF_INET || from->ifa_netmask == NULL) {
+        return false;
+    }
+    network->ip = ntohl(((const struct sockaddr_in *)(const void *)from->ifa_addr)->sin_addr.s_addr);
+    network->mask = ntohl(((const struct sockaddr_in *)(const void *)from->ifa_netmask)->sin_addr.s_addr);
+    network->loopback = (from->ifa_flags & IFF_LOOPBACK) != 0;
+    network->can_broadcast = network->loopback || (from->ifa_flags & IFF_BROADCAST) != 0;
+    return true;
+}
 
 /* The network that an address belongs to; for 0.0.0.0 the first network that is not loopback. */
 static NETWORK find_network(RTS_UI32 ip)
@@ -94,14 +108,10 @@ static NETWORK find_network(RTS_UI32 ip)
         return found;
     }
     for (struct ifaddrs *next = all; next != NULL; next = next->ifa_next) {
-        if (next->ifa_addr == NULL || next->ifa_addr->sa_family != AF_INET || next->ifa_netmask == NULL) {
-            continue;
-        }
-        RTS_UI32 other = ntohl(((struct sockaddr_in *)(void *)next->ifa_addr)->sin_addr.s_addr);
-        RTS_UI32 mask = ntohl(((struct sockaddr_in *)(void *)next->ifa_netmask)->sin_addr.s_addr);
-        bool loopback = (next->ifa_flags & IFF_LOOPBACK) != 0;
-        if (ip == 0 ? !loopback : ((ip ^ other) & mask) == 0) {
-            found = (NETWORK){ip == 0 ? other : ip, mask, loopback || (next->ifa_flags & IFF_BROADCAST) != 0};
+        NETWORK other;
+        if (read_network(next, &other) && (ip == 0 ? !other.loopback : ((ip ^ other.ip) & other.mask) == 0)) {
+            found = other;
+            found.ip = ip == 0 ? other.ip : ip;
             break;
         }
     }
@@ -289,6 +299,42 @@ RTS_RESULT SysSockGetOwn(RTS_HANDLE socket, SOCKADDRESS *own, RTS_UI32 *prefix)
     NETWORK network = find_network(own->ip);
     own->ip = network.ip;
     *prefix = prefix_of(network.mask);
+    return ERR_OK;
+}
+
+/* Whether one of the sockets that tools use is reached by this address, which is replaced by the socket's own. */
+static bool serves(NETWORK *network)
+{
+    for (int purpose = SYSSOCK_TCP; purpose <= SYSSOCK_UDP; purpose++) {
+        if (sockets.source[purpose].file < 0) {
+            continue;
+        }
+        SOCKADDRESS own = own_address(sockets.source[purpose].file);
+        if (own.ip == 0 ? !network->loopback : ((own.ip ^ network->ip) & network->mask) == 0) {
+            network->ip = own.ip == 0 ? network->ip : own.ip;
+            return true;
+        }
+    }
+    return false;
+}
+
+RTS_RESULT SysSockGetNetwork(RTS_UI32 index, SOCKNETWORK *network)
+{
+    NETWORK found;
+    bool there = false;
+    struct ifaddrs *all;
+    make_ready();
+    if (getifaddrs(&all) != 0) {
+        return ERR_NO_OBJECT;
+    }
+    for (struct ifaddrs *next = all; next != NULL && !there; next = next->ifa_next) {
+        there = read_network(next, &found) && serves(&found) && index-- == 0;
+    }
+    freeifaddrs(all);
+    if (!there) {
+        return ERR_NO_OBJECT;
+    }
+    *network = (SOCKNETWORK){found.ip, found.mask};
     return ERR_OK;
 }
 

@@ -24,6 +24,7 @@
 #define COMM_ENDPOINTS 1
 #define SRV_MAX_GROUPS 10
 #define SRV_OTHER_CLIENTS 1
+#define SRV_NETWORKS 8
 #define TCP_BUFFER_SIZE 16384
 #define CAN_FD 1
 #define CAN_BLOCK_SIZE 0 /* the kernel has room */

@@ -139,16 +139,20 @@ void AppBoot(void)
         run_boot_project();
 }
 
+RTS_RESULT AppBootAgain(void)
+{
+    RTS_RESULT result;
+
+    AppUnload();
+    result = load_boot_project(true);
+    return result == ERR_OK ? AppStart() : result;
+}
+
 RTS_RESULT AppBootByHand(void)
 {
     RTS_UI32 active = AppCommitGet()->active;
-    RTS_RESULT result;
 
-    if (APP_MAY_STAY_STOPPED && active != SLOT_NONE && AppCommitGet()->state[active] == SLOT_FAILED) {
-        AppUnload();
-        result = load_boot_project(true);
-        if (result != ERR_OK)
-            return result;
-    }
+    if (APP_MAY_STAY_STOPPED && active != SLOT_NONE && AppCommitGet()->state[active] == SLOT_FAILED)
+        return AppBootAgain();
     return AppStart();
 }

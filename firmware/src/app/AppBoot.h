@@ -14,6 +14,10 @@
 /* Loads what is in flash, and starts it unless it failed before. */
 void AppBoot(void);
 
+/* The same for what is loaded now, by hand: also for what failed before, when there is none to go back to. Nothing is
+ * loaded after an error. */
+RTS_RESULT AppBootAgain(void);
+
 /* Starts what was loaded and not started, because a user asks for it: also what failed before, when there is none to go
  * back to. */
 RTS_RESULT AppBootByHand(void);

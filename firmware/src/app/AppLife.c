@@ -310,12 +310,18 @@ bool AppStopTasks(void)
     return true;
 }
 
-RTS_RESULT AppStart(void)
+/* Gives it its initial values if it waits for them. */
+static RTS_RESULT get_ready(void)
 {
     RTS_RESULT result = app.pending == INIT_DONE ? ERR_OK : AppInitialise();
 
-    if (result == ERR_OK && AppHasException())
-        result = ERR_EXCEPTION;
+    return result == ERR_OK && AppHasException() ? (RTS_RESULT)ERR_EXCEPTION : result;
+}
+
+RTS_RESULT AppStart(void)
+{
+    RTS_RESULT result = get_ready();
+
     if (result != ERR_OK)
         return result;
     AppPostEvent(EVT_PrepareStart);
@@ -332,6 +338,25 @@ RTS_RESULT AppStart(void)
     AppPostEvent(EVT_StartDone);
     return ERR_OK;
 }
+
+#if SRV_OTHER_CLIENTS
+/* Nothing is noted in flash: it may be done often, and a program that ends the runtime here does so again when it is
+ * started. */
+RTS_RESULT AppRunOnce(void)
+{
+    RTS_RESULT result = get_ready();
+
+    if (result != ERR_OK)
+        return result;
+    AppPostEvent(EVT_PrepareStart);
+    app.run_since_ms = SysTimeGetMs();
+    app.state = AS_RUN;
+    AppPostEvent(EVT_StartDone);
+    IecTaskRunOnce();
+    (void)AppStopTasks();
+    return AppHasException() ? ERR_EXCEPTION : ERR_OK;
+}
+#endif
 
 void AppCheckProof(void)
 {

@@ -48,6 +48,9 @@ RTS_RESULT AppReinitialise(bool cold);
 /* Starts the loaded application, initialised before if it was not yet. ERR_EXCEPTION: that failed. */
 RTS_RESULT AppStart(void);
 
+/* The same for one cycle of each task (IecTaskRunOnce), after which it is stopped. ERR_EXCEPTION: or that failed. */
+RTS_RESULT AppRunOnce(void);
+
 /* Stops the tasks; true when they ran. */
 bool AppStopTasks(void);
 

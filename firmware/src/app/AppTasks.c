@@ -44,7 +44,7 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
         return refuse(l, ERR_PARAMETER, "Task %u has no name.", U(l->image->task_count));
     if (task->kind > KIND_FREEWHEELING)
         return refuse(l, ERR_NOT_SUPPORTED, "Task %s has the unknown kind %u.", name, U(task->kind));
-    if (task->priority > 31)
+    if (task->priority > CDL_PRIORITY_LOWEST)
         return refuse(l, ERR_OUT_OF_LIMITS, "Task %s has priority %u, above 31.", name, U(task->priority));
     if (task->kind == KIND_CYCLIC && task->interval_us == 0)
         return refuse(l, ERR_PARAMETER, "Cyclic task %s has no interval.", name);

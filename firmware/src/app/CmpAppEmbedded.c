@@ -46,6 +46,28 @@ RTS_RESULT AppStopApplication(void)
     return ERR_OK;
 }
 
+#if SRV_OTHER_CLIENTS
+RTS_RESULT AppSingleCycle(void)
+{
+    AppHandlePendingException();
+    if (!is_loaded())
+        return ERR_APP_NOT_LOADED;
+    if (AppGetState() == AS_RUN)
+        return ERR_CALL_AGAIN;
+    if (AppIsInitialised() && AppHasException())
+        return ERR_INVALID_STATE;
+    return AppRunOnce();
+}
+#endif
+
+RTS_RESULT AppReload(void)
+{
+    if (AppCommitGet()->active == SLOT_NONE)
+        return ERR_APP_NOT_LOADED;
+    (void)AppStopApplication();
+    return AppBootAgain();
+}
+
 /* ---- reset ---- */
 
 static RTS_RESULT reset_origin(void)

@@ -7,6 +7,8 @@
 
 #include "CmpScheduleTimer.h"
 #include "SysExcept.h"
+#include "SysTime.h"
+#include "TaskTrigger.h"
 #include "rts_config.h"
 
 /* ---- the external function for checks in compiled code ---- */
@@ -45,6 +47,31 @@ RTS_NOINLINE void IecTaskStopAll(void)
     IecCycleStop();
     SchedStop();
     IecCycleCallOff();
+}
+
+static void run_each_once(RTS_UI32 priority, bool by_event)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < IecTaskGetCount(); i++) {
+        const CDL_TASK *task = TriggerGetTask(i);
+        bool waits = task->kind == KIND_EVENT || task->kind == KIND_EXTERNAL;
+        if (task->priority == priority && waits == by_event && (!waits || TriggerTake(i)))
+            (void)IecTaskCycle(i, SysTimeGetNs());
+    }
+}
+
+void IecTaskRunOnce(void)
+{
+    RTS_UI32 priority;
+
+    TriggerForget();
+    IecCycleStart();
+    for (priority = 0; priority <= CDL_PRIORITY_LOWEST; priority++)
+        run_each_once(priority, false);
+    for (priority = 0; priority <= CDL_PRIORITY_LOWEST; priority++)
+        run_each_once(priority, true);
+    IecTaskStopAll();
 }
 
 RTS_RESULT IecTaskGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)

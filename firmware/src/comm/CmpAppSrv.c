@@ -5,6 +5,7 @@
  */
 #include "CmpAppSrv.h"
 
+#include "AppAddress.h"
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
 #include "CmpIecTask.h"
@@ -122,6 +123,49 @@ static RTS_RESULT reset(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTagWrite16(reply, TAG_SERVICE_RESULT, verdict);
     return ERR_OK;
 }
+
+#if SRV_OTHER_CLIENTS
+static RTS_RESULT single_cycle(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    return control(request, reply, AppSingleCycle);
+}
+
+static RTS_RESULT reset_origin(void)
+{
+    return AppReset(RESET_OPTION_ORIGIN);
+}
+
+/* The application in flash and the one in RAM are one. */
+static RTS_RESULT delete_app(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    return control(request, reply, reset_origin);
+}
+
+/* Where an area is in memory. It says what each pointer in a variable says, and is good for comparing it with those: no
+ * service takes an address. */
+static RTS_RESULT get_area_address(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UI32 session = 0;
+    RTS_UI32 area = 0;
+    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_APP_SESSION, &session);
+
+    if (result == ERR_OK)
+        result = BTagFindUnsigned(&request->tags, TAG_APP_AREA, &area);
+    if (result == ERR_OK)
+        result = check_app_session(request->client, session);
+    if (result != ERR_OK)
+        return result;
+    RTS_UI64 address = (uintptr_t)AppGetAreaAddress(area, 0, 1);
+    if (address == 0)
+        return ERR_APP_MAPPED_AREA_NOT_FOUND;
+    BTagOpen(reply, TAG_APP_AREA_ADDRESS, BTAG_ALIGN_0);
+    BTagAppend32(reply, (RTS_UI32)address);
+    if (sizeof(uintptr_t) > sizeof(RTS_UI32))
+        BTagAppend32(reply, (RTS_UI32)(address >> 32));
+    BTagClose(reply);
+    return ERR_OK;
+}
+#endif
 
 /* ---- what is there ---- */
 
@@ -442,6 +486,11 @@ static const SRV_SERVICE services[] = {
     {SRV_APP_READ_APPLICATION_LIST, RIGHT_LOOK, read_application_list},
     {SRV_APP_READ_APPLICATION_INFO, RIGHT_LOOK, read_application_info},
     {SRV_APP_READ_TASK_INFO, RIGHT_LOOK, read_task_info},
+#endif
+#if SRV_OTHER_CLIENTS
+    {SRV_APP_DELETE, RIGHT_DOWNLOAD, delete_app},
+    {SRV_APP_SINGLE_CYCLE, RIGHT_CONTROL, single_cycle},
+    {SRV_APP_GET_AREA_ADDRESS, RIGHT_VIEW, get_area_address},
 #endif
 };
 

@@ -141,6 +141,9 @@ static void open_all(void)
     (void)SysSockGetOwn(udp.own.socket, &own, &prefix);
     driver->address_words =
         (RTS_UI8)BlkDrvUdpPutAddress(own.ip, prefix, (own.port - UDP_PORT) % UDP_PORTS, driver->address);
+#if SRV_OTHER_CLIENTS
+    udp.broadcast.driver.address_bits = (RTS_UI8)(IP_BITS - prefix + UDP_INDEX_BITS);
+#endif
     udp.broadcast.driver.address_words = driver->address_words;
     memcpy(udp.broadcast.driver.address, driver->address, sizeof(driver->address));
 }

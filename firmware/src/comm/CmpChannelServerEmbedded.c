@@ -546,12 +546,18 @@ static COMM_CLIENT *find_owner(const ROUTER_PEER *peer, RTS_UI16 id)
     return client != NULL && RouterIsSamePeer(peer, &client->channel.peer) ? client : NULL;
 }
 
+/* Some clients leave out the direction of their keepalives. */
+static bool is_to_server(const CHANNEL_HEADER *head)
+{
+    return (head->flags & CHANNEL_FLAG_TO_SERVER) != 0 || (SRV_OTHER_CLIENTS && head->type == CHANNEL_PKG_KEEPALIVE);
+}
+
 static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
     const CHANNEL_HEADER *head = (const CHANNEL_HEADER *)data;
     const CHANNEL_ACK *ack = (const CHANNEL_ACK *)data;
 
-    if (size < sizeof(*head) || (head->flags & CHANNEL_FLAG_TO_SERVER) == 0) {
+    if (size < sizeof(*head) || !is_to_server(head)) {
         COMM_COUNT(counters.malformed);
         return;
     }

@@ -12,6 +12,8 @@
 #include "CmpPackets.h"
 #include "CmpSrv.h"
 #include "CmpUserMgr.h"
+#include "NodeName.h"
+#include "SysSocket.h"
 #include "SysTarget.h"
 #include "rts_config.h"
 
@@ -38,6 +40,30 @@ static void write_serial_number(BTAG_WRITER *reply, const char *text)
     BTagAppendText(reply, text, NS_MAX_SERIAL);
     BTagClose(reply);
 }
+
+#if SRV_NETWORKS > 0
+/* u16 count, and for each u32 address and u32 mask. */
+static void write_networks(BTAG_WRITER *reply)
+{
+    SOCKNETWORK network;
+    RTS_UI32 count = 0;
+
+    BTagOpen(reply, TAG_DEV_NETWORKS, BTAG_ALIGN_2);
+    RTS_UI8 *number = BTagReserve(reply, sizeof(WIRE_UI16));
+    for (; count < SRV_NETWORKS && SysSockGetNetwork(count, &network) == ERR_OK; count++) {
+        BTagAppend32(reply, network.ip);
+        BTagAppend32(reply, network.mask);
+    }
+    if (number != NULL)
+        BytesPut16(number, count);
+    BTagClose(reply);
+}
+#else
+static void write_networks(const BTAG_WRITER *reply)
+{
+    RTS_UNUSED(reply);
+}
+#endif
 
 static void write_stack(BTAG_WRITER *reply)
 {
@@ -72,11 +98,12 @@ static RTS_RESULT get_target_ident(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTagWrite32(reply, TAG_DEV_RTS_VERSION, RTS_VERSION);
     write_wide_text(reply, TAG_DEV_DEVICE_NAME, target->device_name, NS_MAX_TYPE_NAMES);
     write_wide_text(reply, TAG_DEV_VENDOR_NAME, target->vendor_name, NS_MAX_TYPE_NAMES);
-    write_wide_text(reply, TAG_DEV_NODE_NAME, target->node_name, NS_MAX_NODE_NAME);
+    write_wide_text(reply, TAG_DEV_NODE_NAME, NodeNameOf(target), NS_MAX_NODE_NAME);
     BTagWrite16(reply, TAG_DEV_MAX_CHANNELS, COMM_MAX_CLIENTS);
     if (SRV_OTHER_CLIENTS)
         BTagWrite32(reply, TAG_DEV_FLAGS, 0); /* there is no encryption */
     write_serial_number(reply, target->serial_number);
+    write_networks(reply);
     if (SRV_INFORMATION)
         write_stack(reply);
     request->reply_session = L7_SESSION_EMPTY;
@@ -212,6 +239,57 @@ static RTS_RESULT set_operation_mode(SRV_REQUEST *request, BTAG_WRITER *reply)
         BTagWrite16(reply, TAG_SERVICE_RESULT, mode == DEV_MODE_DEBUG ? ERR_OK : ERR_NOT_SUPPORTED);
     return result;
 }
+
+/* Takes the low half of UTF-16 characters up to the first NUL; false when there are too many, or others than ASCII. */
+static bool read_name(const BTAG *wide, char *name)
+{
+    for (RTS_UI32 i = 0; i <= NS_MAX_NODE_NAME; i++) {
+        RTS_UI32 character = 2 * i + 2 <= wide->size ? BytesGet16(wide->data + 2 * i) : 0;
+        name[i] = (char)character;
+        if (character == 0)
+            return true;
+        if (character > '~')
+            return false;
+    }
+    return false;
+}
+
+static RTS_RESULT set_node_name(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    char name[NS_MAX_NODE_NAME + 1];
+    BTAG tag;
+    RTS_RESULT result = BTagFind(&request->tags, TAG_DEV_NEW_NODE_NAME, 0, request->tags.size, &tag);
+
+    if (result == ERR_OK)
+        BTagWrite16(reply, TAG_SERVICE_RESULT, read_name(&tag, name) ? NodeNameSet(name) : ERR_PARAMETER);
+    return result;
+}
+
+/* Settings are constants of the firmware (CmpSettings.h): no client has the right to see or change them. Writing such
+ * limits was how others were attacked (CVE-2020-7052). */
+static RTS_RESULT refuse_setting(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UNUSED(request);
+    RTS_UNUSED(reply);
+    return ERR_NO_ACCESS_RIGHTS;
+}
+
+static const SRV_SERVICE settings[] = {
+    {SRV_SETTG_GET_INT, RIGHT_VIEW, refuse_setting},    {SRV_SETTG_SET_INT, RIGHT_VIEW, refuse_setting},
+    {SRV_SETTG_GET_STRING, RIGHT_VIEW, refuse_setting}, {SRV_SETTG_SET_STRING, RIGHT_VIEW, refuse_setting},
+    {SRV_SETTG_REMOVE, RIGHT_VIEW, refuse_setting},     {SRV_SETTG_READ_ALL, RIGHT_VIEW, refuse_setting},
+    {SRV_SETTG_WRITE, RIGHT_VIEW, refuse_setting},
+};
+
+static RTS_RESULT register_settings(void)
+{
+    return SrvRegisterGroup(SG_SETTINGS, settings, RTS_COUNT(settings));
+}
+#else
+static RTS_RESULT register_settings(void)
+{
+    return ERR_OK;
+}
 #endif
 
 static const SRV_SERVICE services[] = {
@@ -225,10 +303,17 @@ static const SRV_SERVICE services[] = {
 #if SRV_OTHER_CLIENTS
     {SRV_DEV_GET_OPERATION_MODE, RIGHT_LOOK, get_operation_mode},
     {SRV_DEV_SET_OPERATION_MODE, RIGHT_CONTROL, set_operation_mode},
+    {SRV_DEV_SET_NODE_NAME, RIGHT_DOWNLOAD, set_node_name},
 #endif
 };
 
 RTS_RESULT CmpDevice_Hook(CMP_HOOK hook)
 {
-    return hook == CH_INIT3 ? SrvRegisterGroup(SG_DEVICE, services, RTS_COUNT(services)) : ERR_OK;
+    RTS_RESULT result = ERR_OK;
+
+    if (hook == CH_INIT3)
+        result = SrvRegisterGroup(SG_DEVICE, services, RTS_COUNT(services));
+    if (hook == CH_INIT3 && result == ERR_OK)
+        result = register_settings();
+    return result;
 }

@@ -473,6 +473,15 @@ static RTS_RESULT begin(const COMM_CLIENT *client, const FILE_ENTRY *entry)
     return ERR_OK;
 }
 
+/* What a client has begun ends with its session. */
+static void drop_orphan(void)
+{
+    if (files.writer == NULL || files.writer->session.id == files.writer_session)
+        return;
+    files.writer = NULL;
+    FileStoreAbort();
+}
+
 static RTS_RESULT start_download(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     FILE_ENTRY entry;
@@ -587,6 +596,8 @@ RTS_RESULT CmpFileTransfer_Hook(CMP_HOOK hook)
     if (hook == CH_INIT) {
         memset(&files, 0, sizeof(files));
         FileStoreOpen();
+    } else if (hook == CH_COMM_CYCLE) {
+        drop_orphan();
     }
     return hook == CH_INIT3 ? SrvRegisterGroup(SG_FILE_TRANSFER, services, RTS_COUNT(services)) : ERR_OK;
 }

@@ -23,8 +23,7 @@
 
 enum {
     ENTRY_HEAD = sizeof(MON2_VALUE),
-    ENTRY_FAILED = ENTRY_HEAD + 1,
-    CONSISTENT_SIZE = 8, /* its element, with what aligns it */
+    CONSISTENT_SIZE = 8, /* its element, with the padding before it */
     ALL_BITS = 0xFF,
 };
 
@@ -112,27 +111,46 @@ static RTS_UI32 take_mask(PROGRAM *program)
     return *(program->code - 1);
 }
 
-/* The address alone; to write also some bits at it, or the programming system's program: allocate a frame, address, and
- * unless disabled copy to it. *mask: NULL when this is not to write. */
+/* What the programs of programming systems have around the address to write at: allocate a frame; unless disabled copy
+ * to the address. For 32-bit CPUs, and as a published client has it for those of 64 bits. */
+enum { COPY_HEAD = 3, COPY_TAIL = 19, COPY_SHAPES = SRV_OTHER_CLIENTS ? 2 : 1 };
+
+/* clang-format off */
+static const RTS_UI8 copy_shapes[COPY_SHAPES][COPY_HEAD + COPY_TAIL] = {
+    {0x15, 0x0C, 0x00, 0x17, 0x0C, 0x09, 0x04, 0x1B, 0x06, 0x00, 0x01, 0x00, 0x00,
+     0x17, 0x04, 0x09, 0x04, 0x17, 0x08, 0x09, 0x04, MON2_OP_CPY},
+#if SRV_OTHER_CLIENTS
+    {0x15, 0x10, 0x00, 0x17, 0x10, 0x09, 0x04, 0x1B, 0x06, 0x00, 0x01, 0x00, 0x00,
+     0x17, 0x08, 0x09, 0x08, 0x17, 0x0C, 0x09, 0x04, MON2_OP_CPY},
+#endif
+};
+/* clang-format on */
+
+/* Takes the head of such a program; what its tail must be, or NULL. */
+static const RTS_UI8 *take_copy_head(PROGRAM *program)
+{
+    for (RTS_UI32 i = 0; i < COPY_SHAPES; i++) {
+        if (goes_on_with(program, copy_shapes[i], COPY_HEAD)) {
+            skip(program, COPY_HEAD);
+            return copy_shapes[i] + COPY_HEAD;
+        }
+    }
+    return NULL;
+}
+
+/* The address alone; to write also some bits at it, or a program that copies to it. *mask: NULL when this is not to
+ * write. */
 static MON_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask)
 {
-    static const RTS_UI8 head[] = {0x15, 0x0C, 0x00};
-    /* clang-format off */
-    static const RTS_UI8 tail[] = {0x17, 0x0C, 0x09, 0x04, 0x1B, 0x06, 0x00, 0x01, 0x00, 0x00,
-                                   0x17, 0x04, 0x09, 0x04, 0x17, 0x08, 0x09, 0x04, MON2_OP_CPY};
-    /* clang-format on */
-    RTS_UI32 tail_size = 0;
-
-    if (mask != NULL && goes_on_with(&program, head, sizeof(head))) {
-        skip(&program, sizeof(head));
-        tail_size = sizeof(tail);
-    }
+    const RTS_UI8 *tail = mask != NULL ? take_copy_head(&program) : NULL;
     MON_RESULT result = take_address(&program, address);
+
     if (result != MONITORING_ERR_OK)
         return result;
-    if (!goes_on_with(&program, tail, tail_size))
+    if (tail != NULL && !goes_on_with(&program, tail, COPY_TAIL))
         return MONITORING_ERR_UNSUPPORTED_OPERATOR;
-    skip(&program, tail_size);
+    if (tail != NULL)
+        skip(&program, COPY_TAIL);
     if (mask != NULL)
         *mask = take_mask(&program);
     return is_end(&program) ? MONITORING_ERR_OK : MONITORING_ERR_UNSUPPORTED_OPERATOR;
@@ -267,18 +285,16 @@ static void read_variable(BTAG_WRITER *reply, const READ_VAR *var, RTS_UI32 rese
         result = MONITORING_ERR_BUFFERSIZE_EXCEEDED;
     if (result != MONITORING_ERR_OK) {
         id |= MON2_ID_FAILED;
-        size = 1;
+        size = result;
     }
     BytesPut16(head.id, id);
     BytesPut32(head.size, size);
     BTagAppend(reply, &head, sizeof(head));
-    RTS_UI8 *value = BTagReserve(reply, size);
-    if (value == NULL)
+    if (result != MONITORING_ERR_OK)
         return;
-    if (result == MONITORING_ERR_OK)
+    RTS_UI8 *value = BTagReserve(reply, size);
+    if (value != NULL)
         load(value, memory, size);
-    else
-        *value = result;
 }
 
 static RTS_RESULT count_variables(BTAG_READER list, RTS_UI32 *count)
@@ -308,8 +324,9 @@ static RTS_RESULT read_list(BTAG_READER *list, BTAG_WRITER *reply)
         var.id = i++;
         result = parse_variable(list, &tag, &var);
         if (result == ERR_OK)
-            read_variable(reply, &var, (count - i) * ENTRY_FAILED + CONSISTENT_SIZE);
+            read_variable(reply, &var, (count - i) * ENTRY_HEAD + CONSISTENT_SIZE);
     }
+    BTagPad(reply);
     BTagClose(reply);
     return result;
 }

@@ -10,6 +10,7 @@
 #include "CMUtils.h"
 #include "CmpBytes.h"
 #include "CmpPackets.h"
+#include "NodeName.h"
 #include "SysTarget.h"
 #include "rts_config.h"
 
@@ -46,7 +47,7 @@ static RTS_UI8 *put_body(NS_REPLY_0400 *reply, const SYS_TARGET *target, bool is
 
     BytesPut16(old->max_channels, COMM_MAX_CLIENTS);
     old->little_endian = 1;
-    BytesPut16(old->node_length, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
+    BytesPut16(old->node_length, put_name(&names, NodeNameOf(target), NS_MAX_NODE_NAME));
     RTS_UI32 device = put_name(&names, target->device_name, NS_MAX_TYPE_NAMES);
     BytesPut16(old->device_length, device);
     BytesPut16(old->vendor_length, put_name(&names, target->vendor_name, NS_MAX_TYPE_NAMES - device));
@@ -68,7 +69,7 @@ static RTS_UI8 *put_body_0101(NS_REPLY_0101 *reply, const SYS_TARGET *target)
     BytesPut32(reply->target_type, target->type);
     BytesPut16(reply->max_channels, COMM_MAX_CLIENTS);
     reply->little_endian = 1;
-    BytesPut16(reply->node_length, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
+    BytesPut16(reply->node_length, put_name(&names, NodeNameOf(target), NS_MAX_NODE_NAME));
     BytesPut16(reply->device_length, put_name(&names, target->device_name, NS_MAX_TYPE_NAMES));
     return names.place;
 }
@@ -90,7 +91,7 @@ static RTS_UI16 choose_version(RTS_UI16 wanted)
 /* Compares UTF-16LE text, with or without NUL, with our node name. */
 static bool is_our_name(const RTS_UI8 *text, RTS_UI32 size)
 {
-    const char *own = SysTargetGet()->node_name;
+    const char *own = NodeNameOf(SysTargetGet());
 
     for (RTS_UI32 i = 0;; i++) {
         RTS_UI32 character = 2 * i + 2 <= size ? BytesGet16(text + 2 * i) : 0;

@@ -17,6 +17,7 @@
 #include "CmpDevice.h"
 #include "CmpIecTask.h"
 #include "CmpSrv.h"
+#include "NodeName.h"
 #include "SysExcept.h"
 #include "SysTarget.h"
 #include "rts_config.h"
@@ -88,7 +89,7 @@ static void print_device(SHELL_OUTPUT *out)
 
     print(out, "Device: %s", target->device_name);
     print(out, "Vendor: %s", target->vendor_name);
-    print(out, "Node: %s", target->node_name);
+    print(out, "Node: %s", NodeNameOf(target));
     print(out, "Serial number: %s", target->serial_number);
     print(out, "Target: type 0x%X, id 0x%X, version 0x%X", (unsigned)target->type, (unsigned)target->id,
           (unsigned)target->version);
@@ -211,6 +212,7 @@ static const SHELL_COMMAND commands[] = {
     {"stopprg", "stop the application", RIGHT_CONTROL, AppStopApplication, NULL},
     {"resetprg", "warm reset of the application", RIGHT_CONTROL, reset_warm, NULL},
     {"resetprgcold", "cold reset of the application", RIGHT_CONTROL, reset_cold, NULL},
+    {"reload", "load and start the boot project again", RIGHT_CONTROL, AppReload, NULL},
     {"tasklist", "tasks and their times", RIGHT_VIEW, NULL, print_tasks},
     {"channelinfo", "channels and lines, and what went wrong there", RIGHT_VIEW, NULL, print_channels},
     {"plcload", "share of the time that cyclic tasks take", RIGHT_VIEW, NULL, print_load},

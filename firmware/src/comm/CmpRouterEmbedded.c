@@ -49,20 +49,37 @@ static bool parse_header(const RTS_UI8 *data, RTS_UI32 size, HEADER *header)
     return true;
 }
 
-/* Ones alone: to all nodes, as no receiver is. */
-static bool is_all_ones(const HEADER *header)
+#if SRV_OTHER_CLIENTS
+/* Ones in the last `bits`, zeros before them. */
+static bool has_ones(const HEADER *header, RTS_UI32 bits)
 {
-    for (RTS_UI32 i = 0; i < 2 * header->receiver_words; i++)
-        if (header->receiver[i] != 0xFF)
+    for (RTS_UI32 i = 2 * header->receiver_words; i-- > 0; bits -= bits < 8 ? bits : 8)
+        if (header->receiver[i] != (bits < 8 ? (1u << bits) - 1 : 0xFF))
             return false;
     return true;
 }
+
+/* Ones alone: to all nodes, as no receiver is. */
+static bool is_to_all(const BLK_DRV *driver, const HEADER *header)
+{
+    return has_ones(header, 16 * header->receiver_words) ||
+           (header->receiver_words == driver->address_words && driver->address_bits != 0 &&
+            has_ones(header, driver->address_bits));
+}
+#else
+static bool is_to_all(const BLK_DRV *driver, const HEADER *header)
+{
+    RTS_UNUSED(driver);
+    RTS_UNUSED(header);
+    return false;
+}
+#endif
 
 static bool is_for_us(const BLK_DRV *driver, const ROUTER_HEADER *fixed, const HEADER *header)
 {
     if ((fixed->flags & ROUTER_FLAG_RELATIVE) != 0 || fixed->hops >> ROUTER_HOP_SHIFT == 0)
         return false;
-    if (driver->point_to_point || header->receiver_words == 0 || (SRV_OTHER_CLIENTS && is_all_ones(header)))
+    if (driver->point_to_point || header->receiver_words == 0 || is_to_all(driver, header))
         return true;
     return header->receiver_words == driver->address_words &&
            memcmp(header->receiver, driver->address, 2 * header->receiver_words) == 0;

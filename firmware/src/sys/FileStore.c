@@ -222,6 +222,11 @@ RTS_RESULT FileStoreWrite(const RTS_UI8 *data, RTS_UI32 size)
     return result;
 }
 
+bool FileStoreIsWriting(void)
+{
+    return store.writing;
+}
+
 RTS_UI32 FileStorePosition(void)
 {
     return store.written;

@@ -198,6 +198,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(command("status", "show the state of the program"))
     _add_link(command("start", "start the program"))
     _add_link(command("stop", "stop the program"))
+    _add_link(command("cycle", "run one cycle of each task of a stopped program"))
     reset = command("reset", "reset the program; it is stopped afterwards")
     reset.add_argument(
         "option", choices=["warm", "cold", "origin"],

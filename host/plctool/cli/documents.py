@@ -510,6 +510,12 @@ def stop(plc: Controller) -> Document:
     return status(plc)
 
 
+def cycle(plc: Plc) -> Document:
+    """Runs one cycle of a stopped program; the state that it leads to."""
+    plc.cycle()
+    return status(plc)
+
+
 def reset(plc: Controller, option: str) -> Document:
     """Resets the program; the state that it leads to."""
     plc.reset(option)

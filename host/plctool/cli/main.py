@@ -324,6 +324,10 @@ def _stop(args: argparse.Namespace) -> int:
     return _on_device(args, documents.stop, output.status_text)
 
 
+def _cycle(args: argparse.Namespace) -> int:
+    return _on_device(args, documents.cycle, output.status_text)
+
+
 def _reset(args: argparse.Namespace) -> int:
     return _on_device(args, lambda plc: documents.reset(plc, args.option), output.status_text)
 
@@ -521,7 +525,8 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build": _build, "check": _check, "info": _info, "image": _image, "symbols": _symbols, "run": _run,
     "test": _test, "new": _new,
     "export": _export, "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
-    "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
+    "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "cycle": _cycle,
+    "reset": _reset,
     "tasks": _tasks, "log": _log, "shell": _shell, "passwd": _passwd,
     "files": _files, "source": _source, "port-check": _port_check,
     "read": _read, "write": _write, "watch": _watch, "gateway": _gateway, "completion": _completion, "man": _man,

@@ -140,17 +140,16 @@ def _read_batch(session: Session, image_crc: int, batch: Sequence[AreaRange]) ->
         if len(content) < _VALUE_HEAD.size:
             break
         head = _VALUE_HEAD.unpack(content)
-        value_id = head.id
-        value = content[_VALUE_HEAD.size : _VALUE_HEAD.size + head.size]
-        content = content[_VALUE_HEAD.size + head.size :]
-        if value_id == index | lib.MON2_ID_FAILED and value:
-            if not _leads_nowhere(piece, value[0]):
-                raise _monitoring_error("read", value[0])
+        content = content[_VALUE_HEAD.size :]
+        if head.id == index | lib.MON2_ID_FAILED:
+            if not _leads_nowhere(piece, head.size):  # in its place is the error
+                raise _monitoring_error("read", head.size)
             values.append(None)
-        elif value_id != index or len(value) != piece.size:
+        elif head.id != index or head.size != piece.size or len(content) < piece.size:
             break
         else:
-            values.append(value)
+            values.append(content[: piece.size])
+            content = content[piece.size :]
     if len(values) != len(batch):
         raise bintag.malformed("values are missing")
     return values, tags.find(lib.TAG_MON2_CONSISTENT) is not None

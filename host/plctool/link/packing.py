@@ -48,21 +48,22 @@ class Packer:
 
     def __init__(self, image: bytes) -> None:
         self._image = image
-        self._same = _chain(image, _SEARCHED)
-        self._pairs = _chain(image, 2)
+        self._same = _Chain(image, _SEARCHED)
+        self._pairs = _Chain(image, 2)
 
-    def blocks(self, start: int, room: int, longest: int) -> Iterator[Packed]:
+    def blocks(self, start: int, room: int, longest: int, first_room: int = 0) -> Iterator[Packed]:
         """The image from `start` on, in blocks of `room` bytes at most (more than 32) that unpack to no more than
-        `longest`."""
+        `longest`; the first one of `first_room`, if that is less and not 0, so that it is there sooner."""
         steps: deque[_Step] = deque()
         searched = position = start
         while position < len(self._image):
-            writer = _Writer(self._image, position, room, longest)
+            first = position == start and 0 < first_room < room
+            writer = _Writer(self._image, position, first_room if first else room, longest)
             while not writer.is_full:
                 if not steps:
                     if searched == len(self._image):
                         break
-                    end = min(searched + _AT_A_TIME, len(self._image))
+                    end = min(searched + (first_room if first else _AT_A_TIME), len(self._image))
                     steps.extend(self._search(searched, end))
                     searched = end
                 left = writer.add(steps.popleft())
@@ -73,6 +74,8 @@ class Packer:
 
     def _search(self, start: int, end: int) -> list[_Step]:
         """The way from `start` to `end` that takes the fewest bits, as far as it looks."""
+        self._same.extend(end)
+        self._pairs.extend(end)
         count = end - start
         cost = [0] + [1 << 60] * count
         steps: list[tuple[int, int]] = [(0, 0)] * (count + 1)  # by which the place is reached
@@ -94,9 +97,9 @@ class Packer:
             size = self._common(at, last, 0, end)
             for part in _parts(1, size):
                 yield part, last, 1 + _BITS[part]
-        if at - self._pairs[at] <= _LOW and self._pairs[at] >= 0 and at + 2 <= end:
-            yield 2, at - self._pairs[at], _PAIR_BITS
-        found, place = _SEARCHED - 1, self._same[at]
+        if at - self._pairs.previous[at] <= _LOW and self._pairs.previous[at] >= 0 and at + 2 <= end:
+            yield 2, at - self._pairs.previous[at], _PAIR_BITS
+        found, place = _SEARCHED - 1, self._same.previous[at]
         for _ in range(_CHAIN):
             if place < 0 or at - place > _FARTHEST:
                 return
@@ -106,7 +109,7 @@ class Packer:
                 for part in _parts(found + 1, size):
                     yield part, at - place, bits + _BITS[part - 1]
                 found = size
-            place = self._same[place]
+            place = self._same.previous[place]
 
     def _common(self, at: int, distance: int, found: int, end: int) -> int:
         """How many bytes from `at` on are those `distance` before; 0 if no more than `found`."""
@@ -120,15 +123,21 @@ class Packer:
         return to - at
 
 
-def _chain(image: bytes, count: int) -> list[int]:
-    """For each place the previous one with the same `count` bytes; -1: none."""
-    newest: dict[bytes, int] = {}
-    same = []
-    for at in range(len(image)):
-        key = image[at : at + count]
-        same.append(newest.get(key, -1))
-        newest[key] = at
-    return same
+class _Chain:
+    """For each place, up to which it was extended, the `previous` one with the same `count` bytes; -1: none."""
+
+    def __init__(self, image: bytes, count: int) -> None:
+        self.previous: list[int] = []
+        self._image, self._count = image, count
+        self._newest: dict[bytes, int] = {}
+
+    def extend(self, end: int) -> None:
+        """To all places before `end`."""
+        image, count, newest = self._image, self._count, self._newest
+        for at in range(len(self.previous), end):
+            key = image[at : at + count]
+            self.previous.append(newest.get(key, -1))
+            newest[key] = at
 
 
 def _parts(first: int, size: int) -> range:

@@ -206,6 +206,16 @@ def read_status(session: Session) -> Status:
     return Status(app_state(state.state, state.op_state), image.crc, image.size, exception, state.op_state)
 
 
+def loaded_crc(session: Session) -> int:
+    """CRC of the application's image, 0 without one; logs in to it."""
+    try:
+        return session.recover(session.application).image_crc
+    except DeviceError as error:
+        if error.result != lib.ERR_APP_NOT_EXIST:
+            raise
+        return 0
+
+
 def app_state(state: int, operating: int) -> AppState:
     """From AS_* and the OS_* flags."""
     if operating & lib.OS_EXCEPTION:
@@ -232,6 +242,21 @@ def start(session: Session, checked: bool = False) -> None:
 
 def stop(session: Session) -> None:
     _check_control(session.recover(partial(_control, session, lib.SRV_APP_STOP)), "stop")
+
+
+def cycle(session: Session) -> None:
+    """Runs one cycle of each task of an application that is stopped. Not again when no reply came: it may have run."""
+    try:
+        reply = session.recover(partial(_control, session, lib.SRV_APP_SINGLE_CYCLE), repeatable=False)
+    except DeviceError as error:
+        if error.result != lib.ERR_L7_UNKNOWNCMD:
+            raise
+        raise DeviceError(
+            "The firmware of this device has no single cycle; SRV_OTHER_CLIENTS gives it (docs/compatibility.md).",
+            "no-single-cycle",
+            error.result,
+        ) from None
+    _check_control(reply, "cycle")
 
 
 def reset(session: Session, option: int) -> None:
@@ -278,6 +303,7 @@ def read_tasks(session: Session) -> list[TaskInfo]:
 
 _BLOCK_OVERHEAD = 44  # layer 7 header and tags around the data of a block, bytes
 _PACKED_SIZE = 4096  # of packed data at most: searching for so much takes less time than the line is ahead, bytes
+_FIRST_PACKED_SIZE = 900  # of the first message: the line need not wait for a long search, and is busy during the next
 _BLOCK_ALIGN = 16  # flash is written best in whole program units
 
 
@@ -360,7 +386,8 @@ class _Transfer:
     def _packed_blocks(self, start_at: int, room: int, longest: int) -> Iterator[tuple[bintag.Tag, int]]:
         self._packer = self._packer or Packer(self._image)
         offset = start_at
-        for block in self._packer.blocks(start_at, min(room - _PACKED.size, _PACKED_SIZE), longest):
+        most = min(room - _PACKED.size, _PACKED_SIZE)
+        for block in self._packer.blocks(start_at, most, longest, _FIRST_PACKED_SIZE):
             if len(block.data) + _PACKED.size < block.size:
                 yield bintag.raw(lib.TAG_CDL_PACKED, _PACKED.pack(unpacked=block.size) + block.data), block.size
             else:
