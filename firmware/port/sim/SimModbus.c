@@ -170,8 +170,7 @@ static bool is_device(const IoConfigConnector *connector)
 {
     RTS_UI32 fault;
 
-    return connector->parent != IO_CONFIG_NONE &&
-           strcmp(IoMgrConfigGetDriverName(connector), "IoDrvModbus") == 0 &&
+    return connector->parent != IO_CONFIG_NONE && strcmp(IoMgrConfigGetDriverName(connector), "IoDrvModbus") == 0 &&
            IoMgrReadParameter(IoMgrConfigGetIndex(connector), IO_SIM_ABSENT, &fault, 32, 0) == ERR_OK;
 }
 
