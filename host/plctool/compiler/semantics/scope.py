@@ -148,8 +148,8 @@ class Scope:
         return symbol or self.globals.own_unit(self._without_foreign(key))
 
     def _foreign_constant(self, key: str, bare: str) -> GlobalSymbol | None:
-        """The constant of the program in `tcunit.limit`. Not a variable, and not where `tcunit` is like a name that there
-        is: `motr.speed` is a mistake, whatever else is called `speed`."""
+        """The constant of the program in `tcunit.limit`. Not a variable, and not where `tcunit` is like another name:
+        `motr.speed` is a mistake, whatever else is called `speed`."""
         symbol = self.globals.global_named(bare)
         if symbol is None or ast.Modifier.CONSTANT not in symbol.qualifiers:
             return None
