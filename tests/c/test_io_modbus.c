@@ -8,8 +8,9 @@
 #include "IoDrvModbus.h"
 #include "ModbusRtu.h"
 #include "io_driver.h"
+#include "no_network.h"
 
-enum { LINE = 5, PASS_MS = 5, UNIT = 1, OTHER_UNIT = 2, SERVER_LISTENS = 7 };
+enum { LINE = 5, PASS_MS = 5, UNIT = 1, OTHER_UNIT = 2 };
 
 static struct {
     RTS_UI32 opened;
@@ -19,9 +20,8 @@ static struct {
     RTS_UI8 out[256]; /* the last frame from it */
     RTS_UI32 out_size;
     RTS_UI32 asked[OTHER_UNIT + 1]; /* frames by unit */
-    RTS_UI32 listeners;
-    RTS_UI8 identification_of; /* this unit has one */
-    RTS_UI8 server_id_of;      /* this one has an ID only */
+    RTS_UI8 identification_of;      /* this unit has one */
+    RTS_UI8 server_id_of;           /* this one has an ID only */
 } line;
 
 /* ---- the line ---- */
@@ -97,59 +97,6 @@ RTS_UI32 __wrap_SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
     return size;
 }
 
-/* ---- the network: no peer is there ---- */
-
-RTS_RESULT SysSockListen(const SOCKADDRESS *own, RTS_HANDLE *listener)
-{
-    RTS_UNUSED(own);
-    *listener = SERVER_LISTENS;
-    line.listeners++;
-    return ERR_OK;
-}
-
-RTS_HANDLE SysSockAccept(RTS_HANDLE listener, SOCKADDRESS *peer)
-{
-    RTS_UNUSED(listener);
-    RTS_UNUSED(peer);
-    return RTS_INVALID_HANDLE;
-}
-
-RTS_HANDLE SysSockConnect(const SOCKADDRESS *peer)
-{
-    RTS_UNUSED(peer);
-    return RTS_INVALID_HANDLE;
-}
-
-RTS_RESULT SysSockGetConnected(RTS_HANDLE socket)
-{
-    RTS_UNUSED(socket);
-    return ERR_NET_NOTCONNECTED;
-}
-
-RTS_RESULT SysSockRecv(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *received)
-{
-    RTS_UNUSED(socket);
-    RTS_UNUSED(data);
-    RTS_UNUSED(size);
-    *received = 0;
-    return ERR_NET_NOTCONNECTED;
-}
-
-RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *taken)
-{
-    return SysSockRecv(socket, (RTS_UI8 *)data, size, taken);
-}
-
-void SysSockReset(RTS_HANDLE socket)
-{
-    SysSockClose(socket);
-}
-
-void SysSockClose(RTS_HANDLE socket)
-{
-    line.listeners -= socket == SERVER_LISTENS;
-}
-
 /* ---- configurations ---- */
 
 static void begin(void)
@@ -157,6 +104,7 @@ static void begin(void)
     (void)IoDrvModbus_Hook(CH_EXIT3);
     begin_io();
     memset(&line, 0, sizeof line);
+    listeners = 0;
     CHECK_EQUAL(IoDrvModbus_Hook(CH_INIT2), ERR_OK);
     io_init(&io);
     add_copying_task("Main", 10000, 0);
@@ -410,7 +358,7 @@ static void check_no_server(void)
     CHECK_EQUAL(line.closed, line.opened);
     CHECK(!is_written(0));
     CHECK_EQUAL(line.out_size, 0);
-    CHECK_EQUAL(line.listeners, 0);
+    CHECK_EQUAL(listeners, 0);
 }
 
 static void an_optional_server_whose_memory_has_no_room_is_not_there(void)
@@ -450,7 +398,7 @@ static void a_tcp_server_that_is_left_out_does_not_listen(void)
     add_range(0, 0, 10);
     CHECK_EQUAL(load_io(), ERR_OK);
     run_passes(2);
-    CHECK_EQUAL(line.listeners, 1);
+    CHECK_EQUAL(listeners, 1);
 }
 
 /* Its place in the tables is not what the server had that was left out. */
@@ -465,7 +413,7 @@ static void a_server_comes_after_one_that_is_left_out(void)
     CHECK_EQUAL(load_io(), ERR_OK);
     CHECK(is_written(5));
     CHECK(!is_written(0));
-    CHECK_EQUAL(line.listeners, 0);
+    CHECK_EQUAL(listeners, 0);
     CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
     CHECK_EQUAL(line.closed, line.opened);
 }

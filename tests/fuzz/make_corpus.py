@@ -1,4 +1,5 @@
-"""Puts images that the compiler makes into the corpus of the loader."""
+"""Puts what the compiler makes into corpora: images into that of the loader, I/O configurations into that of the I/O
+manager, with which tests/c/test_io_mutation.c begins, too."""
 
 from __future__ import annotations
 
@@ -7,8 +8,9 @@ import tempfile
 from pathlib import Path
 
 from plctool.compiler import compile_sources
+from plctool.image.file import parse_image
 
-CORPUS = Path(__file__).parent / "corpus" / "loader"
+CORPUS = Path(__file__).parent / "corpus"
 
 PROGRAMS = {
     "smallest": "PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM",
@@ -38,15 +40,170 @@ PROGRAMS = {
 }
 
 
+# Programs with descriptions of their inputs and outputs: each driver, every kind of parameter and channel.
+DESCRIBED = {
+    "gpio": (
+        """
+        PROGRAM Main VAR start, door, motor, lamp : BOOL; n : INT; END_VAR
+        motor := start AND NOT door; lamp := Board.ok; n := n + 1; END_PROGRAM
+        PROGRAM Count VAR count : BOOL; END_VAR END_PROGRAM
+        CONFIGURATION C RESOURCE R ON PLC
+            TASK Cycle(INTERVAL := T#10ms); TASK OnEdge(EVENT := 'pulse');
+            PROGRAM Main WITH Cycle : Main; PROGRAM Count WITH OnEdge : Count;
+        END_RESOURCE END_CONFIGURATION""",
+        """
+        [gpio]
+        name = "Board"
+        [gpio.in]
+        DI0 = "Main.start"
+        DI1 = { var = "Main.door", pull = "up", invert = true, on_error = "zero" }
+        DI2 = { var = "Count.count", event = "pulse", edge = "both" }
+        [gpio.out]
+        DO0 = { var = "Main.motor", on_stop = "hold" }
+        DO1 = { var = "Main.lamp", on_stop = 1 }""",
+    ),
+    "sim": (
+        """
+        PROGRAM Main VAR start AT %IX0.1 : BOOL; level : INT; motor AT %QX0.6 : BOOL; speed : DINT; END_VAR
+        motor := start AND level < 900; speed := level; END_PROGRAM
+        PROGRAM Slow VAR start AT %IX0.1 : BOOL; raw : REAL; lamp : BOOL; END_VAR
+        lamp := start AND raw < 1.0 AND Bench.ok; END_PROGRAM
+        CONFIGURATION C RESOURCE R ON PLC
+            TASK Fast(INTERVAL := T#10ms, PRIORITY := 1); TASK Rest(INTERVAL := T#20ms, PRIORITY := 5);
+            PROGRAM Main WITH Fast : Main; PROGRAM Slow WITH Rest : Slow;
+        END_RESOURCE END_CONFIGURATION""",
+        """
+        [[sim]]
+        name = "Bench"
+        in = { button = "Main.start", level = { var = "Main.level", on_error = -3 } }
+        out = { motor = "Main.motor", speed = { var = "Main.speed", on_stop = 77 } }
+        [[sim]]
+        name = "Other"
+        task = "Rest"
+        optional = true
+        in = { raw = { var = "Slow.raw", on_error = "zero" } }
+        out = { lamp = { var = "Slow.lamp", on_stop = "hold" } }""",
+    ),
+    "modbus_client": (
+        """
+        PROGRAM Main VAR power : REAL; door : BOOL; count : INT; speed : INT; valve : BOOL; limit : DINT; END_VAR
+        speed := count; valve := door AND Meter.ok; limit := REAL_TO_DINT(power); END_PROGRAM""",
+        """
+        [[modbus.rs485]]
+        port = "COM2"
+        baud = 38400
+        parity = "odd"
+        [[modbus.rs485.device]]
+        name = "Meter"
+        unit = 3
+        timeout = "T#20ms"
+        [[modbus.rs485.device.read]]
+        function = 4
+        address = 30001
+        every = "T#10ms"
+        var = "Main.power"
+        [[modbus.rs485.device.read]]
+        function = 2
+        address = 10007
+        every = "T#10ms"
+        var = "Main.door"
+        [[modbus.rs485.device.write]]
+        function = 16
+        address = 40011
+        on_change = true
+        every = "T#10ms"
+        verify = true
+        vars = ["Main.speed", "Main.limit"]
+        [[modbus.tcp]]
+        host = "127.0.0.1"
+        [[modbus.tcp.device]]
+        name = "Drive"
+        order = "CDAB"
+        optional = true
+        [[modbus.tcp.device.read]]
+        function = 3
+        address = 40001
+        every = "T#10ms"
+        var = "Main.count"
+        on_error = "zero"
+        [[modbus.tcp.device.write]]
+        function = 5
+        address = 1
+        every = "T#10ms"
+        var = "Main.valve"
+        """,
+    ),
+    "modbus_server": (
+        """
+        PROGRAM Main VAR setpoint : REAL; recipe : ARRAY[0..3] OF INT; enable, alarm : BOOL; level : INT; END_VAR
+        alarm := enable AND setpoint > 1.0; level := recipe[1]; END_PROGRAM""",
+        """
+        [modbus.server.rs485]
+        port = "COM2"
+        unit = 5
+        [modbus.server.rs485.holding]
+        40001 = "Main.setpoint"
+        40003 = "Main.recipe"
+        [modbus.server.tcp]
+        port = 1502
+        as_bits = true
+        [modbus.server.tcp.holding]
+        "40020.0" = "Main.enable"
+        [modbus.server.tcp.input]
+        "30001.0" = "Main.alarm"
+        30002 = "Main.level"
+        """,
+    ),
+    "sysfs": (
+        """
+        PROGRAM Main VAR level : REAL; raw : DINT; setpoint, power : REAL; END_VAR
+        setpoint := level; power := DINT_TO_REAL(raw); END_PROGRAM""",
+        """
+        [[iio]]
+        name = "Adc"
+        device = "ads1115"
+        every = "T#1ms"
+        in = { in_voltage0 = { var = "Main.level", on_error = "zero" }, in_voltage1 = "Main.raw" }
+        out = { out_voltage0 = "Main.setpoint" }
+        [[pwm]]
+        name = "Heater"
+        chip = "pwmchip0"
+        out = { pwm1 = { var = "Main.power", frequency = 1000 } }""",
+    ),
+}
+
+
+def compile_image(folder: Path, name: str, text: str) -> bytes:
+    source = folder / f"{name}.st"
+    source.write_text(text)
+    return compile_sources([source], target=f"{platform.machine()}-linux").image
+
+
+def configuration(folder: Path, name: str, text: str, description: str) -> bytes:
+    """The I/O configuration of a program with a description."""
+    place = folder / name
+    place.mkdir()
+    (place / f"{name}.io.toml").write_text(description)
+    image = parse_image(compile_image(place, name, text))
+    if image.io is None:
+        raise SystemExit(f"{name} has no I/O configuration.")
+    offset, size = image.io
+    return image.code[offset : offset + size]
+
+
+def put(corpus: str, name: str, data: bytes) -> None:
+    (CORPUS / corpus).mkdir(parents=True, exist_ok=True)
+    (CORPUS / corpus / name).write_bytes(data)
+    print(f"{corpus}/{name}: {len(data)} bytes")
+
+
 def main() -> None:
-    CORPUS.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         for name, text in PROGRAMS.items():
-            source = Path(folder) / f"{name}.st"
-            source.write_text(text)
-            image = compile_sources([source], target=f"{platform.machine()}-linux").image
-            (CORPUS / name).write_bytes(image)
-            print(f"{name}: {len(image)} bytes")
+            put("loader", name, compile_image(folder, name, text))
+        for name, (text, description) in DESCRIBED.items():
+            put("io", name, configuration(folder, name, text, description))
 
 
 if __name__ == "__main__":

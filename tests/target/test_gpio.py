@@ -15,6 +15,11 @@ from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.errors import DeviceError
 from plctool.link.connection import Connection
+from plctool.link.transports import make_link
+from plctool.port_check import parse_wire
+from plctool.port_check.bench import Bench
+from plctool.port_check.report import judge
+from plctool.port_check.wires import Wires
 
 LEDS = 0x40028000  # a register of the FPGA that QEMU has
 PROGRAM = program(
@@ -62,3 +67,17 @@ def test_outputs_are_the_leds_of_the_board(tmp_path: Path) -> None:
             plc.flash(build(tmp_path / "bad", LINES.replace("LED1", "LED7")))
         eventually(lambda: leds() == 3)  # what ran before runs again
         assert plc.stack().unused >= HEADROOM  # the deepest that there is
+
+
+def test_port_check_finds_that_a_wire_is_missing(tmp_path: Path) -> None:
+    """QEMU presses no button, so there is none; the check's program runs on the board and says so."""
+    with Board(MACHINE, firmware("full"), tmp_path) as board, Plc(Connection(board.line())) as plc:
+        link = make_link("serial", "the board's", baud=115200)
+        bench = Bench(lambda: Plc(Connection(board.line())), plc, TARGET, tmp_path, link)
+        wires = [parse_wire("LED0=BUTTON0"), parse_wire("LED1=BUTTON1")]
+        found = [judge(check) for check in Wires(bench, wires, None).checks()]
+    assert [(outcome.verdict, outcome.text.partition(" within ")[0]) for outcome in found] == [
+        ("failed", "BUTTON0 does not follow LED0"),
+        ("failed", "BUTTON1 does not follow LED1"),
+    ]
+    assert all(outcome.text.endswith("it stays low") and outcome.figures["edges"] == 1 for outcome in found)

@@ -227,6 +227,11 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
         "--max-drift", type=_percent, default=0.01, metavar="PERCENT",
         help="largest error of its clock; default: 1; a simulated board on a busy host needs more",
     )  # fmt: skip
+    port.add_argument(
+        "--wire", action="append", default=[], metavar="OUTPUT=INPUT",
+        help="lines of the board that are wired: the input has to follow the output; may be given several times",
+    )  # fmt: skip
+    port.add_argument("--device", type=usable_path, metavar="FILE.toml", help="names of its lines, and its modules")
     _add_link(port)
 
     read = command("read", "print values of variables")

@@ -653,14 +653,17 @@ def port_check(
     replace: bool,
     max_drift: float,
     power_cycle: Callable[[], None] | None,
+    wires: Sequence[str],
+    device: Path | None,
     show: Callable[[Outcome], None],
 ) -> tuple[Document, PortReport]:
     """Checks a port; see `port_check.run_port_check`."""
-    from plctool.port_check import run_port_check
+    from plctool.port_check import parse_wire, run_port_check
 
     report = run_port_check(
-        connect, link=link, replace=replace, max_drift=max_drift, power_cycle=power_cycle, show=show
-    )
+        connect, link=link, replace=replace, max_drift=max_drift, power_cycle=power_cycle,
+        wires=[parse_wire(wire) for wire in wires], device=device, show=show,
+    )  # fmt: skip
     return report.document(), report
 
 

@@ -405,6 +405,8 @@ def _port_check(args: argparse.Namespace) -> int:
         replace=args.yes,
         max_drift=args.max_drift,
         power_cycle=power_cycle if args.power_cycle else None,
+        wires=args.wire,
+        device=args.device,
         show=lambda outcome: None if args.json else print(outcome_text(outcome), flush=True),
     )
     _show(args, document, lambda d: summary_text(report))

@@ -66,31 +66,36 @@ class Bench:
         self.link = link
         self._connect = connect
         self._folder = folder
-        self._built: dict[str, Path] = {}
+        self._built: dict[tuple[str, str], Path] = {}
 
     def reconnect(self) -> None:
         """A new link, after the controller was without power."""
         self.plc.close()
         self.plc = self._connect()
 
-    def flash(self, text: str) -> FlashResult:
-        """Builds a program and starts it with its initial values."""
-        return self.plc.flash(self.build(text), force=True)
+    def flash(self, text: str, description: str = "", device: Path | None = None) -> FlashResult:
+        """Builds a program, with its inputs and outputs if it has some, and starts it with its initial values."""
+        return self.plc.flash(self.build(text, description, device), force=True)
 
-    def build(self, text: str) -> Path:
-        """The image of a program; its symbols are beside it."""
-        from plctool.compiler import compile_sources
+    def build(self, text: str, description: str = "", device: Path | None = None) -> Path:
+        """The image of a program; its symbols are beside it. `description`: of its inputs and outputs, on the board of
+        the file `device`."""
+        from plctool.compiler import IoFiles, compile_sources
         from plctool.debug.symbols import symbol_path
 
-        if text not in self._built:
+        if (text, description) not in self._built:
             source = self._folder / f"check{len(self._built)}.st"
             source.write_text(text)
-            built = compile_sources([source], target=self.target, limits=False)
+            described = source.with_suffix(".io.toml")
+            if description:
+                described.write_text(description)
+            io = IoFiles(described, device) if description else IoFiles(wanted=False)
+            built = compile_sources([source], target=self.target, limits=False, io=io)
             image = source.with_suffix(".cdl")
             image.write_bytes(built.image)
             built.symbols.save(symbol_path(image))
-            self._built[text] = image
-        return self._built[text]
+            self._built[text, description] = image
+        return self._built[text, description]
 
     # ---- what a controller may be built without ----
 

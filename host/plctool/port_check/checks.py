@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import random
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 
@@ -55,8 +55,11 @@ _SMALL_FRAME, _LARGE_FRAME = 1000, 500_000  # DINTs that no stack of a controlle
 class Checks:
     """Each check returns its text and figures, or raises CheckFailed or NotAvailable."""
 
-    def __init__(self, bench: Bench, power_cycle: Callable[[], None] | None, max_drift: float) -> None:
+    def __init__(
+        self, bench: Bench, power_cycle: Callable[[], None] | None, max_drift: float, wires: Sequence[Check] = ()
+    ) -> None:
         self._bench = bench
+        self._wires = wires
         self._power_cycle = power_cycle
         self._max_drift = max_drift
 
@@ -85,6 +88,7 @@ class Checks:
         for name, (_, _, expected) in _FAULTS.items():
             limits = {"exception": ("one_of", sorted(expected)), "seconds": ("max", FAULT_PATIENCE)}
             yield Check(f"exception: {name}", partial(self.exception, name), limits)
+        yield from self._wires
         yield Check("stack headroom", self.stack, {"unused_share": ("min", MIN_STACK_SHARE)})
         yield Check("origin reset", self.origin_reset)
 
