@@ -90,8 +90,8 @@ soak: build/build.ninja
 	$(BIN)/python tests/soak/soak.py $(ARGS)
 
 habits: build/build.ninja
-	$(MESON) compile -C build
-	PYTHONPATH=host:build/host $(BIN)/python tests/corpus/habits.py
+	@ninja --quiet -C build under_attack
+	@PYTHONPATH=host:build/host $(BIN)/python tests/corpus/habits.py
 
 FUZZED := build build-sanitized
 FUZZ_SECONDS ?= 60

@@ -222,9 +222,9 @@ class Names:
         """The list of globals of that name."""
         return self._lists.get(key)
 
-    def own_name(self, key: str) -> Symbol | None:
-        """A unit, global variable or list of globals that the program itself declares under that name."""
-        return self._units.get(key) or self.global_named(key) or self.own_list(key)
+    def own_names(self) -> list[str]:
+        """Of units, global variables and lists of them that the program itself declares, case-folded."""
+        return [*self._units, *self._globals, *self._lists]
 
     def _library_symbol(self, key: str) -> Unit | GlobalSymbol | None:
         if key.partition(".")[0] in self._globals and "." in key:

@@ -133,7 +133,9 @@ class Scope:
                 return symbol
         found = self.globals.lookup(key.removeprefix("."), library=self.library, imported=self.imported)
         bare = self._without_foreign(key) if found is None else ""
-        return self.globals.own_name(bare) if bare else found
+        if not bare:
+            return found
+        return self.globals.own_unit(bare) or self.globals.own_list(bare) or self._foreign_constant(key, bare)
 
     def unit(self, name: str) -> Unit | None:
         """A type, function, function block or program, whatever variables have its name."""
@@ -144,6 +146,15 @@ class Scope:
         found = (self.globals.unit(k, library=self.library, imported=self.imported) for k in (*spaces, key))
         symbol = next((symbol for symbol in found if symbol is not None), None)
         return symbol or self.globals.own_unit(self._without_foreign(key))
+
+    def _foreign_constant(self, key: str, bare: str) -> GlobalSymbol | None:
+        """The constant of the program in `tcunit.limit`. Not a variable, and not where `tcunit` is like another name:
+        `motr.speed` is a mistake, whatever else is called `speed`."""
+        symbol = self.globals.global_named(bare)
+        if symbol is None or ast.Modifier.CONSTANT not in symbol.qualifiers:
+            return None
+        known = [*self.names, *self.outer, *self.globals.own_names()]
+        return None if did_you_mean(key.partition(".")[0], known) else symbol
 
     def _without_foreign(self, key: str) -> str:
         """A name without the namespace of a library that is given as source: `tcunit.x` is `x` where nothing else is

@@ -1,9 +1,9 @@
 """Sequential Function Charts: a chart becomes variables and statements of the unit, or ACTION, whose body it is.
 
 - A step is a variable of the type SFC_STEP__, so that `step.X` and `step.T` are read like any members.
-- In a chart without simultaneous branches one step is active at a time: its transitions are a branch of a CASE over a
-  hidden number, and while it stays, so are the calls of its actions. Else the transitions are evaluated first, into
-  temporaries, and then fire together.
+- In a chart of one network without simultaneous branches one step is active at a time: its transitions are a branch of
+  a CASE over a hidden number, and while it stays, so are the calls of its actions. Else the transitions are evaluated
+  first, into temporaries, and then fire together.
 - An action that has only the qualifier N is called while one of its steps is active, and once more after that. With
   any other qualifier an instance of the library's ACTION_CONTROL decides.
 
@@ -17,7 +17,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from plctool.compiler.diagnostics import Diagnostics, did_you_mean
@@ -168,21 +169,18 @@ class _Structure:
         if not initial:
             pos = self._chart.steps[0].pos if self._chart.steps else self._decl.pos
             self._error(pos, "sfc", f"the chart of {self._decl.name} has no INITIAL_STEP to start with")
+        touching = defaultdict[str, list[set[str]]](list)  # the ends of the transitions at a step
+        for ends in (keys(t.sources) | keys(t.targets) for t in self._chart.transitions):
+            for key in ends:
+                touching[key].append(ends)
         first = dict[str, ast.Step]()  # of each network, by any of its steps
         for step in initial:
             other = first.get(step.name.casefold())
             if other is not None:
                 message = f"{step.name} cannot be an INITIAL_STEP as well: {other.name} is the one of this network"
                 self._error(step.pos, "sfc", message)
-            first |= dict.fromkeys(self._network_of(step), other or step)
-
-    def _network_of(self, step: ast.Step) -> set[str]:
-        """The steps that transitions connect with one, in either direction, and that one."""
-        found = {step.name.casefold()}
-        groups = [keys(t.sources) | keys(t.targets) for t in self._chart.transitions]
-        while joined := [group for group in groups if group & found and not group <= found]:
-            found = found.union(*joined)
-        return found
+            else:
+                first |= dict.fromkeys(_network_of(step.name.casefold(), touching), step)
 
     def _check_ends(self, transition: ast.Transition) -> None:
         for side in (transition.sources, transition.targets):
@@ -196,20 +194,33 @@ class _Structure:
                 seen.add(name.casefold())
 
     def _warn_of_unreachable(self) -> None:
+        leaving = defaultdict[str, list[tuple[set[str], set[str]]]](list)
+        for transition in self._chart.transitions:
+            sources = keys(transition.sources)
+            for key in sources:
+                leaving[key].append((sources, keys(transition.targets)))
         reached = {key for key, step in self._steps.items() if step.initial}
-        grown = True
-        while grown:
-            grown = False
-            for transition in self._chart.transitions:
-                targets = keys(transition.targets)
-                if keys(transition.sources) <= reached and not targets <= reached:
+        waiting = list(reached)
+        while waiting:
+            for sources, targets in leaving[waiting.pop()]:
+                if sources <= reached:
+                    waiting += targets - reached
                     reached |= targets
-                    grown = True
         for key, step in self._steps.items():
             if key not in reached:
                 pos = self._decl.source.pos(step.pos)
                 message = f"the step {step.name} is never reached: no transitions lead there from an initial step"
                 self._diagnostics.warning(pos, "unreachable", message)
+
+
+def _network_of(key: str, touching: Mapping[str, list[set[str]]]) -> set[str]:
+    """The steps that transitions connect with one, in either direction, and that one."""
+    found, waiting = {key}, [key]
+    while waiting:
+        for ends in touching[waiting.pop()]:
+            waiting += ends - found
+            found |= ends
+    return found
 
 
 def keys(names: Iterable[tuple[int, str]]) -> set[str]:

@@ -5,6 +5,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections import defaultdict
+
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.rules.places import named_place
@@ -108,11 +110,12 @@ class _Evolution:
         pos = initial.pos
         start = [_started(pos, initial), self._state(pos, initial)]
         branches = [([_label(pos, 0)], start)]
+        leaving = defaultdict[str, list[ast.Transition]](list)
+        for transition in self._transitions:
+            leaving[transition.sources[0][1].casefold()].append(transition)
         for step in self._chart.steps:
             key = step.name.casefold()
-            firing = [
-                (t.condition, self._move(t, step)) for t in self._transitions if t.sources[0][1].casefold() == key
-            ]
+            firing = [(t.condition, self._move(t, step)) for t in leaving[key]]
             body = [_measured(step.pos, step)]
             if firing:
                 body.append(ast.If(step.pos, firing, []))
@@ -139,8 +142,12 @@ class _Evolution:
             for step in self._chart.steps
         ]
         fires = {t: hidden_name(self._decl, f"{FIRES}{i}") for i, t in enumerate(self._chart.transitions)}
-        for i, transition in enumerate(self._transitions):
-            body.append(self._test(transition, self._transitions[:i], fires))
+        before = defaultdict[str, list[ast.Transition]](list)  # those that leave a step
+        for transition in self._transitions:
+            sources = keys(transition.sources)
+            body.append(self._test(transition, [t for key in sorted(sources) for t in before[key]], fires))
+            for key in sources:
+                before[key].append(transition)
         for transition in self._transitions:
             left = [_left(transition.pos, step) for step in self._ends(transition.sources)]
             body.append(ast.If(transition.pos, [(_name(transition.pos, fires[transition]), left)], []))
@@ -153,13 +160,12 @@ class _Evolution:
         return [self._steps[name.casefold()] for _, name in names]
 
     def _test(
-        self, transition: ast.Transition, before: list[ast.Transition], fires: dict[ast.Transition, str]
+        self, transition: ast.Transition, rivals: list[ast.Transition], fires: dict[ast.Transition, str]
     ) -> ast.Stmt:
         """Notes whether a transition fires: its steps are active and none of those before takes one of them away."""
-        pos, sources = transition.pos, keys(transition.sources)
+        pos = transition.pos
         enabled = [_part(pos, step, "X") for step in self._ends(transition.sources)]
-        rivals = [other for other in before if sources & keys(other.sources)]
-        enabled += [ast.Unary(pos, ast.Operator.NOT, _name(pos, fires[other])) for other in rivals]
+        enabled += [ast.Unary(pos, ast.Operator.NOT, _name(pos, fires[other])) for other in dict.fromkeys(rivals)]
         note = _assign(pos, _name(pos, fires[transition]), _bool(pos, True))
         return ast.If(
             pos, [(_joined(ast.Operator.AND, enabled), [ast.If(pos, [(transition.condition, [note])], [])])], []

@@ -48,6 +48,7 @@ NAMES = {
     "SELF": "write THIS^",
     "BREAK": "EXIT leaves a loop, and a branch of a CASE ends by itself",
     **dict.fromkeys(("NULLPTR", "NIL", "NONE"), "write NULL"),
+    "__CURRENTTASK": "a program does not know its task; give the PROGRAM an input, and each instance its number",
     "PI": "write LREAL#3.141592653589793, or declare a constant",
     "ON": "write TRUE", "OFF": "write FALSE", "YES": "write TRUE", "NO": "write FALSE",
 }  # fmt: skip
@@ -89,6 +90,11 @@ REFUSED = {
 REFUSED_CALLS = {
     "BITADR": "a bit has no address of its own here; use the variable itself, or ADR and a bit number",
     "INDEXOF": "a POU has no number here; call it by its name",
+    **dict.fromkeys(
+        ("__XADD", "__COMPARE_AND_SWAP", "TEST_AND_SET"),
+        "there is no reading and writing in one step that other tasks cannot interrupt; let one task alone write it",
+    ),
+    "__VARINFO": "nothing but ADR and SIZEOF is known of a variable while a program runs",
     "INI": "an instance gets its initial values when the program starts; assign them one by one",
 }
 """Functions of other systems that this one has not, and why."""

@@ -174,14 +174,19 @@ class InitialValues:
         self, name: str, node: ast.Init, t: StructType, arguments: dict[str, Expr], scope: Scope
     ) -> bool:
         """`fb : MyFB(id := 3)` for an input of FB_Init; False when there is no such input."""
-        if isinstance(node, ast.ArrayInit | ast.StructInit):
-            return False
         for member in reversed(initialisers(self._world, t)):
             for symbol, _ in self._world.declared.member(member).parameters:
                 if symbol.name.casefold() == name.casefold():
-                    arguments[name.casefold()] = input_value(Checker(self._world, scope), node, symbol.type, name)
+                    arguments[name.casefold()] = self._argument(name, node, symbol.type, scope)
                     return True
         return False
+
+    def _argument(self, name: str, node: ast.Init, t: Type, scope: Scope) -> Expr:
+        c = Checker(self._world, scope)
+        if isinstance(node, ast.ArrayInit | ast.StructInit):
+            message = f"FB_Init takes a constant or a variable for {name}; declare a constant with these values"
+            return c.error(node.pos, "arguments", message)
+        return input_value(c, node, t, name)
 
 
 def with_arguments(decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
