@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import IO, Any, NoReturn
 
 IMPORTED = (
-    "plctool.cli.main",
+    "plctool.__main__",
     "plctool.compiler.build",
     "plctool.compiler.library",
     "plctool.device",
@@ -120,7 +120,7 @@ def _work(request: dict[str, Any], streams: list[int]) -> NoReturn:
     sys.argv = ["plctool", *request["words"]]
     sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115 # buffered as a file
     try:
-        status = sys.modules["plctool.cli.main"].main()
+        status = sys.modules["plctool.__main__"].run()
     except SystemExit as end:
         status = end.code or 0
     except BaseException:

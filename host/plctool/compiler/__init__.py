@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import CompileError
+from plctool.compiler.garbage import no_collection
 from plctool.compiler.level import Level
 from plctool.compiler.program_files import IoFiles, ProgramFiles, Sources, program_files
 from plctool.errors import UsageError
@@ -70,6 +71,7 @@ def check_sources(paths: Sequence[Path | str]) -> CheckResult:
     return check_with_tests(files.load_sources(), load=files.load_io, libraries=files.load_libraries())
 
 
+@no_collection()
 def check_with_tests(
     sources: Sequence[Source],
     warnings: WarningOptions | None = None,
@@ -98,6 +100,7 @@ def check_with_tests(
     return replace(result, program=result.program if tests.ok else None, diagnostics=found_sorted)
 
 
+@no_collection()
 def compile_sources(
     paths: Sources,
     *,
