@@ -41,7 +41,7 @@ address = 40001
 every = "T#50ms"
 var = "Main.power"
 [[modbus.rs485.device]]
-name = "Nobody"
+name = "Absent"
 unit = 4
 timeout = "T#100ms"
 [[modbus.tcp]]
@@ -109,14 +109,14 @@ def test_what_a_device_refuses_is_its_exception(plant: tuple[Plc, Devices, Devic
 
 def test_a_device_that_is_not_there_is_an_error_and_holds_up_no_other(plant: tuple[Plc, Devices, Devices]) -> None:
     plc, meter, _ = plant
-    assert ask(plc, "read", device="Nobody", reference=40001, readBy=3, count=1) == 0x104
+    assert ask(plc, "read", device="Absent", reference=40001, readBy=3, count=1) == 0x104
     before = meter.count(3)
     eventually(lambda: meter.count(3) > before + 5)
 
 
 def test_a_program_that_was_stopped_goes_on_asking(plant: tuple[Plc, Devices, Devices]) -> None:
     plc, _, _ = plant
-    plc.write({"Main.device": "Nobody", "Main.reference": 40001, "Main.count": 1, "Main.get": True})
+    plc.write({"Main.device": "Absent", "Main.reference": 40001, "Main.count": 1, "Main.get": True})
     plc.stop()
     plc.write({"Main.device": "Meter", "Main.get": False})
     plc.start()

@@ -27,25 +27,37 @@
 #define PENDING_BUS_CYCLE 0x40000000u
 RTS_STATIC_ASSERT(APP_MAX_TASKS < 30, tasks_have_a_bit_each);
 
-/* What there is to do in the cycle of a task, found out when the configuration is loaded. */
+/* What a task uses, by IO_MAP_*; found out when the configuration is loaded. None at first. */
 typedef struct {
-    const IoConfigTaskMap *map[2]; /* by IO_MAP_*; NULL: it uses none */
-    bool has_devices;              /* of which it is the bus task */
+    const IoConfigConnectorMap *first[2];
+    RTS_UI16 count[2];
 } WORK;
 
 static struct {
     IO_DRIVER *drivers; /* all there are, while there is a configuration */
     bool is_loaded;
     bool has_phases;
+    RTS_UI32 bus_tasks; /* a bit for each task that is that of a device with something to do in it */
     WORK work[APP_MAX_TASKS];
 } state;
 
 /* ---- one driver, one caller ---- */
 
-/* Inlined, as what is done at both ends of each call of a driver. */
+/* Inlined, as what is done at both ends of each call of a driver. On one core who interrupts between the load and the
+ * store has left the driver when the store comes. */
+static RTS_INLINE bool take_driver(IO_DRIVER *driver)
+{
+    if (!RTS_ONE_CORE)
+        return SysAtomicReplace(&driver->busy, 0, 1);
+    if (SysAtomicLoad(&driver->busy) != 0)
+        return false;
+    SysAtomicStore(&driver->busy, 1);
+    return true;
+}
+
 static RTS_INLINE bool enter_driver(IO_DRIVER *driver)
 {
-    if (SysAtomicReplace(&driver->busy, 0, 1))
+    if (take_driver(driver))
         return true;
     (void)SysAtomicAdd(&driver->skipped, 1);
     return false;
@@ -81,7 +93,7 @@ static void do_notes(IO_DRIVER *driver, RTS_UI32 notes);
 
 static void follow_notes(IO_DRIVER *driver)
 {
-    while (has_notes(driver) && SysAtomicReplace(&driver->busy, 0, 1)) {
+    while (has_notes(driver) && take_driver(driver)) {
         do_notes(driver, take_notes(driver));
         SysAtomicStore(&driver->busy, 0);
     }
@@ -94,14 +106,21 @@ static RTS_INLINE void leave_driver(IO_DRIVER *driver)
         follow_notes(driver);
 }
 
-/* Enters, or leaves a note for who is in; false then. */
-static bool enter_or_note(IO_DRIVER *driver, RTS_UI32 what)
+/* Not inlined: rare. */
+static RTS_NOINLINE void leave_note(IO_DRIVER *driver, RTS_UI32 what)
 {
-    if (enter_driver(driver))
-        return true;
+    (void)SysAtomicAdd(&driver->skipped, 1);
     note(driver, what);
-    if (SysAtomicReplace(&driver->busy, 0, 1)) /* it has just been left */
+    if (take_driver(driver)) /* it has just been left */
         leave_driver(driver);
+}
+
+/* Enters, or leaves a note for who is in; false then. */
+static RTS_INLINE bool enter_or_note(IO_DRIVER *driver, RTS_UI32 what)
+{
+    if (take_driver(driver))
+        return true;
+    leave_note(driver, what);
     return false;
 }
 
@@ -138,10 +157,10 @@ static void substitute(const IoConfigConnectorMap *map, const IoConfigConnectorM
     SysLockLeave(lock);
 }
 
-static void read_inputs(const IoConfigTaskMap *task_map)
+static void read_inputs(const WORK *work)
 {
-    const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_map);
-    const IoConfigConnectorMap *end = map + task_map->connector_map_count;
+    const IoConfigConnectorMap *map = work->first[IO_MAP_INPUTS];
+    const IoConfigConnectorMap *end = map + work->count[IO_MAP_INPUTS];
     const IoConfigConnectorMap *next;
 
     for (; map < end; map = next) {
@@ -149,9 +168,12 @@ static void read_inputs(const IoConfigTaskMap *task_map)
         next = end_of_run(map, end, IoDeviceGetWell, driver);
         if (driver == NULL) {
             substitute(map, next);
-        } else if (driver->functions->IoDrvReadInputs != NULL && enter_driver(driver)) {
-            (void)driver->functions->IoDrvReadInputs(map, (int)(next - map));
-            leave_driver(driver);
+        } else {
+            RTS_RESULT (*read)(const IoConfigConnectorMap *maps, int count) = driver->functions->IoDrvReadInputs;
+            if (read != NULL && enter_driver(driver)) {
+                (void)read(map, (int)(next - map));
+                leave_driver(driver);
+            }
         }
     }
 }
@@ -189,10 +211,10 @@ static void write_safe(IO_DRIVER *driver, const IoConfigConnectorMap *map, int c
 }
 
 /* Of one task, what goes to a driver that we are in. */
-static void write_to(IO_DRIVER *driver, const IoConfigTaskMap *task_map, PF_WRITE write)
+static void write_to(IO_DRIVER *driver, const WORK *work, PF_WRITE write)
 {
-    const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_map);
-    const IoConfigConnectorMap *end = map + task_map->connector_map_count;
+    const IoConfigConnectorMap *map = work->first[IO_MAP_OUTPUTS];
+    const IoConfigConnectorMap *end = map + work->count[IO_MAP_OUTPUTS];
     const IoConfigConnectorMap *next;
 
     for (; map < end; map = next) {
@@ -203,10 +225,10 @@ static void write_to(IO_DRIVER *driver, const IoConfigTaskMap *task_map, PF_WRIT
     }
 }
 
-static void write_outputs(RTS_UI32 task, const IoConfigTaskMap *task_map)
+static void write_outputs(RTS_UI32 task, const WORK *work)
 {
-    const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_map);
-    const IoConfigConnectorMap *end = map + task_map->connector_map_count;
+    const IoConfigConnectorMap *map = work->first[IO_MAP_OUTPUTS];
+    const IoConfigConnectorMap *end = map + work->count[IO_MAP_OUTPUTS];
     const IoConfigConnectorMap *next;
 
     for (; map < end; map = next) {
@@ -268,9 +290,8 @@ static void do_notes(IO_DRIVER *driver, RTS_UI32 notes)
     RTS_UI32 task;
 
     for (task = 0; task < APP_MAX_TASKS; task++) {
-        const IoConfigTaskMap *map = state.work[task].map[IO_MAP_OUTPUTS];
-        if (map != NULL && (is_safe || (notes >> task & 1) != 0))
-            write_to(driver, map, is_safe ? write_safe : write_all);
+        if (is_safe || (notes >> task & 1) != 0)
+            write_to(driver, &state.work[task], is_safe ? write_safe : write_all);
     }
     if ((notes & PENDING_BUS_CYCLE) != 0)
         run_left_bus_cycles(driver);
@@ -278,16 +299,21 @@ static void do_notes(IO_DRIVER *driver, RTS_UI32 notes)
 
 /* ---- the phases of a cycle ---- */
 
+static RTS_INLINE bool is_bus_task(RTS_UI32 task)
+{
+    return (state.bus_tasks >> task & 1) != 0;
+}
+
 static void before_code(RTS_UI32 task, const IEC_CONTEXT *context)
 {
     const WORK *work = &state.work[task];
 
     RTS_UNUSED(context);
-    if (work->map[IO_MAP_INPUTS] != NULL) {
-        read_inputs(work->map[IO_MAP_INPUTS]);
+    if (work->count[IO_MAP_INPUTS] != 0) {
+        read_inputs(work);
         SchedNoteEvents();
     }
-    if (work->has_devices)
+    if (is_bus_task(task))
         IoDevicesUpdate(task);
 }
 
@@ -296,9 +322,8 @@ static void after_code(RTS_UI32 task, const IEC_CONTEXT *context)
     const WORK *work = &state.work[task];
 
     RTS_UNUSED(context);
-    if (work->map[IO_MAP_OUTPUTS] != NULL)
-        write_outputs(task, work->map[IO_MAP_OUTPUTS]);
-    if (work->has_devices)
+    write_outputs(task, work);
+    if (is_bus_task(task))
         start_bus_cycles(task);
 }
 
@@ -400,12 +425,17 @@ static void find_work(void)
     RTS_UI32 i;
 
     memset(state.work, 0, sizeof state.work);
+    state.bus_tasks = 0;
     for (i = 0; i < IoTablesCountTaskMaps(); i++) {
         const IoConfigTaskMap *map = IoTablesGetTaskMaps() + i;
-        state.work[map->task].map[map->type] = map;
+        WORK *work = &state.work[map->task];
+        work->first[map->type] = IoMgrConfigGetConnectorMaps(map);
+        work->count[map->type] = map->connector_map_count;
     }
-    for (i = 0; i < IoTablesCountConnectors(); i++)
-        state.work[IoDeviceGetBusTask(i)].has_devices |= has_bus_work(i);
+    for (i = 0; i < IoTablesCountConnectors(); i++) {
+        if (has_bus_work(i))
+            state.bus_tasks |= 1u << IoDeviceGetBusTask(i);
+    }
 }
 
 static RTS_RESULT register_phases(void)
@@ -442,6 +472,7 @@ void IoCycleUnload(void)
     state.drivers = NULL;
     state.is_loaded = false;
     memset(state.work, 0, sizeof state.work);
+    state.bus_tasks = 0;
 }
 
 void IoCycleForget(void)
@@ -455,11 +486,8 @@ void IoCycleKeepUp(void)
 {
     RTS_UI32 task;
 
-    for (task = 0; task < APP_MAX_TASKS; task++) {
-        const IoConfigTaskMap *map = state.work[task].map[IO_MAP_INPUTS];
-        if (map != NULL)
-            read_inputs(map);
-    }
+    for (task = 0; task < APP_MAX_TASKS; task++)
+        read_inputs(&state.work[task]);
     start_bus_cycles(IO_ALL_TASKS);
     IoDevicesUpdate(IO_ALL_TASKS);
 }

@@ -293,8 +293,6 @@ static RTS_UI32 group_of(const IoConfigConnectorMap *map)
 static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
 {
     for (; count > 0; count--, maps++) {
-        const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
-        RTS_UI32 channels = maps->channel_map_count;
         RTS_UI32 number = group_of(maps);
         GROUP *group = &groups[number];
         RTS_UI32 values;
@@ -307,8 +305,7 @@ static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
         }
         BytesPut32(group->in, values);
         lock = SysLockEnter();
-        for (; channels > 0; channels--)
-            IoMgrCopyInputLE(channel++, group->in);
+        IoMgrCopyInputs(IoMgrConfigGetChannelMaps(maps), maps->channel_map_count, group->in);
         SysLockLeave(lock);
     }
     return ERR_OK;
@@ -317,15 +314,12 @@ static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
 static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
 {
     for (; count > 0; count--, maps++) {
-        const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
-        RTS_UI32 channels = maps->channel_map_count;
         RTS_UI32 number = group_of(maps);
         GROUP *group = &groups[number];
         RTS_UI32 lock = SysLockEnter();
         RTS_RESULT result;
 
-        for (; channels > 0; channels--)
-            IoMgrCopyOutputLE(channel++, group->out);
+        IoMgrCopyOutputs(IoMgrConfigGetChannelMaps(maps), maps->channel_map_count, group->out);
         SysLockLeave(lock);
         result =
             group->lines != 0 ? SysGpioWrite(number, group->outputs, BytesGet32(group->out)) : (RTS_RESULT)ERR_DEVICE;

@@ -186,9 +186,14 @@ const IoConfigChannelMap *IoMgrConfigGetChannelMaps(const IoConfigConnectorMap *
 /* ---- copies ---- */
 
 /* Inlined, but for bytes: a bit is a few instructions, and there may be many. */
-static RTS_NOINLINE void copy_bytes(RTS_UI8 *to, const RTS_UI8 *from, RTS_UI32 size, bool swapped)
+static RTS_NOINLINE void copy_bytes(const IoConfigChannelMap *channel, RTS_UI8 *to, RTS_UI32 to_bit,
+                                    const RTS_UI8 *from, RTS_UI32 from_bit, RTS_UI32 turned)
 {
-    if (!swapped) {
+    RTS_UI32 size = channel->bits >> 3;
+
+    to += to_bit >> 3;
+    from += from_bit >> 3;
+    if ((channel->flags & IO_CHANNEL_BIG_ENDIAN) == turned) {
         memcpy(to, from, size);
     } else {
         while (size > 0)
@@ -206,17 +211,16 @@ static RTS_INLINE void copy_bits(RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *fr
     *to = (RTS_UI8)((*to & ~mask) | (value & mask));
 }
 
-/* Whole bytes, or bits. */
+/* Eight bits or more are whole bytes on both sides (IoConfigChannelMap). */
 static RTS_INLINE void copy(const IoConfigChannelMap *channel, RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from,
                             RTS_UI32 from_bit, RTS_UI32 turned)
 {
     RTS_UI32 bits = channel->bits;
 
-    if (((to_bit | from_bit | bits) & 7) != 0)
+    if (bits < 8)
         copy_bits(to, to_bit, from, from_bit, bits);
     else
-        copy_bytes(to + (to_bit >> 3), from + (from_bit >> 3), bits >> 3,
-                   (channel->flags & IO_CHANNEL_BIG_ENDIAN) != turned);
+        copy_bytes(channel, to, to_bit, from, from_bit, turned);
 }
 
 static RTS_INLINE void copy_input(const IoConfigChannelMap *channel, const void *memory, RTS_UI32 turned)
@@ -249,13 +253,29 @@ void IoMgrCopyOutputBE(const IoConfigChannelMap *channel, void *memory)
     copy_output(channel, memory, IO_CHANNEL_BIG_ENDIAN);
 }
 
+void IoMgrCopyInputs(const IoConfigChannelMap *channel, RTS_UI32 count, const void *memory)
+{
+    RTS_UI8 *area = tables.areas[APP_AREA_INPUT];
+
+    for (; count > 0; count--, channel++)
+        copy(channel, area, channel->area_bit, memory, channel->parameter_bit, 0);
+}
+
+void IoMgrCopyOutputs(const IoConfigChannelMap *channel, RTS_UI32 count, void *memory)
+{
+    const RTS_UI8 *area = tables.areas[APP_AREA_OUTPUT];
+
+    for (; count > 0; count--, channel++)
+        copy(channel, memory, channel->parameter_bit, area, channel->area_bit, 0);
+}
+
 void IoTablesSetChannel(RTS_UI32 type, const IoConfigChannelMap *channel, RTS_UI32 value)
 {
     RTS_UI8 *area = tables.areas[APP_AREA_INPUT + type];
     RTS_UI32 at = channel->area_bit;
     RTS_UI32 bits;
 
-    if (((at | channel->bits) & 7) != 0) {
+    if (channel->bits < 8) {
         RTS_UI8 byte = (RTS_UI8)value;
         copy_bits(area, at, &byte, 0, channel->bits);
         return;

@@ -25,11 +25,11 @@ enum {
 /* Offers the functions to programs; in CH_INIT3. */
 RTS_RESULT ModbusCallsRegister(void);
 
-/* Whose devices are asked from now on; NULL: nobody's. `wake`, if there is one, is called by the task that sends a
+/* Whose devices are asked from now on; NULL: none. `wake`, if there is one, is called by the task that sends a
  * request. In main, while no task runs. */
 void ModbusCallsBegin(MODBUS_SETUP *setup, void (*wake)(void));
 
-/* In main, in each pass. Takes back what nobody will ask for, so that nothing is sent for a program that does not run. */
+/* In main, in each pass. Takes back what is not asked for any more, so that nothing is sent for a program that does not run. */
 void ModbusCallsPoll(bool is_running, RTS_I64 now_ns);
 
 #endif

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
@@ -90,7 +91,7 @@ def _connector_maps(connectors: list[Connector], task: int, kind: int) -> Iterat
     drivers = list(dict.fromkeys(driver for driver, _, _ in used))
     for _, group in groupby(sorted(used, key=lambda u: drivers.index(u[0])), key=lambda u: u[0]):
         for _, index, chosen in group:
-            yield ConnectorMap(index, tuple(map(_channel, chosen)))
+            yield ConnectorMap(index, tuple(_joined(map(_channel, chosen))))
 
 
 def _connector(c: Connector, indices: dict[int, int], tasks: list[Task]) -> ConnectorEntry:
@@ -114,6 +115,32 @@ def _channel(c: Channel) -> ChannelEntry:
     flags = c.substitute.what | int(lib.IO_CHANNEL_BIG_ENDIAN) * c.big_endian
     value = substitute_value(c.variable_type, c.substitute.value) if c.substitute.what == VALUE else 0
     return ChannelEntry(c.parameter, c.parameter_bit, c.area_bit, c.size_bits, flags, value)
+
+
+def _joined(channels: Iterable[ChannelEntry]) -> list[ChannelEntry]:
+    """Single bits that lie side by side within a byte, in the device and in the inputs or outputs, are one channel of
+    the image: eight lines are copied as fast as one."""
+    made: list[ChannelEntry] = []
+    for channel in sorted(channels, key=lambda c: (c.parameter, c.parameter_bit)):
+        if made and _follows(made[-1], channel):
+            last = made.pop()
+            value = last.value | channel.value << last.bits
+            channel = replace(last, bits=last.bits + channel.bits, value=value)
+        made.append(channel)
+    return made
+
+
+def _follows(first: ChannelEntry, second: ChannelEntry) -> bool:
+    """Whether two channels can be one."""
+    return (
+        first.bits < 8
+        and second.bits == 1
+        and (first.parameter, first.flags) == (second.parameter, second.flags)
+        and first.parameter_bit + first.bits == second.parameter_bit
+        and first.area_bit + first.bits == second.area_bit
+        and second.parameter_bit % 8 != 0
+        and second.area_bit % 8 != 0
+    )
 
 
 def substitute_value(t: Type | None, value: object) -> int:

@@ -82,12 +82,8 @@ static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
 {
     RTS_UI32 lock = SysLockEnter();
 
-    for (; count > 0; count--, maps++) {
-        const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
-        RTS_UI32 channels = maps->channel_map_count;
-        for (; channels > 0; channels--)
-            IoMgrCopyInputLE(channel++, blank.inputs);
-    }
+    for (; count > 0; count--, maps++)
+        IoMgrCopyInputs(IoMgrConfigGetChannelMaps(maps), maps->channel_map_count, blank.inputs);
     SysLockLeave(lock);
     return ERR_OK;
 }
@@ -97,12 +93,8 @@ static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
 {
     RTS_UI32 lock = SysLockEnter();
 
-    for (; count > 0; count--, maps++) {
-        const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
-        RTS_UI32 channels = maps->channel_map_count;
-        for (; channels > 0; channels--)
-            IoMgrCopyOutputLE(channel++, blank.outputs);
-    }
+    for (; count > 0; count--, maps++)
+        IoMgrCopyOutputs(IoMgrConfigGetChannelMaps(maps), maps->channel_map_count, blank.outputs);
     SysLockLeave(lock);
     return ERR_OK;
 }

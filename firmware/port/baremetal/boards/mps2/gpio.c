@@ -16,11 +16,8 @@ enum { LINES = 4, FIRST_BUTTON = 2 };
 #define FPGA_LED (*(volatile RTS_UI32 *)0x40028000u)
 #define FPGA_BUTTON (*(volatile RTS_UI32 *)0x40028008u)
 
-/* What the group says of a line. */
-static struct {
-    RTS_UI8 user; /* group + 1; 0: free */
-    RTS_UI8 number;
-} lines[LINES];
+/* What a group calls a line: the bit of its number; 0: it has not got it. */
+static RTS_UI32 bits[IO_GPIO_GROUPS][LINES];
 
 static RTS_UI32 active_low; /* lines, a bit each */
 
@@ -35,6 +32,15 @@ static RTS_UI32 find(const char *name)
     return i;
 }
 
+static bool is_taken(RTS_UI32 i)
+{
+    RTS_UI32 group = 0;
+
+    while (group < IO_GPIO_GROUPS && bits[group][i] == 0)
+        group++;
+    return group < IO_GPIO_GROUPS;
+}
+
 RTS_RESULT SysGpioAdd(RTS_UI32 group, RTS_UI32 number, const SYS_GPIO_LINE *line)
 {
     const RTS_UI32 possible = GPIO_OPTION_ACTIVE_LOW | GPIO_OPTION_OUT;
@@ -42,12 +48,11 @@ RTS_RESULT SysGpioAdd(RTS_UI32 group, RTS_UI32 number, const SYS_GPIO_LINE *line
 
     if (i == LINES)
         return ERR_NO_OBJECT;
-    if (lines[i].user != 0)
+    if (is_taken(i))
         return ERR_OPERATION_DENIED;
     if ((line->options & ~possible) != 0 || ((line->options & GPIO_OPTION_OUT) != 0) != (i < FIRST_BUTTON))
         return ERR_NOT_SUPPORTED;
-    lines[i].user = (RTS_UI8)(group + 1);
-    lines[i].number = (RTS_UI8)number;
+    bits[group][i] = 1u << number;
     active_low &= ~(1u << i);
     active_low |= (RTS_UI32)((line->options & GPIO_OPTION_ACTIVE_LOW) != 0) << i;
     return ERR_OK;
@@ -60,12 +65,7 @@ RTS_RESULT SysGpioOpen(RTS_UI32 group, RTS_UI32 outputs)
 
 void SysGpioClose(RTS_UI32 group)
 {
-    RTS_UI32 i;
-
-    for (i = 0; i < LINES; i++) {
-        if (lines[i].user == group + 1)
-            lines[i].user = 0;
-    }
+    memset(bits[group], 0, sizeof bits[group]);
 }
 
 void SysGpioPoll(void)
@@ -78,9 +78,9 @@ RTS_RESULT SysGpioRead(RTS_UI32 group, RTS_UI32 *values)
     RTS_UI32 found = 0;
     RTS_UI32 i;
 
-    for (i = 0; i < LINES; i++, levels >>= 1) {
-        if (lines[i].user == group + 1)
-            found |= (levels & 1) << lines[i].number;
+    for (i = 0; i < LINES; i++) {
+        if ((levels >> i & 1) != 0)
+            found |= bits[group][i];
     }
     *values = found;
     return ERR_OK;
@@ -92,10 +92,10 @@ RTS_RESULT SysGpioWrite(RTS_UI32 group, RTS_UI32 mask, RTS_UI32 values)
     RTS_UI32 i;
 
     for (i = 0; i < FIRST_BUTTON; i++) {
-        RTS_UI32 number = lines[i].number;
-        RTS_UI32 level = (values >> number ^ active_low >> i) & 1;
-        if (lines[i].user == group + 1 && (mask >> number & 1) != 0)
-            leds = (leds & ~(1u << i)) | level << i;
+        RTS_UI32 bit = bits[group][i] & mask;
+        bool is_high = ((values & bit) != 0) != ((active_low >> i & 1) != 0);
+        if (bit != 0)
+            leds = is_high ? leds | 1u << i : leds & ~(1u << i);
     }
     FPGA_LED = leds;
     return ERR_OK;
