@@ -86,11 +86,14 @@ static void copy_in(const IMAGE_PART *part, const UNIT *shared)
 {
     UNIT *copy = copy_at(part->copy);
     UNIT *before = copy_at(part->before);
-    RTS_UI32 count;
+    RTS_UI32 count = part->count;
 
+    if (count == 0)
+        return;
     shared += part->first;
-    for (count = part->count; count > 0; count--)
+    do {
         *before++ = *copy++ = *shared++;
+    } while (--count > 0);
 }
 
 void AppImageCopyIn(RTS_UI32 task)
@@ -106,17 +109,18 @@ static void copy_out(const IMAGE_PART *part, UNIT *shared)
 {
     const UNIT *copy = copy_at(part->copy);
     const UNIT *before = copy_at(part->before);
-    RTS_UI32 count;
+    RTS_UI32 count = part->count;
 
-    if (copy == before)
+    if (copy == before) /* it writes nothing of it, or there is nothing */
         return;
     shared += part->first;
-    for (count = part->count; count > 0; count--, shared++) {
+    do {
         UNIT now = *copy++;
         UNIT changed = now ^ *before++;
         if (changed != 0)
             *shared = (*shared & ~changed) | (now & changed);
-    }
+        shared++;
+    } while (--count > 0);
 }
 
 void AppImageCopyOut(RTS_UI32 task, const RTS_UI32 *running)

@@ -216,20 +216,28 @@ static bool end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
     return false;
 }
 
+/* Without phases a task is here because of its copies. */
 static void run_phases_before(TASK *task)
 {
-    CyclePhasesRun(CYCLE_INPUTS, index_of(task), &task->context);
-    if (task->has_copies || !CyclePhasesExist())
+    bool has_phases = CyclePhasesExist();
+
+    if (has_phases)
+        CyclePhasesRun(CYCLE_INPUTS, index_of(task), &task->context);
+    if (!has_phases || task->has_copies)
         AppImageCopyIn(index_of(task));
-    CyclePhasesRun(CYCLE_BEFORE_CODE, index_of(task), &task->context);
+    if (has_phases)
+        CyclePhasesRun(CYCLE_BEFORE_CODE, index_of(task), &task->context);
 }
 
 static void run_phases_after(TASK *task)
 {
-    CyclePhasesRun(CYCLE_AFTER_CODE, index_of(task), &task->context);
-    if (task->has_copies || !CyclePhasesExist())
+    bool has_phases = CyclePhasesExist();
+
+    if (has_phases)
+        CyclePhasesRun(CYCLE_AFTER_CODE, index_of(task), &task->context);
+    if (!has_phases || task->has_copies)
         AppImageCopyOut(index_of(task), &tasks.running);
-    if (CyclePhasesExist() && SysAtomicLoad(&tasks.running)) {
+    if (has_phases && SysAtomicLoad(&tasks.running)) {
         CyclePhasesRun(CYCLE_OUTPUTS, index_of(task), &task->context);
         CyclePhasesRun(CYCLE_RECORD, index_of(task), &task->context);
     }

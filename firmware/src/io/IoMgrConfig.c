@@ -257,16 +257,24 @@ void IoMgrCopyInputs(const IoConfigChannelMap *channel, RTS_UI32 count, const vo
 {
     RTS_UI8 *area = tables.areas[APP_AREA_INPUT];
 
-    for (; count > 0; count--, channel++)
+    if (count == 0)
+        return;
+    do {
         copy(channel, area, channel->area_bit, memory, channel->parameter_bit, 0);
+        channel++;
+    } while (--count > 0);
 }
 
 void IoMgrCopyOutputs(const IoConfigChannelMap *channel, RTS_UI32 count, void *memory)
 {
     const RTS_UI8 *area = tables.areas[APP_AREA_OUTPUT];
 
-    for (; count > 0; count--, channel++)
+    if (count == 0)
+        return;
+    do {
         copy(channel, memory, channel->parameter_bit, area, channel->area_bit, 0);
+        channel++;
+    } while (--count > 0);
 }
 
 void IoTablesSetChannel(RTS_UI32 type, const IoConfigChannelMap *channel, RTS_UI32 value)

@@ -15,7 +15,7 @@
 #if MODBUS_MAX_CALLS > 0
 enum {
     VERSION = 0x00010000,
-    FIRST = 1,   /* slot: the one before is that of scans */
+    FIRST = 1,   /* slot: the previous one is that of scans */
     SLOTS = 256, /* in the number of a request: its slot, and how often there was one */
     COIL_ON = 0xFF00,
 };
