@@ -37,6 +37,8 @@ _LINUX_SOURCES = [
     *_PORTABLE,
     *(FIRMWARE / "src").glob("comm/*.c"),
     *(source for source in (FIRMWARE / "src/io").glob("*.c") if "Modbus" not in source.name),  # as in the simulator
+    FIRMWARE / "src/io/ModbusCalls.c",
+    FIRMWARE / "src/modbus/ModbusPdu.c",
     *(source for source in (FIRMWARE / "port/sim").glob("*.c") if source.name != "SimBoards.c"),  # it is of plctool
     *(FIRMWARE / "port/linux" / name for name in ("IecStack.c", "IecStackSwitch.S", "SysExcept.c", "SysMem.c")),
 ]
