@@ -57,7 +57,10 @@ def check(port: str, folder: Path, *wires: str, device: Path | None = None) -> d
     with connect(link) as plc:
         bench = Bench(lambda: connect(link), plc, "x86_64-linux", folder, link)
         checks = Wires(bench, [parse_wire(wire) for wire in wires], device).checks()
-        return {outcome.name.removeprefix("wire "): outcome for outcome in map(judge, checks)}
+        found = {outcome.name.removeprefix("wire "): outcome for outcome in map(judge, checks)}
+        if any(outcome.figures for outcome in found.values()):
+            assert plc.read("Main.drive[0]") is False  # all outputs are low at the end
+        return found
 
 
 def test_wires_that_are_there_pass_with_their_delay(wired, tmp_path):
@@ -111,6 +114,36 @@ def test_the_names_of_the_board_are_known(wired, tmp_path):
     with wired("0>8 1>9") as port:
         found = check(port, tmp_path, "DO0=DI0", "DO1=DI1", device=device)
     assert [outcome.verdict for outcome in found.values()] == ["passed", "passed"], found
+
+
+MODULE = f"""{DEVICE}
+[[module]]
+name = "Digital"
+driver = "IoDrvSim"
+in = {{ DI0 = {{ type = "BOOL", parameter = 1 }}, AI0 = {{ type = "INT", parameter = 3 }} }}
+out = {{ DO0 = {{ type = "BOOL", parameter = 2 }} }}
+"""
+
+
+def test_channels_of_a_vendors_driver_are_checked(wired, tmp_path):
+    """A simulated device has no wire, so the input stays low."""
+    device = tmp_path / "device.toml"
+    device.write_text(MODULE)
+    with wired("0>8") as port:
+        found = check(port, tmp_path, "DO0=DI0", "Digital.DO0=Digital.DI0", device=device)
+    assert found["DO0=DI0"].verdict == "passed", found
+    text = f"Digital.DI0 does not follow Digital.DO0 within {LIMIT_MS} ms: it stays low"
+    assert found["Digital.DO0=Digital.DI0"].text == text
+
+
+def test_channels_that_are_no_bits_are_refused(wired, tmp_path):
+    device = tmp_path / "device.toml"
+    device.write_text(MODULE)
+    with wired("") as port:
+        found = check(port, tmp_path, "Digital.DO0=Digital.AI0", device=device)
+    outcome = found["Digital.DO0=Digital.AI0"]
+    assert outcome.verdict == "failed"
+    assert "INT" in outcome.text and "BOOL" in outcome.text, outcome.text
 
 
 def test_a_line_that_is_not_there_is_named(wired, tmp_path):

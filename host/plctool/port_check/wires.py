@@ -72,6 +72,7 @@ CASE step OF
             IF wire > {last_wire} THEN step := 5; END_IF
         END_IF
     END_IF
+5:  FOR k := 0 TO {last_output} DO drive[k] := FALSE; END_FOR
 END_CASE
 {write}
 """
