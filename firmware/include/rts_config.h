@@ -240,7 +240,7 @@
 
 /* Tables of external functions that components may register; two words each. */
 #ifndef CM_MAX_EXT_TABLES
-#define CM_MAX_EXT_TABLES 4
+#define CM_MAX_EXT_TABLES (4 + (MODBUS_MAX_CALLS > 0))
 #endif
 
 /* Phases of the cycle of every task that components may register (CyclePhases.h); two words each. 0: none. */

@@ -66,6 +66,7 @@ def did_you_mean(name: str, candidates: Iterable[str]) -> str:
     """`; did you mean X?` for the candidate most like `name`, else nothing."""
     from difflib import get_close_matches
 
-    by_key = {key: c for c in candidates if (key := c.casefold()) != name.casefold()}
+    # Of names that differ in case only the last in this order, whatever the order of the candidates.
+    by_key = {key: c for c in sorted(candidates) if (key := c.casefold()) != name.casefold()}
     close = get_close_matches(name.casefold(), list(by_key), n=1, cutoff=0.7)
     return f"; did you mean {by_key[close[0]]}?" if close else ""

@@ -56,10 +56,10 @@ var = "Main.half_int"
 VARIABLES = "VAR setpoint : INT; ratio, half : REAL; half_int : INT; ok : BOOL; END_VAR"
 
 
-def load(board: Board, folder: Path, description: str, body: str) -> Plc:
+def load(board: Board, folder: Path, description: str, body: str, variables: str = VARIABLES) -> Plc:
     """The program with a description on the board, running."""
     (folder / "bus.io.toml").write_text(description)
-    built = compile_text(program(VARIABLES, body, "T#10ms"), TARGET, folder)
+    built = compile_text(program(variables, body, "T#10ms"), TARGET, folder)
     plc = Plc(Connection(board.line()), built.path.with_suffix(".sym"))
     plc.flash(built.image)
     return plc
@@ -127,6 +127,24 @@ def test_board_is_a_client(make_board: Callable[..., Any], tmp_path: Path) -> No
         device.registers[0:4] = bytes([0x42, 0xC8, 0, 0])  # 100.0
         eventually(lambda: plc.read("Main.ok") and plc.read("Main.ratio") == 100.0)
         eventually(lambda: device.registers[18:20] == bytes([0, 50]))
+
+
+def test_a_program_asks_a_device_once(make_board: Callable[..., Any], tmp_path: Path) -> None:
+    variables = "VAR read : MODBUS_READ; write : MODBUS_WRITE; words : ARRAY[0..1] OF WORD; ask : BOOL; END_VAR"
+    body = """
+    read(Execute := ask, Device := 'Meter', Address := 40006, Count := 2, Data := words);
+    write(Execute := read.Done, Device := 'Meter', FunctionCode := 6, Address := 40008, Data := words);
+    """
+    board = make_board("modbus")
+    board.power_on("host")
+    with load(board, tmp_path, CLIENT[: CLIENT.index("[[modbus.rs485.device.read]]")], body, variables) as plc:
+        device = Device(board.field_bus)
+        device.registers[10:14] = bytes([0x12, 0x34, 0x56, 0x78])
+        plc.write({"Main.ask": True})
+        eventually(lambda: plc.read("Main.write.Done"))
+        assert [plc.read(f"Main.words[{i}]") for i in (0, 1)] == [0x1234, 0x5678]
+        assert device.registers[14:16] == bytes([0x12, 0x34])
+        assert plc.read("Meter.ok")
 
 
 def test_the_line_of_the_tool_is_no_field_bus(make_board: Callable[..., Any], tmp_path: Path) -> None:
