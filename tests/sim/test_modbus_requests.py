@@ -222,3 +222,27 @@ def test_addresses_are_those_of_the_description(
     addresses.write({"Main.c": code, "Main.r": reference})
     addresses.run_cycles(1)
     assert addresses.read("Main.a") == (-1 if expected is None else expected)
+
+
+def test_a_block_that_is_not_called_any_more_gives_its_place_back_after_a_minute(plc: Simulator) -> None:
+    plc.write({"Main.many": True})
+    plc.run_cycles(1)
+    plc.write({"Main.many": False})
+    plc.run_for(100)
+    assert ask(plc, "read") == (False, 0x103)
+    plc.run_for(seconds=62)
+    assert ask(plc, "read") == (False, 2)
+    plc.write({"Main.many": True})
+    plc.run_cycles(1)
+    assert [plc.read(f"Main.spare[{i}].ErrorID") for i in (1, 16, 17)] == [0x105, 0x105, 0x103]
+
+
+@pytest.mark.parametrize("option", ["warm", "cold"])
+def test_a_reset_ends_all_requests(plc: Simulator, option: str) -> None:
+    plc.set_modbus("Meter", 40001, 5)
+    plc.write({"Main.many": True})
+    plc.run_cycles(1)
+    plc.reset(option)
+    plc.start()
+    assert plc.read("Main.many") is False
+    assert ask(plc, "read", count=1) == (True, 0), "there is room, though none was given back"

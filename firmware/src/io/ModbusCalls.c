@@ -179,8 +179,11 @@ static RTS_I32 modbus_state(RTS_I32 number)
 {
     MODBUS_CALL *call = find(number, MODBUS_CALL_ENDED);
 
-    if (call != NULL && SysAtomicReplace(&call->state, MODBUS_CALL_ENDED, MODBUS_CALL_TAKEN))
-        return result_of(call);
+    if (call != NULL && SysAtomicReplace(&call->state, MODBUS_CALL_ENDED, MODBUS_CALL_TAKEN)) {
+        if (call->number == number)
+            return result_of(call);
+        SysAtomicStore(&call->state, MODBUS_CALL_ENDED); /* it became that of another block meanwhile */
+    }
     return find(number, MODBUS_CALL_WAITS) != NULL ? 0 : -MODBUS_ERROR_CANCELLED;
 }
 
@@ -235,15 +238,17 @@ void ModbusCallsBegin(MODBUS_SETUP *of, void (*waking)(void))
     wake = waking;
 }
 
+/* One that is on its way when the program stops is given back when it has ended. */
 void ModbusCallsPoll(bool is_running, RTS_I64 now_ns)
 {
     for (RTS_UI32 i = FIRST; i < RTS_COUNT(setup->calls); i++) {
         MODBUS_CALL *call = &setup->calls[i];
-        if (ModbusClientIsAsking(call))
-            continue;
+        bool is_asking = ModbusClientIsAsking(call);
         if (!is_running)
+            call->number = 0;
+        if (!is_running && !is_asking)
             SysAtomicStore(&call->state, MODBUS_CALL_FREE);
-        else if (now_ns - call->due_ns > ABANDONED_NS)
+        else if (call->number == 0 || now_ns - call->due_ns > ABANDONED_NS)
             (void)SysAtomicReplace(&call->state, MODBUS_CALL_ENDED, MODBUS_CALL_FREE);
     }
 }
