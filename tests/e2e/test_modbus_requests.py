@@ -120,5 +120,5 @@ def test_a_program_that_was_stopped_goes_on_asking(plant: tuple[Plc, Devices, De
     plc.stop()
     plc.write({"Main.device": "Meter", "Main.get": False})
     plc.start()
-    eventually(lambda: not plc.read("Main.read.Busy"))
+    eventually(lambda: not (plc.read("Main.read.Busy") or plc.read("Main.read.Error")))
     assert ask(plc, "read", device="Meter", reference=40011, readBy=3, count=1) == 0
