@@ -65,6 +65,15 @@ def test_a_task_that_exceeds_its_watchdog_stops_where_it_was(tool, plcrt, eventu
     assert counted(tool, plcrt) == before  # the other task starts no new cycle
 
 
+def test_a_loop_in_a_single_cycle_is_broken_as_well(tool, plcrt):
+    started(tool, plcrt, "WATCHDOG := T#100ms")
+    tool.ok("stop", "--port", plcrt.port)
+    tool.ok("write", "--port", plcrt.port, "Main.slow=TRUE")
+    assert tool("cycle", "--port", plcrt.port).status == 1
+    fault = exception(tool, plcrt)
+    assert (fault["name"], fault["task"], fault["line"] in LOOP) == ("WATCHDOG", "Fast", True)
+
+
 def test_a_loop_made_of_a_jump_is_broken_as_well(tool, plcrt, eventually):
     text = PROGRAM.replace("{properties}", "WATCHDOG := T#100ms")
     loop = "FOR i := 1 TO 2000000000 DO\n        n := n * 3 + i;\n    END_FOR"

@@ -25,11 +25,12 @@ END_PROGRAM
 PROGRAM Bad
 VAR a, b : DINT; END_VAR
 IF b > 100 THEN a := 1 / a; END_IF
+WHILE b < 0 DO a := a + 1; END_WHILE
 b := b * 2;
 END_PROGRAM
 CONFIGURATION Config
     RESOURCE Res ON PLC
-        TASK Slow(INTERVAL := T#20ms, PRIORITY := 9);
+        TASK Slow(INTERVAL := T#20ms, PRIORITY := 9, WATCHDOG := T#100ms);
         TASK OnEdge(SINGLE := Main.rise, PRIORITY := 1);
         TASK Fast(INTERVAL := T#1ms, PRIORITY := 5);
         PROGRAM Main WITH Slow : Main;
@@ -76,6 +77,17 @@ def test_an_exception_in_a_single_cycle_stops_it(plc):
         plc.cycle()
     status = plc.status()
     assert status.state == "exception" and status.exception and status.exception.pou == "Bad1"
+    plc.reset("cold")
+    plc.cycle()
+    assert plc.read("Main.n") == 1
+
+
+def test_an_endless_loop_in_a_single_cycle_is_broken(plc):
+    plc.write({"Bad1.b": -1})
+    with pytest.raises(DeviceError, match="EXCEPTION"):
+        plc.cycle()
+    status = plc.status()
+    assert status.exception and (status.exception.name, status.exception.pou) == ("WATCHDOG", "Bad1")
     plc.reset("cold")
     plc.cycle()
     assert plc.read("Main.n") == 1
