@@ -1,4 +1,4 @@
-# make demo   the whole story on this machine        make test   all tests
+# make demo   the whole story on this machine        make test   the tests
 # make lint   style, types, words                   make bench  figures, side by side
 # make format gives C and Python their one style
 # make wheel  dist/*.whl for this kind of Linux and every Python from 3.11 on, tried in those that are here
