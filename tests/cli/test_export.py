@@ -36,11 +36,21 @@ def test_what_is_left_out_is_a_warning_and_in_the_document(tool: Any, folder: Pa
     assert (left_out["line"], left_out["severity"]) == (1, "warning")
 
 
-def test_what_cannot_be_written_is_an_error_and_no_file(tool: Any, folder: Path) -> None:
+def test_a_file_without_a_place_is_kept_as_text_with_a_warning(tool: Any, folder: Path) -> None:
     (folder / "src/space.st").write_text("NAMESPACE N\nFUNCTION F : INT F := 1; END_FUNCTION\nEND_NAMESPACE\n")
+    (folder / "src/main.st").write_text("PROGRAM Main\nVAR i : INT; END_VAR\ni := N.F();\nEND_PROGRAM\n")
+    done = tool("export", str(folder / "src"), "-o", str(folder / "p.xml"))
+    assert done.status == 0
+    assert "space.st:1:1: warning: PLCopen XML has no namespaces" in done.err
+    tool("build", str(folder / "p.xml"), "-o", str(folder / "b.cdl"))
+    assert "Main.i = 1\n" in tool("run", str(folder / "b.cdl"), "--get", "Main.i").out
+
+
+def test_what_cannot_be_written_is_an_error_and_no_file(tool: Any, folder: Path) -> None:
+    (folder / "src/bell.st").write_text("{define bell}\n// a bell: \x07\n")
     done = tool("export", str(folder / "src"), "-o", str(folder / "p.xml"))
     assert done.status == 2
-    assert "space.st:1:1: error: PLCopen XML has no namespaces" in done.err
+    assert "bell.st:2:12: error: XML has no character 7" in done.err
     assert not (folder / "p.xml").exists()
 
 

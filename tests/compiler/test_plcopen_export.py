@@ -104,17 +104,37 @@ MAIN = "PROGRAM Main\nVAR x : INT; END_VAR\nx := 1;\nEND_PROGRAM\n"
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        (f"{MAIN}NAMESPACE N\n{MAIN.replace('Main', 'Other')}END_NAMESPACE\n", 5, "namespaces"),
+        (f"{MAIN}NAMESPACE N\n{MAIN.replace('Main', 'Other')}END_NAMESPACE\n", 5, "no namespaces"),
         (f"{MAIN}CLASS C\nEND_CLASS\n", 5, "write FUNCTION_BLOCK"),
         (f"{{define debug}}\n{MAIN}", 1, "definition"),
-        (f"{{IF NOT defined (x)}}\n{MAIN}{{END_IF}}\n{MAIN.replace('Main', 'Other')}", 2, "more than one"),
-        (f"{MAIN}// a bell: \x07\n", 5, "character 7"),
+        (f"{{IF NOT defined (x)}}\n{MAIN}{{END_IF}}\n{MAIN.replace('Main', 'Other')}", 2, "a condition around several"),
     ],
 )  # fmt: skip
-def test_what_has_no_place_is_refused_with_its_line(text: str, line: int, words: str) -> None:
-    written = exported(text)
+def test_a_file_with_what_has_no_place_is_kept_as_it_is_with_a_word(text: str, line: int, words: str) -> None:
+    whole = Source("whole.st", "FUNCTION Twice : INT\nVAR_INPUT i : INT; END_VAR\nTwice := 2 * i;\nEND_FUNCTION\n")
+    written = write_project([Source("GVL.st", text), whole], "p", frozenset())
+    assert written.ok
+    assert [(d.file, d.line) for d in written.diagnostics] == [("GVL.st", line)]
+    assert words in written.diagnostics[0].message
+    assert "plctool" in written.diagnostics[0].message
+    units = ElementTree.fromstring(written.text).findall(".//p:pou", NS)
+    assert [unit.get("name") for unit in units] == ["Twice"]
+    _, kept = read_project("p.xml", written.text)
+    assert kept.text == text
+    assert kept.stem == "GVL"
+    assert kept.pos(text.index("PROGRAM Main")).file == "p.xml"
+
+
+def test_a_file_kept_as_it_is_has_the_lines_of_the_xml_in_diagnostics() -> None:
+    written = write_project([Source("a.st", f"{{define debug}}\n{MAIN}".replace("x := 1", "x := y"))], "p", frozenset())
+    (error,) = [d for d in check_sources(read_project("p.xml", written.text)).diagnostics if d.severity == "error"]
+    assert "x := y;" in written.text.splitlines()[error.line - 1]
+
+
+def test_a_character_that_xml_cannot_hold_is_refused_with_its_line() -> None:
+    written = exported(f"{MAIN}// a bell: \x07\n")
     assert not written.ok
-    assert any(d.line == line and words in d.message for d in written.diagnostics), written.diagnostics
+    assert any(d.line == 5 and "character 7" in d.message for d in written.diagnostics), written.diagnostics
 
 
 def test_unit_tests_are_left_out_with_a_word() -> None:

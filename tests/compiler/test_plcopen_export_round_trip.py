@@ -31,7 +31,6 @@ OPTIONS = Options(find_target(DEFAULT_TARGET), 0, parse_checks("all"))
 PLAIN = re.compile(r'<data name="[^"]*interfaceasplaintext".*?</data>', re.DOTALL)
 ASKS_FOR_ITS_PLACE = "__POSITION"  # of which the place in the XML is another one
 ACTIONS_COME_FIRST = ("building",)  # PLCopen XML has them before methods, so parts of the image are in another order
-NO_PLACE = ("namespaces", "CLASS", "definition")
 
 
 def exported(sources: list[Source]) -> Written:
@@ -47,10 +46,7 @@ def image_of(result: CheckResult) -> bytes:
 def test_program(path: Path) -> None:
     sources = program_files([path]).load_sources()
     written = exported(sources)
-    if not written.ok:
-        errors = [d for d in written.diagnostics if d.severity == "error"]
-        assert all(any(word in d.message for word in NO_PLACE) and d.file == str(path) for d in errors)
-        return
+    assert written.ok
     image = image_of(checked(path))
     again = check_sources(read_project("p.xml", written.text))
     if ASKS_FOR_ITS_PLACE in sources[0].text:
@@ -75,6 +71,6 @@ def test_project(path: Path) -> None:
         assert image_of(again) == image_of(original)
 
 
-def test_few_programs_have_no_place() -> None:
-    refused = [path for path in RUNNING if not exported(program_files([path]).load_sources()).ok]
-    assert 0 < len(refused) < len(RUNNING) // 30
+def test_few_programs_are_kept_as_text() -> None:
+    kept = [path for path in RUNNING if "SourceText" in exported(program_files([path]).load_sources()).text]
+    assert 0 < len(kept) < len(RUNNING) // 30

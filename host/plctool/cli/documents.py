@@ -201,7 +201,7 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
 def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list[str]]:
     """Writes a program as PLCopen XML; also what is left out, as users read it. `stamp`: when, in seconds since 1970.
 
-    Raises CompileError when the program has errors, or something that PLCopen XML has no place for; UsageError for a
+    Raises CompileError when the program has errors, or a character that XML cannot hold; UsageError for a
     file that would be a source of the program itself.
     """
     from plctool.compiler import CompileError

@@ -48,7 +48,19 @@ def read_project(path: str, text: str) -> list[Source]:
     project = _Project(findings)
     project.read(root)
     lists = [made.source(path, text, name=name) for name, made in project.lists.items()]
-    return [project.text.source(path, text, findings=findings.all), *lists]
+    files = [_source_text(element).source(path, text, name=element.get("name")) for element in _files(root)]
+    return [project.text.source(path, text, findings=findings.all), *lists, *files]
+
+
+def _files(root: Element) -> list[Element]:
+    """The files that stand in a project as they are."""
+    return [file for data in root.child_data("sourcetext") for file in data.all("SourceText")]
+
+
+def _source_text(element: Element) -> Text:
+    made = Text()
+    made.copied(chunk for text in element.children for chunk in text.every_chunk())
+    return made
 
 
 class _Project:

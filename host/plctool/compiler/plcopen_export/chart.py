@@ -17,7 +17,7 @@ from plctool.compiler.plcopen_export.outline import Part, closed
 from plctool.compiler.syntax.lexer import Token
 
 _ROW, _COLUMN = 80, 120  # distances
-Refuse = Callable[[int, str], None]  # offset, what cannot be written
+NoPlace = Callable[[int, str, str], None]  # offset, what the standard has not, what to write otherwise
 
 
 @dataclass
@@ -31,13 +31,13 @@ class _Transition:
 
 
 class ChartWriter:
-    """Writes one chart. `refuse`: takes what the standard has no place for."""
+    """Writes one chart. `no_place`: takes what the standard has no place for."""
 
-    def __init__(self, parent: Xml, parts: list[Part], declarations: Declarations, refuse: Refuse) -> None:
+    def __init__(self, parent: Xml, parts: list[Part], declarations: Declarations, no_place: NoPlace) -> None:
         self._sfc = child(parent, "SFC")
         self._declarations = declarations
         self._slice = declarations.slice
-        self._refuse = refuse
+        self._no_place = no_place
         self._next = 0
         self._steps = [part for part in parts if part.kind != "TRANSITION"]
         self._transitions = [self._read(part) for part in parts if part.kind == "TRANSITION"]
@@ -115,7 +115,7 @@ class ChartWriter:
         if rest and qualifier in ("L", "D", "SD", "DS", "SL"):
             more["duration"] = rest.pop(0)
         if len(rest) > 1:
-            self._refuse(tokens[0].pos, f"the action {name} has several indicators; PLCopen XML has a place for one")
+            self._no_place(tokens[0].pos, f"second indicator of an action, as {name} has it", "give it one")
         if rest:
             more["indicator"] = rest[0]
         action = child(block, "action", localId=self._id(), **more)

@@ -1,4 +1,4 @@
-"""Elements of PLCopen XML, and what CODESYS adds to them.
+"""Elements of PLCopen XML, what CODESYS adds to them, and our own addition: a file as it is.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -26,10 +26,15 @@ def text_in(parent: Xml, text: str) -> None:
 
 def data(parent: Xml, name: str) -> Xml:
     """A new addition to an element, by a name of CODESYS."""
+    return _added(parent, f"{CODESYS}{name}", "implementation")
+
+
+def _added(parent: Xml, name: str, unknown: str) -> Xml:
+    """`unknown`: what others do with it."""
     added = parent.find("addData")
     if added is None:
         added = child(parent, "addData")
-    return child(added, "data", name=f"{CODESYS}{name}", handleUnknown="implementation")
+    return child(added, "data", name=name, handleUnknown=unknown)
 
 
 def plain(parent: Xml, text: str) -> None:
@@ -50,3 +55,8 @@ def documentation(parent: Xml, text: str) -> None:
     """A comment, without its marks."""
     if text:
         text_in(child(parent, "documentation"), text)
+
+
+def source_text(root: Xml, name: str, text: str) -> None:
+    """A file as it is. `name`: what the list of globals in it is called."""
+    text_in(child(_added(root, "plctool/sourcetext", "discard"), "SourceText", name=name), text)

@@ -2,8 +2,8 @@
 
 Every declaration is there twice: in the elements of the standard, and as plain text in an addition of CODESYS, which
 keeps comments, pragmas and what the standard has no element for. Readers that know the addition take the text. Methods,
-properties and interfaces are additions of CODESYS. What has no place at all is refused; nothing is left out without a
-word.
+properties and interfaces are additions of CODESYS. A file with something that has no place at all is an addition of our
+own, as it is, which no other system reads; nothing is left out without a word.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -11,18 +11,30 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from typing import Literal
 from xml.etree import ElementTree
 
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.plcopen_export.chart import ChartWriter
 from plctool.compiler.plcopen_export.declarations import Declarations
-from plctool.compiler.plcopen_export.elements import TC6, Xml, attributes, child, data, documentation, plain, text_in
+from plctool.compiler.plcopen_export.elements import (
+    TC6,
+    Xml,
+    attributes,
+    child,
+    data,
+    documentation,
+    plain,
+    source_text,
+    text_in,
+)
 from plctool.compiler.plcopen_export.outline import UNITS, Outline, Part, outline, type_end
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.lexer import Lexer, Token
+from plctool.compiler.typed import Pos
 from plctool.version import plctool_version
 
 _KINDS = {"FUNCTION": "function", "FUNCTION_BLOCK": "functionBlock", "PROGRAM": "program"}
@@ -30,11 +42,11 @@ _MEMBERS = frozenset(("METHOD", "PROPERTY", "PROPERTY_GET", "PROPERTY_SET", "ACT
 _TESTS = frozenset(("TEST", "SETUP", "TEARDOWN"))
 _UNWRITABLE = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _DEFINES = re.compile(r"\{\s*(?:un)?define\b", re.IGNORECASE)
-_REFUSED = {
-    "NAMESPACE": "PLCopen XML has no namespaces; make a library of its own of it, or take its units out of it",
-    "USING": "PLCopen XML has no namespaces; write the whole names",
-    "CLASS": "PLCopen XML has no CLASS; write FUNCTION_BLOCK",
-    "ACCESS": "VAR_ACCESS stands in a PROGRAM or in the CONFIGURATION",
+_NO_PLACE = {
+    "NAMESPACE": ("namespaces", "make a library of its own of it, or take its units out of it"),
+    "USING": ("namespaces", "write the whole names"),
+    "CLASS": ("CLASS", "write FUNCTION_BLOCK"),
+    "ACCESS": ("VAR_ACCESS by itself", "put it into a PROGRAM or the CONFIGURATION"),
 }
 
 
@@ -55,9 +67,10 @@ def write_project(sources: Sequence[Source], name: str, declared: frozenset[str]
     """A program without errors as PLCopen XML. `declared`: what {IF defined(pou: NAME)} finds; `seconds`: when it was
     written, since 1970."""
     project = _Project(name, declared, seconds)
-    for source in sources:
-        _File(project, source).write()
-    project.finish()
+    as_text = project.write(sources, {})
+    if as_text:
+        project = _Project(name, declared, seconds)
+        project.write(sources, as_text)
     ElementTree.indent(project.root)
     text = ElementTree.tostring(project.root, "unicode")
     return Written(f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n', project.diagnostics)
@@ -83,7 +96,32 @@ class _Project:
         self.configurations = child(child(self.root, "instances"), "configurations")
         self.lists: list[Xml] = []  # of globals, until there is a resource for them
 
-    def finish(self) -> None:
+    def write(self, sources: Sequence[Source], as_text: Mapping[int, list[Diagnostic]]) -> dict[int, list[Diagnostic]]:
+        """All files; the result says which have something without a place, by their index. `as_text`: the same, of
+        those that are written as they are."""
+        without_place: dict[int, list[Diagnostic]] = {}
+        for index, source in enumerate(sources):
+            self._look_at_characters(source)
+            if index in as_text:
+                self.diagnostics += as_text[index]
+                source_text(self.root, source.stem, source.text)
+            elif reasons := _File(self, source).write():
+                without_place[index] = reasons
+        self._place_lists()
+        return without_place
+
+    def say(self, pos: Pos, severity: Literal["error", "warning"], code: str, message: str) -> None:
+        """What a user should know."""
+        found = Diagnostic(pos.file, pos.line, pos.column, severity, code, message)
+        if found not in self.diagnostics:
+            self.diagnostics.append(found)
+
+    def _look_at_characters(self, source: Source) -> None:
+        for match in _UNWRITABLE.finditer(source.text):
+            message = f"XML has no character {ord(match.group())}; write it as $xx in a string"
+            self.say(source.pos(match.start()), "error", "format", message)
+
+    def _place_lists(self) -> None:
         """Puts lists of globals where the standard has them: into a resource."""
         if not self.lists:
             return
@@ -103,14 +141,13 @@ class _File:
         self._outline: Outline = outline(source, project.declared)
         self._declarations = Declarations(source.text, self._outline.attributes, self._only_text)
         self._last: tuple[Xml, Part] | None = None  # the unit that members without one belong to
+        self._without_place: list[Diagnostic] = []
 
-    def write(self) -> None:
-        """All that it holds."""
+    def write(self) -> list[Diagnostic]:
+        """All that it holds; the result names what has no place."""
         text = self._source.text
-        for match in _UNWRITABLE.finditer(text):
-            self._refuse(match.start(), f"XML has no character {ord(match.group())}; write it as $xx in a string")
         for match in _DEFINES.finditer(text):
-            self._refuse(match.start(), "PLCopen XML has no order in which a definition holds; write out what is meant")
+            self._no_place(match.start(), "order in which a definition holds", "write out what is meant")
         comment = self._outline.rest.strip()
         if comment:
             self._balanced(self._outline.rest, len(text) - len(self._outline.rest))
@@ -119,27 +156,25 @@ class _File:
         tests = [part for part in self._outline.parts if part.kind in _TESTS]
         if tests:
             message = f"PLCopen XML has no place for unit tests: those in this file are left out ({len(tests)})"
-            self._say(tests[0].pos, "warning", "left-out", message)
+            self._project.say(self._source.pos(tests[0].pos), "warning", "left-out", message)
         if comment and self._project.pous.findall("pou"):
             documentation(self._project.pous.findall("pou")[-1], comment)
         elif comment:
             documentation(self._project.root, comment)
+        return self._without_place
 
-    def _refuse(self, offset: int, message: str) -> None:
-        self._say(offset, "error", "format", message)
+    def _no_place(self, offset: int, lacks: str, hint: str) -> None:
+        """`lacks`: what PLCopen XML has not; `hint`: what to write for other systems."""
+        pos = self._source.pos(offset)
+        message = f"PLCopen XML has no {lacks}: it holds this file as text, which only plctool reads; otherwise {hint}"
+        if all(message != reason.message for reason in self._without_place):
+            self._without_place.append(Diagnostic(pos.file, pos.line, pos.column, "warning", "left-out", message))
 
     def _only_text(self, offset: int, what: str) -> None:
         message = (
             f"{what} is in the plain text only, which CODESYS and TwinCAT read; for other systems write it otherwise"
         )
-        self._say(offset, "warning", "left-out", message)
-
-    def _say(self, offset: int, severity: str, code: str, message: str) -> None:
-        pos = self._source.pos(offset)
-        assert severity in ("error", "warning")
-        found = Diagnostic(pos.file, pos.line, pos.column, severity, code, message)  # type: ignore[arg-type]
-        if found not in self._project.diagnostics:
-            self._project.diagnostics.append(found)
+        self._project.say(self._source.pos(offset), "warning", "left-out", message)
 
     def _balanced(self, text: str, offset: int) -> str:
         """The text, which may be read by itself: no conditional pragma begins or ends elsewhere."""
@@ -147,7 +182,9 @@ class _File:
         for _ in Lexer(text, lambda _at, code, _message: said.append(code), 0, None, self._project.declared):
             pass
         if "pragma" in said:
-            self._refuse(offset, "a conditional pragma here is around more than one declaration or body")
+            self._no_place(
+                offset, "place for a condition around several declarations or bodies", "write one around each"
+            )
         return text
 
     # ---- what stands for itself ----
@@ -165,7 +202,7 @@ class _File:
         elif part.kind == "CONFIGURATION":
             self._configuration(part)
         elif part.kind not in _TESTS:
-            self._refuse(part.pos, _REFUSED[part.kind])
+            self._no_place(part.pos, *_NO_PLACE[part.kind])
 
     def _types(self, part: Part) -> None:
         tokens = part.tokens[1:-1]
@@ -252,7 +289,7 @@ class _File:
     def _body(self, unit: Xml, part: Part) -> None:
         body = child(unit, "body")
         if part.chart:
-            ChartWriter(body, part.chart, self._declarations, self._refuse).write()
+            ChartWriter(body, part.chart, self._declarations, self._no_place).write()
             for step in part.chart:
                 self._balanced(step.gap, step.pos)
             documentation(body, self._balanced(part.body, part.pos).strip())
@@ -272,7 +309,7 @@ class _File:
         elif part.kind in _MEMBERS:
             self._property(unit, owner, part)
         else:
-            self._refuse(part.pos, _REFUSED[part.kind])
+            self._no_place(part.pos, *_NO_PLACE[part.kind])
 
     def _action(self, unit: Xml, part: Part) -> None:
         actions = unit.find("actions")
