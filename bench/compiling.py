@@ -125,7 +125,7 @@ def profile(path: Path) -> Stages:
         with stages.stage("LLVM: reading"):
             llvm.parse_assembly(text, llvm.create_context())
         with stages.stage("LLVM: optimising"):
-            module, machine = optimised(text, target, options.opt_level)
+            module, machine = optimised(text, target, options.opt_level, large=len(lowered.texts) > 1)
         with stages.stage("LLVM: code"):
             objects.append(machine.emit_object(module))
     stages.seconds["LLVM: optimising"] -= stages.seconds["LLVM: reading"]
