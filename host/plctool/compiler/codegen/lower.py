@@ -99,7 +99,7 @@ def _pou(unit: Unit, pou: Pou, effects: Effects, *, raises: bool) -> None:
     fn = Function(signature, unit.attributes(pou), unit.inlining(pou))
     body = Body(unit, fn, pou, effects, raises=raises)
     body.open_scope(pou.name, pou.pos)
-    parts = sections(pou)
+    parts = [pou] if pou in unit.sections else sections(pou)
     if len(parts) > 1:
         write_calls(body, [unit.section(part, raises=raises) for part in parts])
     else:

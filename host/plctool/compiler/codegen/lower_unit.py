@@ -102,7 +102,7 @@ class Unit:
         self.defaults = defaults
         self.imports: list[External] = []
         self.exchanges = False  # tasks exclude each other by Intrinsic.EXCHANGE
-        self._sections: set[Pou] = set()
+        self.sections: set[Pou] = set()  # parts of POUs
         self.handed: dict[Pou, list[Variable]] = {}  # inputs that function blocks get as parameters
         self.pous: dict[tuple[Pou, bool], str] = {}  # symbol of every POU; True: returns its exceptions
         self.structs: dict[str, StructType] = {}  # types whose default initialiser is needed, by symbol
@@ -142,7 +142,7 @@ class Unit:
 
     def inlining(self, pou: Pou) -> str:
         """The attributes for LLVM about inlining a POU: the standard library is made for it, if there is room."""
-        if pou.kind is PouKind.PROGRAM or self.options.debug or pou in self._sections:
+        if pou.kind is PouKind.PROGRAM or self.options.debug or pou in self.sections:
             return "noinline"
         large = _LARGE_FRAME_OF_CONTROLLER if self.options.compact else _LARGE_FRAME
         if sum(variable.type.size for variable in pou.locals) > large:
@@ -163,7 +163,7 @@ class Unit:
 
     def section(self, part: Pou, *, raises: bool) -> str:
         """The symbol of a part of a POU."""
-        self._sections.add(part)
+        self.sections.add(part)
         return self.symbol(part, raises=raises)
 
     def target_of(self, pou: Pou, dispatch: Dispatch | None, *, raises: bool = False) -> str:

@@ -25,7 +25,7 @@ def texts(module: Module) -> list[str]:
     total = sum(d.function.size for d in functions.values())
     if total <= _WHOLE:
         return [module.text(d.function.definition(d.linkage) for d in functions.values())]
-    parts = _cut(functions, total // (2 * (1 + total // (4 * _WHOLE))))
+    parts = _cut(functions, total // (2 * (1 + total // (2 * _WHOLE))))
     return [module.text(_part(names, functions, calls)) for names in parts]
 
 

@@ -21,12 +21,13 @@ class Parser:
         self.tables = tables
         self.states = [tables.start]
         self.values: list[Any] = []
-        self._reducers = reducers
+        self._rules = [(r.origin, r.size, reducer) for r, reducer in zip(tables.rules, reducers, strict=True)]
 
     def feed(self, token: Token) -> bool:
         """Takes a token; False when it does not fit. The stacks then are as if it had not been there, but for
         reductions that were due."""
-        states, values, actions = self.states, self.values, self.tables.actions
+        states, values = self.states, self.values
+        actions, gotos, rules = self.tables.actions, self.tables.gotos, self._rules
         kind = token.type
         while True:
             action = actions[states[-1]].get(kind)
@@ -36,21 +37,29 @@ class Parser:
                 states.append(action)
                 values.append(token)
                 return True
-            self.reduce(-1 - action)
+            # Here and not in `reduce`: half the time of a parse is spent with it.
+            origin, size, reducer = rules[-1 - action]
+            if reducer is None:
+                states[-1] = gotos[states[-2]][origin]
+            else:
+                self._replace(origin, size, reducer)
             if kind == END and states[-1] == self.tables.end:
                 return True
 
     def reduce(self, number: int) -> None:
         """Replaces the symbols of a rule by what it stands for."""
-        states, values = self.states, self.values
-        rule, reducer = self.tables.rules[number], self._reducers[number]
-        size = rule.size
+        origin, size, reducer = self._rules[number]
         if reducer is None:
-            del states[-1]
-        elif size:
+            self.states[-1] = self.tables.gotos[self.states[-2]][origin]
+        else:
+            self._replace(origin, size, reducer)
+
+    def _replace(self, origin: str, size: int, reducer: Reducer) -> None:
+        states, values = self.states, self.values
+        if size:
             children = values[-size:]
             del states[-size:], values[-size:]
             values.append(reducer(children))
         else:
             values.append(reducer([]))
-        states.append(self.tables.gotos[states[-1]][rule.origin])
+        states.append(self.tables.gotos[states[-1]][origin])
