@@ -16,6 +16,7 @@ import compiling
 import latency
 import links
 import overheads
+import serial_share
 import targets
 
 from plctool.compiler import IoFiles, compile_sources
@@ -92,6 +93,7 @@ def bench_serial() -> None:
             share = len(image) * BITS_PER_BYTE / BAUD / taken
             beside = f"share {share:.1%}" + (f"; {seconds[False] / taken:.2f} times as fast" if packed else "")
             line(f"{name}, {len(image)} bytes, {'packed' if packed else 'as it is'}", f"{taken:.2f} s", beside)
+    serial_share.main(images)
 
 
 # ---- CAN -------------------------------------------------------------------------------------------------------------

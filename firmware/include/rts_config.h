@@ -359,8 +359,15 @@
 #define CAN_RESTART_MS 500
 #endif
 
-/* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is
- * below 424), COM_QUEUE_SIZE and about 150 bytes. */
+/* The longest packet that a serial line takes, bytes: BLK_MAX_SIZE, or more, for clients that ask whether it is
+ * (docs/protocol.md): the fewer packets a download is, the less of the line they take. */
+#ifndef COM_PACKET_SIZE
+#define COM_PACKET_SIZE 512
+#endif
+#define BLK_LONG_PACKETS (COM_PACKET_SIZE > 512)
+
+/* Serial lines the block driver serves; each costs one receive packet (COM_PACKET_SIZE + 2 bytes, less when
+ * NETSERVER_MESSAGE_SIZE is below 424), COM_QUEUE_SIZE and about 150 bytes. */
 #ifndef COM_MAX_LINES
 #define COM_MAX_LINES 1
 #endif

@@ -234,6 +234,7 @@ class CanTransport:
     ) -> None:
         self.name = name
         self.max_packet = int(lib.BLK_MAX_SIZE)
+        self.long_packet = 0
         self.packet_overhead = 0
         self.byte_rate = math.inf  # `send` waits for the bus
         self.is_slow = True
