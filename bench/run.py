@@ -102,11 +102,11 @@ def bench_serial() -> None:
 def bench_can() -> None:
     print("\nA download over CAN on a simulated bus (share of what ISO-TP carries at best that is image bytes)")
     done = subprocess.run([ROOT / "build/tests/c/can_share"], capture_output=True, text=True, check=True)
-    for name, longest, size, seconds, share in (text.split("\t") for text in done.stdout.splitlines()):
+    for name, longest, packet, size, seconds, share in (text.split("\t") for text in done.stdout.splitlines()):
         line(
-            f"{name}, {size} bytes, messages of {longest}",
+            f"{name}, messages of {longest}",
             f"{float(seconds):.2f} s",
-            f"{float(share):.1%}; {int(size) / float(seconds) / 1e3:.1f} kB/s",
+            f"packets of {packet}: {float(share):.1%}; {int(size) / float(seconds) / 1e3:.1f} kB/s",
         )
 
 

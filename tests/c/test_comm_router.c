@@ -147,13 +147,13 @@ static void every_cut_packet_is_rejected(void)
 
 static void packet_longer_than_any_line_takes_is_rejected(void)
 {
-    static RTS_UI8 packet[COM_PACKET_SIZE + 4] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x10,
-                                                  0x00, 0x01, 0x02, 0xC2, 0x00, 0x04};
+    static RTS_UI8 packet[BLK_LONGEST_PACKET + 4] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x10,
+                                                     0x00, 0x01, 0x02, 0xC2, 0x00, 0x04};
 
     setup();
-    RouterHandleData(&driver, packet, COM_PACKET_SIZE);
+    RouterHandleData(&driver, packet, BLK_LONGEST_PACKET);
     CHECK_EQUAL(sent_count, 1);
-    RouterHandleData(&driver, packet, COM_PACKET_SIZE + 1);
+    RouterHandleData(&driver, packet, BLK_LONGEST_PACKET + 1);
     CHECK_EQUAL(sent_count, 1);
 }
 

@@ -27,7 +27,7 @@ enum {
     /* A packet with the largest message of the channel in one block. No packet is larger, in either direction. */
     MESSAGE_MAX = ROUTER_HEADER_MAX + CHANNEL_FIRST_SIZE + NETSERVER_MESSAGE_SIZE,
     PACKET_MAX = MESSAGE_MAX < BLK_MAX_SIZE ? MESSAGE_MAX : BLK_MAX_SIZE,
-    TAKES_MAX = BLK_LONG_PACKETS ? COM_PACKET_SIZE : PACKET_MAX,
+    TAKES_MAX = COM_PACKET_SIZE > BLK_MAX_SIZE ? COM_PACKET_SIZE : PACKET_MAX,
 };
 
 RTS_STATIC_ASSERT(COM_PACKET_SIZE >= BLK_MAX_SIZE && COM_PACKET_SIZE <= 0xFFFF, packets_of_the_field_are_taken);
