@@ -6,8 +6,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Prints a line for each kind of bus and longest message: its name, that length, bytes, seconds, and the share of what
- * ISO-TP carries at best: packets of the largest size, one after the other, of which all bytes count.
+ * Prints a line for each kind of bus, longest message and longest packet: its name, these lengths, bytes, seconds, and
+ * the share of what ISO-TP carries at best: packets of the largest size, one after the other, of which all bytes count.
  */
 #include <stdio.h>
 #include <string.h>
@@ -20,8 +20,6 @@
 enum {
     IMAGE = 16000,
     KBIT = 1000,
-    IN_FIRST = CLIENT_PAYLOAD_SIZE - CHANNEL_FIRST_SIZE, /* bytes of a message in its packets */
-    IN_OTHERS = CLIENT_PAYLOAD_SIZE - (int)sizeof(CHANNEL_DATA),
     HEADS = 44,           /* of the message and its elements */
     UNIT = 16,            /* pieces are multiples of it */
     ACKNOWLEDGEMENTS = 4, /* at most, before a reply */
@@ -64,15 +62,19 @@ static RTS_UI32 take_reply(CLIENT *client)
     return reply_number(&reply, TAG_CDL_NEXT);
 }
 
-/* Bytes of the image in a message of `longest` bytes at most. */
-static RTS_UI32 piece_of(RTS_UI32 longest)
+/* Bytes of the image in a message of `longest` bytes at most that fills its packets. */
+static RTS_UI32 piece_of(const CLIENT *client, RTS_UI32 longest)
 {
-    return (IN_FIRST + (longest - IN_FIRST) / IN_OTHERS * IN_OTHERS - HEADS) / UNIT * UNIT;
+    enum { PREFIX = CHANNEL_FIRST_SIZE - sizeof(CHANNEL_DATA) };
+    RTS_UI32 room = client_room(client) - (RTS_UI32)sizeof(CHANNEL_DATA);
+    RTS_UI32 filled = (longest + PREFIX) / room * room;
+
+    return ((filled == 0 ? longest : filled - PREFIX) - HEADS) / UNIT * UNIT;
 }
 
 static bool send_image(CLIENT *client, RTS_UI32 longest)
 {
-    RTS_UI32 piece = piece_of(longest);
+    RTS_UI32 piece = piece_of(client, longest);
     RTS_UI32 arrived = 0;
 
     for (RTS_UI32 offset = 0; offset < IMAGE; offset += piece) {
@@ -94,37 +96,43 @@ static double frame_seconds(RTS_UI32 size, bool fd)
 }
 
 /* Seconds a byte takes at best: a first frame, one of flow control, all others full. */
-static double best(bool fd)
+static double best(RTS_UI32 size, bool fd)
 {
     RTS_UI32 full = fd ? CAN_FD_SIZE : CAN_CLASSIC_SIZE;
-    RTS_UI32 left = BLK_MAX_SIZE - (full - 2);
+    RTS_UI32 left = size - (full - 2);
     double packet = frame_seconds(full, fd) + frame_seconds(ISOTP_FLOW_SIZE, fd);
 
     for (; left > full - 1; left -= full - 1)
         packet += frame_seconds(full, fd);
-    return (packet + frame_seconds(1 + left, fd)) / BLK_MAX_SIZE;
+    return (packet + frame_seconds(1 + left, fd)) / size;
 }
 
-static bool measure(const char *name, RTS_UI32 longest, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
+static bool measure(const char *name, RTS_UI32 longest, RTS_UI32 packet, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
 {
     CLIENT client;
 
     can_start(bit_rate, data_bit_rate);
     can_client(&client, can_tool(200));
+    client.packet = packet;
     client_send_open(&client, 7, longest);
     bool done = client_take_open(&client) == CHANNEL_OPEN_OK && client_login(&client) && client_login_app(&client);
     RTS_I64 start = SimCanNow();
     done = done && send_image(&client, longest);
     double seconds = (double)(SimCanNow() - start) / 1e9;
-    printf("%s\t%u\t%d\t%.4f\t%.4f\n", name, (unsigned)longest, IMAGE, seconds,
-           IMAGE * best(data_bit_rate != 0) / seconds);
+    RTS_UI32 size = packet > BLK_MAX_SIZE ? packet : BLK_MAX_SIZE;
+    done = done && client_room(&client) == size - CLIENT_HEADER_SIZE;
+    printf("%s\t%u\t%u\t%d\t%.4f\t%.4f\n", name, (unsigned)longest, (unsigned)size, IMAGE, seconds,
+           IMAGE * best(size, data_bit_rate != 0) / seconds);
     can_end();
     return done;
 }
 
 int main(void)
 {
-    static const RTS_UI32 longest[] = {576, 2048, NETSERVER_MESSAGE_SIZE};
+    static const struct {
+        RTS_UI32 message;
+        RTS_UI32 packet; /* 0: those of all devices */
+    } longest[] = {{576, 0}, {2048, 0}, {2048, CAN_PACKET_SIZE}, {NETSERVER_MESSAGE_SIZE, CAN_PACKET_SIZE}};
     bool done = true;
 
     for (RTS_UI32 i = 0, random = 1; i < IMAGE; i++) {
@@ -132,9 +140,9 @@ int main(void)
         image[i] = (RTS_UI8)(random >> 24);
     }
     for (RTS_UI32 i = 0; i < RTS_COUNT(longest); i++)
-        done = done && measure("CAN 125 kbit/s", longest[i], 125 * KBIT, 0) &&
-               measure("CAN 500 kbit/s", longest[i], 500 * KBIT, 0) &&
-               measure("CAN 1 Mbit/s", longest[i], 1000 * KBIT, 0) &&
-               measure("CAN FD 500 kbit/s, 2 Mbit/s", longest[i], 500 * KBIT, 2000 * KBIT);
+        done = done && measure("CAN 125 kbit/s", longest[i].message, longest[i].packet, 125 * KBIT, 0) &&
+               measure("CAN 500 kbit/s", longest[i].message, longest[i].packet, 500 * KBIT, 0) &&
+               measure("CAN 1 Mbit/s", longest[i].message, longest[i].packet, 1000 * KBIT, 0) &&
+               measure("CAN FD 500 kbit/s, 2 Mbit/s", longest[i].message, longest[i].packet, 500 * KBIT, 2000 * KBIT);
     return done ? 0 : 1;
 }

@@ -16,6 +16,7 @@ import compiling
 import latency
 import links
 import overheads
+import serial_share
 import targets
 
 from plctool.compiler import IoFiles, compile_sources
@@ -92,6 +93,7 @@ def bench_serial() -> None:
             share = len(image) * BITS_PER_BYTE / BAUD / taken
             beside = f"share {share:.1%}" + (f"; {seconds[False] / taken:.2f} times as fast" if packed else "")
             line(f"{name}, {len(image)} bytes, {'packed' if packed else 'as it is'}", f"{taken:.2f} s", beside)
+    serial_share.main(images)
 
 
 # ---- CAN -------------------------------------------------------------------------------------------------------------
@@ -100,11 +102,11 @@ def bench_serial() -> None:
 def bench_can() -> None:
     print("\nA download over CAN on a simulated bus (share of what ISO-TP carries at best that is image bytes)")
     done = subprocess.run([ROOT / "build/tests/c/can_share"], capture_output=True, text=True, check=True)
-    for name, longest, size, seconds, share in (text.split("\t") for text in done.stdout.splitlines()):
+    for name, longest, packet, size, seconds, share in (text.split("\t") for text in done.stdout.splitlines()):
         line(
-            f"{name}, {size} bytes, messages of {longest}",
+            f"{name}, messages of {longest}",
             f"{float(seconds):.2f} s",
-            f"{float(share):.1%}; {int(size) / float(seconds) / 1e3:.1f} kB/s",
+            f"packets of {packet}: {float(share):.1%}; {int(size) / float(seconds) / 1e3:.1f} kB/s",
         )
 
 

@@ -126,7 +126,8 @@ typedef struct {
     WIRE_UI32 request_id;
     WIRE_UI32 limit;       /* longest message, bytes */
     RTS_UI8 address_words; /* of both addresses together */
-    RTS_UI8 reserved[3];
+    RTS_UI8 unused;
+    WIRE_UI16 packet; /* own: longest packet the client would send, bytes; 0: BLK_MAX_SIZE */
 } CHANNEL_OPEN_REQUEST;
 
 typedef struct {
@@ -137,7 +138,7 @@ typedef struct {
     WIRE_UI32 limit;
     RTS_UI8 byte_order; /* 1: the device is big-endian */
     RTS_UI8 address_words;
-    RTS_UI8 reserved[2];
+    WIRE_UI16 packet; /* own: longest packet the device takes of it; 0: BLK_MAX_SIZE */
 } CHANNEL_OPEN_RESPONSE;
 
 /* From both sides. */

@@ -32,6 +32,9 @@ typedef struct {
 #if SRV_OTHER_CLIENTS
     RTS_UI8 address_bits; /* of it that are used, from the last byte on; 0: all */
 #endif
+#if BLK_LONG_PACKETS
+    RTS_UI16 takes; /* longest packet it takes, if that is more than BLK_MAX_SIZE */
+#endif
 #if COMM_ENDPOINTS
     bool reliable; /* what it takes arrives, once and in order, or the peer is gone */
     bool gone;     /* its only peer has gone; true for one pass of CH_COMM_CYCLE at least */

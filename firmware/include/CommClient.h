@@ -52,6 +52,9 @@ typedef struct {
 #if SRV_OTHER_CLIENTS
     bool is_version_1_0; /* of the open request: shorter */
 #endif
+#if BLK_LONG_PACKETS
+    RTS_UI16 wanted; /* longest packet the client would send, in place of BLK_MAX_SIZE; 0: it does not ask */
+#endif
     bool missing_due;    /* the acknowledgement asks for a repetition */
     RTS_UI32 request_id; /* of the open request */
     RTS_UI32 limit;      /* largest message, both directions */

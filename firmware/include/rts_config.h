@@ -320,12 +320,13 @@
 #define CAN_FD 0
 #endif
 
-/* Packets that may arrive over CAN at a time, from as many tools; each costs a packet of 512 bytes and 30. */
+/* Packets that may arrive over CAN at a time, from as many tools; each costs a packet of CAN_PACKET_SIZE bytes
+ * and 30. */
 #ifndef CAN_RX_SESSIONS
 #define CAN_RX_SESSIONS (COMM_MAX_CLIENTS + 1)
 #endif
 
-/* Packets that may be on their way to tools over CAN; each costs the same. One whose tool has gone takes its place for a
+/* Packets that may be on their way to tools over CAN; each costs 540 bytes. One whose tool has gone takes its place for a
  * second. */
 #ifndef CAN_TX_SESSIONS
 #define CAN_TX_SESSIONS (COMM_MAX_CLIENTS + 1)
@@ -359,8 +360,21 @@
 #define CAN_RESTART_MS 500
 #endif
 
-/* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is
- * below 424), COM_QUEUE_SIZE and about 150 bytes. */
+/* The longest packet that a serial line takes, bytes: BLK_MAX_SIZE, or more, for clients that ask whether it is
+ * (docs/protocol.md): the fewer packets a download is, the less of the line they take. */
+#ifndef COM_PACKET_SIZE
+#define COM_PACKET_SIZE 512
+#endif
+
+/* The same for CAN, up to 4095. */
+#ifndef CAN_PACKET_SIZE
+#define CAN_PACKET_SIZE 512
+#endif
+#define BLK_LONGEST_PACKET (COM_PACKET_SIZE > CAN_PACKET_SIZE ? COM_PACKET_SIZE : CAN_PACKET_SIZE) /* of all lines */
+#define BLK_LONG_PACKETS (COM_PACKET_SIZE > 512 || CAN_PACKET_SIZE > 512)
+
+/* Serial lines the block driver serves; each costs one receive packet (COM_PACKET_SIZE + 2 bytes, less when
+ * NETSERVER_MESSAGE_SIZE is below 424), COM_QUEUE_SIZE and about 150 bytes. */
 #ifndef COM_MAX_LINES
 #define COM_MAX_LINES 1
 #endif

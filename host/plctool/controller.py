@@ -155,7 +155,7 @@ class Controller(ABC):
         self, data: bytes, start: bool, force: bool, unchecked: bool, progress: Callable[[int, int], None]
     ) -> FlashResult:
         crc = image_crc(data)
-        status = self.raw_status()
+        status = self._status_before(data)
         is_there = (status.image_crc, status.image_size) == (crc, len(data))
         skipped = is_there and status.exception is None and not force and not unchecked
         begin = self._now()
@@ -165,10 +165,11 @@ class Controller(ABC):
         seconds = self._now() - begin
         persistent = None if skipped else self._kept_changes(status.image_crc, crc)
         if start and not skipped:
-            self._start_checked()
-        elif start and status.state is not AppState.RUN:
-            self.start()
-        now = self.raw_status()
+            now = self._start_checked()
+        else:
+            if start and status.state is not AppState.RUN:
+                self.start()
+            now = self.raw_status()
         if now.image_crc != crc:
             message = (
                 "The controller went down when the program was initialised, and started the previous one; see the log."
@@ -176,9 +177,14 @@ class Controller(ABC):
             raise DeviceError(message, "died")
         return FlashResult(len(data), seconds, skipped, now.state, persistent)
 
-    def _start_checked(self) -> None:
-        """As `start`, just after the controller has replied."""
+    def _status_before(self, data: bytes) -> Status:
+        """The status before a download of this image."""
+        return self.raw_status()
+
+    def _start_checked(self) -> Status:
+        """As `start`, just after the controller has replied; the status then."""
         self.start()
+        return self.raw_status()
 
     def _loaded_crc(self) -> int:
         """CRC of the image that the controller has just taken."""

@@ -134,6 +134,7 @@ class Plc(Controller):
             else Session(connection, ask_password)
         )
         self._symbol_file = symbols
+        self._prepared: services.Prepared | None = None  # of the download that follows
 
     def close(self) -> None:
         self._connection.close()
@@ -230,8 +231,8 @@ class Plc(Controller):
     def _loaded_crc(self) -> int:
         return services.loaded_crc(self._session)  # by a request that the start needs too
 
-    def _start_checked(self) -> None:
-        services.start(self._session, checked=True)
+    def _start_checked(self) -> Status:
+        return services.start_checked(self._session)
 
     def stop(self) -> None:
         services.stop(self._session)
@@ -257,7 +258,12 @@ class Plc(Controller):
         return self._session.exclusive(purpose)
 
     def _download(self, data: bytes, restart: bool, progress: Callable[[int], None]) -> None:
-        services.download(self._session, data, restart, progress)
+        prepared, self._prepared = self._prepared, None
+        services.download(self._session, data, restart, progress, prepared)
+
+    def _status_before(self, data: bytes) -> Status:
+        status, self._prepared = services.prepare_download(self._session, data)
+        return status
 
     # ---- variables ----
 

@@ -26,7 +26,7 @@ RTS_UI32 client_packet(const CLIENT *client, RTS_UI8 service, const RTS_UI8 *pay
 
 void client_send_package(const CLIENT *client, const RTS_UI8 *package, RTS_UI32 size)
 {
-    RTS_UI8 packet[BLK_MAX_SIZE];
+    RTS_UI8 packet[CLIENT_LONGEST];
 
     size = client_packet(client, ROUTER_SVC_CHANNEL, package, size, packet);
     if (client->link != NULL)
@@ -60,6 +60,11 @@ RTS_UI32 client_take(const CLIENT *client, RTS_UI8 *service, RTS_UI8 *payload)
 
 /* ---- layer 4 ---- */
 
+RTS_UI32 client_room(const CLIENT *client)
+{
+    return (client->packet > BLK_MAX_SIZE ? client->packet : BLK_MAX_SIZE) - CLIENT_HEADER_SIZE;
+}
+
 void client_init(CLIENT *client, RTS_UI16 address)
 {
     memset(client, 0, sizeof(*client));
@@ -81,6 +86,7 @@ void client_send_open(const CLIENT *client, RTS_UI32 request_id, RTS_UI32 buffer
     BytesPut32(package + 8, request_id);
     BytesPut32(package + 12, buffer);
     package[16] = 2;
+    BytesPut16(package + 18, client->packet);
     client_seal(package, sizeof(package));
     client_send_package(client, package, sizeof(package));
 }
@@ -94,6 +100,7 @@ int client_take_open(CLIENT *client)
         return -1;
     client->channel = BytesGet16(package + 14);
     client->limit = BytesGet32(package + 16);
+    client->packet = client->open_size < sizeof(CHANNEL_OPEN_RESPONSE) ? 0 : BytesGet16(package + 22);
     client->sent = 0;
     client->received = 0;
     return BytesGet16(package + 12);
@@ -117,7 +124,7 @@ void client_send_close(const CLIENT *client)
 void client_send_block(const CLIENT *client, RTS_UI32 number, RTS_UI8 flags, const RTS_UI8 *message, RTS_UI32 length,
                        RTS_UI32 offset, RTS_UI32 size)
 {
-    RTS_UI8 package[BLK_MAX_SIZE] = {CHANNEL_PKG_DATA, flags};
+    RTS_UI8 package[CLIENT_LONGEST] = {CHANNEL_PKG_DATA, flags};
     RTS_UI32 header = sizeof(CHANNEL_DATA);
 
     BytesPut16(package + 2, client->channel);
@@ -147,7 +154,7 @@ void client_send_message(CLIENT *client, const RTS_UI8 *message, RTS_UI32 size)
     RTS_UI32 offset = 0;
 
     do {
-        RTS_UI32 room = CLIENT_PAYLOAD_SIZE - (flags & CHANNEL_FLAG_FIRST ? CHANNEL_FIRST_SIZE : sizeof(CHANNEL_DATA));
+        RTS_UI32 room = client_room(client) - (flags & CHANNEL_FLAG_FIRST ? CHANNEL_FIRST_SIZE : sizeof(CHANNEL_DATA));
         RTS_UI32 part = size - offset < room ? size - offset : room;
         client_send_block(client, ++client->sent, flags, message, size, offset, part);
         flags = CHANNEL_FLAG_TO_SERVER;

@@ -32,6 +32,7 @@ typedef struct {
     RTS_UI32 session;
     RTS_UI32 app_session;
     RTS_UI32 open_size; /* bytes of the last open response */
+    RTS_UI32 packet;    /* longest that it sends, to a device that takes it; 0: BLK_MAX_SIZE, without asking */
 } CLIENT;
 
 /* Bytes of an open response of version 1.0. */
@@ -39,10 +40,13 @@ enum { CLIENT_OLD_RESPONSE = 20 };
 
 /* ---- layer 3 ---- */
 
-/* Of a packet; and what fits into one. */
-enum { CLIENT_HEADER_SIZE = 12, CLIENT_PAYLOAD_SIZE = BLK_MAX_SIZE - CLIENT_HEADER_SIZE };
+/* Of a packet; and the longest that a client sends. */
+enum { CLIENT_HEADER_SIZE = 12, CLIENT_LONGEST = 4095 };
 
-/* Makes a packet from this client to the device; returns its size. `size`: at most CLIENT_PAYLOAD_SIZE, as in all that
+/* Bytes of a package that fit into a packet. */
+RTS_UI32 client_room(const CLIENT *client);
+
+/* Makes a packet from this client to the device; returns its size. `size`: at most client_room, as in all that
  * follow. */
 RTS_UI32 client_packet(const CLIENT *client, RTS_UI8 service, const RTS_UI8 *payload, RTS_UI32 size, RTS_UI8 *packet);
 /* Sends a channel package. */

@@ -62,6 +62,29 @@ static void a_tool_logs_in_on_classic_can_and_fd(void)
     }
 }
 
+/* Packets that an echo takes when the tool sends packets of up to `packet` bytes, if it may. */
+static RTS_UI32 packets_of_an_echo(RTS_UI32 longest)
+{
+    CLIENT client;
+
+    can_start(500 * KBIT, 0);
+    can_client(&client, can_tool(200));
+    client.packet = longest;
+    CHECK(client_open(&client) && client_login(&client) && client_login_app(&client));
+    RTS_UI32 before = BlkDrvCanGetCounters()->packets;
+    CHECK(echo(&client));
+    RTS_UI32 packets = BlkDrvCanGetCounters()->packets - before;
+    can_end();
+    return packets;
+}
+
+static void a_tool_that_asks_may_send_long_packets(void)
+{
+    CHECK_EQUAL(packets_of_an_echo(0), 4);
+    CHECK_EQUAL(packets_of_an_echo(1000), 2);
+    CHECK_EQUAL(packets_of_an_echo(4095), 1);
+}
+
 static void two_tools_are_served_at_once(void)
 {
     CLIENT a;
@@ -346,6 +369,7 @@ static void an_address_that_cannot_be_is_refused(void)
 int main(void)
 {
     RUN(a_tool_logs_in_on_classic_can_and_fd);
+    RUN(a_tool_that_asks_may_send_long_packets);
     RUN(two_tools_are_served_at_once);
     RUN(packets_of_several_tools_arrive_at_the_same_time);
     RUN(more_packets_than_there_is_room_for_are_sent_again);

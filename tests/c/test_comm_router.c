@@ -145,14 +145,15 @@ static void every_cut_packet_is_rejected(void)
     }
 }
 
-static void packet_longer_than_a_block_is_rejected(void)
+static void packet_longer_than_any_line_takes_is_rejected(void)
 {
-    static RTS_UI8 packet[BLK_MAX_SIZE + 4] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x10, 0x00, 0x01, 0x02, 0xC2, 0x00, 0x04};
+    static RTS_UI8 packet[BLK_LONGEST_PACKET + 4] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x10,
+                                                     0x00, 0x01, 0x02, 0xC2, 0x00, 0x04};
 
     setup();
-    RouterHandleData(&driver, packet, BLK_MAX_SIZE);
+    RouterHandleData(&driver, packet, BLK_LONGEST_PACKET);
     CHECK_EQUAL(sent_count, 1);
-    RouterHandleData(&driver, packet, BLK_MAX_SIZE + 1);
+    RouterHandleData(&driver, packet, BLK_LONGEST_PACKET + 1);
     CHECK_EQUAL(sent_count, 1);
 }
 
@@ -431,7 +432,7 @@ int main(void)
     RUN(wrong_magic_is_rejected);
     RUN(addresses_of_fifteen_words_are_answered);
     RUN(every_cut_packet_is_rejected);
-    RUN(packet_longer_than_a_block_is_rejected);
+    RUN(packet_longer_than_any_line_takes_is_rejected);
     RUN(signal_packets_are_never_answered);
     RUN(packets_without_sender_are_never_answered);
     RUN(hop_count_zero_and_relative_addresses_are_not_delivered);

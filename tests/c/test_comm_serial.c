@@ -7,6 +7,8 @@
 
 #include "CmpBlkDrvSimpleCom.h"
 #include "CmpBytes.h"
+#include "CmpPackets.h"
+#include "comm_client.h"
 #include "comm_fakes.h"
 #include "test.h"
 
@@ -213,18 +215,46 @@ static void every_single_bit_error_is_noticed(void)
 
 static void largest_packet_passes_and_one_byte_more_overflows(void)
 {
-    static RTS_UI8 data[BLK_MAX_SIZE + 1];
+    static RTS_UI8 data[COM_PACKET_SIZE + 1];
 
     fakes_start();
     memset(data, '#', sizeof(data));
-    put_frame(data, BLK_MAX_SIZE, 0);
-    put_frame(data, BLK_MAX_SIZE + 1, 0);
+    put_frame(data, COM_PACKET_SIZE, 0);
+    put_frame(data, COM_PACKET_SIZE + 1, 0);
     put_question();
-    fakes_cycle(1);
-    fakes_cycle(1);
+    while (fakes.line_in_read < fakes.line_in_size)
+        fakes_cycle(1);
     CHECK_EQUAL(counters()->frames, 2);
     CHECK_EQUAL(counters()->overflows, 1);
     CHECK_EQUAL(answers(), 1);
+}
+
+/* What the open response says of the longest packet to a client that would send `wanted` bytes. */
+static RTS_UI32 granted_packet(RTS_UI32 wanted)
+{
+    static RTS_UI8 answer[BLK_MAX_SIZE + 2];
+    RTS_UI8 packet[12 + sizeof(CHANNEL_OPEN_REQUEST)] = {0xC5, 0x6B, 0x40, 0x40, 0x00, 0x11,
+                                                         0x00, 0x01, 0x00, 0x23, 0x00, 0x00};
+    CHANNEL_OPEN_REQUEST *open = (CHANNEL_OPEN_REQUEST *)(packet + 12);
+    RTS_UI32 position = 0;
+
+    fakes_start();
+    open->meta.type = CHANNEL_PKG_OPEN_REQ;
+    BytesPut32(open->limit, NETSERVER_MESSAGE_SIZE);
+    BytesPut16(open->packet, wanted);
+    client_seal(packet + 12, sizeof(*open));
+    put_frame(packet, sizeof(packet), 0);
+    fakes_cycle(1);
+    CHECK_EQUAL(take_frame(&position, answer), 12 + sizeof(CHANNEL_OPEN_RESPONSE));
+    return BytesGet16(((const CHANNEL_OPEN_RESPONSE *)(answer + 12))->packet);
+}
+
+static void a_client_that_asks_is_told_the_longest_packet(void)
+{
+    CHECK_EQUAL(granted_packet(0), 0);
+    CHECK_EQUAL(granted_packet(600), BLK_LONG_PACKETS ? 600 : 0);
+    CHECK_EQUAL(granted_packet(COM_PACKET_SIZE), BLK_LONG_PACKETS ? COM_PACKET_SIZE : 0);
+    CHECK_EQUAL(granted_packet(0xFFFF), BLK_LONG_PACKETS ? COM_PACKET_SIZE : 0);
 }
 
 static void frame_without_end_never_overflows_the_buffer(void)
@@ -387,6 +417,7 @@ int main(void)
     RUN(frame_with_wrong_crc_is_dropped);
     RUN(every_single_bit_error_is_noticed);
     RUN(largest_packet_passes_and_one_byte_more_overflows);
+    RUN(a_client_that_asks_is_told_the_longest_packet);
     RUN(frame_without_end_never_overflows_the_buffer);
     RUN(wrong_escape_ends_the_frame);
     RUN(doubled_hash_is_a_wrong_escape_and_may_begin_a_frame);

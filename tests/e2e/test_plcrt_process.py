@@ -367,6 +367,7 @@ class Wire:
     name = "wire"
     local_address = b"\x00\x02"
     max_packet = simplecom.MAX_PACKET
+    long_packet = simplecom.LONG_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     point_to_point = False
     places = NO_PLACES

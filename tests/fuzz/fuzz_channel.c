@@ -124,7 +124,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     client_init(&client, 0x0102);
     FUZZ_CHECK(client_open(&client) && client_login(&client));
     for (size_t i = 0; i < size;) {
-        uint8_t package[CLIENT_PAYLOAD_SIZE];
+        uint8_t package[BLK_MAX_SIZE - CLIENT_HEADER_SIZE];
         uint8_t head = data[i++];
         RTS_UI32 length = UNIT * (head & 0x7Fu);
         if (length > sizeof(package))

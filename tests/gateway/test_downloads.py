@@ -227,3 +227,11 @@ def test_a_download_below_the_command_keeps_others_away_too(served: Served) -> N
 
     download(plc._session, image, progress=look)
     assert served.plc.image == image and refused[0].code == BUSY
+
+
+def test_a_download_logs_in_again_when_the_device_has_ended_the_login(served: Served) -> None:
+    plc, (image, _) = served.connect("plctool flash"), make_application("3", 3_000)
+    plc.status()
+    served.plc.LOGIN += 1
+    plc.flash(image)
+    assert served.plc.image == image

@@ -49,6 +49,7 @@ class FakeLine:
         self.name = "fake line"
         self.local_address = CLIENT_ADDRESS
         self.max_packet = simplecom.MAX_PACKET
+        self.long_packet = simplecom.LONG_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
         self.point_to_point = False
         self.places = NO_PLACES
@@ -138,11 +139,13 @@ class FakeDevice:
     def __init__(self, handler: Callable[[bytes], bytes] = lambda message: message, buffer_size: int = 16384) -> None:
         self.handler = handler
         self.buffer_size = buffer_size
+        self.packet_size = 0  # longest packet that it takes, if a client asks
+        self.longest_packet = 0  # that has arrived
         self.work_time = 0.002  # between a request and its reply [s]
         self.free_channels = True
         self.messages: list[bytes] = []
         self.requests_repeated = 0
-        self._decoder = simplecom.Decoder()
+        self._decoder = simplecom.Decoder(simplecom.LONG_PACKET)
         self._peer = b""
         self._ids = itertools.count(0x5A01)
         self._reset_channel(0, 0)
@@ -163,9 +166,11 @@ class FakeDevice:
         self._reply: _Reply | None = None
 
     def take_bytes(self, data: bytes) -> None:
-        for packet in map(router.decode, self._decoder.feed(data)):
+        for whole in self._decoder.feed(data):
+            packet = router.decode(whole)
             if packet is None:
                 continue
+            self.longest_packet = max(self.longest_packet, len(whole))
             self._peer = packet.sender
             if packet.service == lib.ROUTER_SVC_NAME_REQUEST:
                 self._send(lib.ROUTER_SVC_NAME_RESPONSE, name_reply(struct.unpack_from("<I", packet.payload, 4)[0]))
@@ -183,7 +188,7 @@ class FakeDevice:
     def _take_package(self, package: bytes) -> None:
         kind = package[0]
         if kind == lib.CHANNEL_PKG_OPEN_REQ:
-            self._open(*struct.unpack_from("<II", package, 8))
+            self._open(*struct.unpack_from("<IIBBH", package, 8))
             return
         channel_id = struct.unpack_from("<H", package, 8 if kind & lib.CHANNEL_META else 2)[0]
         if not self._id or channel_id != self._id:
@@ -195,7 +200,7 @@ class FakeDevice:
         elif kind == lib.CHANNEL_PKG_ACK:
             self._take_ack(package)
 
-    def _open(self, request_id: int, wanted: int) -> None:
+    def _open(self, request_id: int, wanted: int, words: int, _: int, packet: int) -> None:
         if not self.free_channels:
             self._send_package(
                 meta(lib.CHANNEL_PKG_OPEN_RESP, struct.pack("<IHHIBBH", request_id, 1, 0xFFFF, 0, 0, 0, 0))
@@ -205,7 +210,10 @@ class FakeDevice:
             self._reset_channel(next(self._ids), request_id)
         granted = min(wanted, self.buffer_size)
         self._send_package(
-            meta(lib.CHANNEL_PKG_OPEN_RESP, struct.pack("<IHHIBBH", request_id, 0, self._id, granted, 0, 4, 0))
+            meta(
+                lib.CHANNEL_PKG_OPEN_RESP,
+                struct.pack("<IHHIBBH", request_id, 0, self._id, granted, 0, words, min(packet, self.packet_size)),
+            )
         )
 
     def _take_data(self, package: bytes) -> None:

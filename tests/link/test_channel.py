@@ -63,6 +63,49 @@ def test_a_damaged_open_response_is_ignored() -> None:
     assert channel.state is State.OPENING
 
 
+def opened(line: Line, limit: int, packet: int = 0) -> Channel:
+    """A channel to a device that takes messages of `limit` bytes, and packets of `packet` bytes."""
+    channel = Channel(line, 2, 7)
+    channel.open(0.0)
+    channel.next_package(0.0)
+    body = struct.pack("<IHHIBBH", 7, 0, 1, limit, 0, 2, packet)
+    head = struct.pack("<BBH", 0x83, 0, 0x0101)
+    channel.receive(head + struct.pack("<I", zlib.crc32(head + bytes(4) + body)) + body, 0.1)
+    assert channel.state is State.OPEN
+    return channel
+
+
+def test_the_open_request_says_how_long_packets_may_be_if_the_line_takes_longer_ones() -> None:
+    channel = Channel(Line(500, 18, 1e9, 4096, 12), 5, 7)
+    channel.open(0.0)
+    package = channel.next_package(0.0)
+    assert package is not None and package[16:] == bytes([5, 0, 0x00, 0x10])
+
+
+@pytest.mark.parametrize(
+    ("packet", "longest"), [(0, 500), (100, 500), (512, 500), (708, 696), (4096, 4084), (9999, 4084)]
+)
+def test_blocks_are_as_long_as_the_device_says_and_no_longer_than_was_asked(packet: int, longest: int) -> None:
+    channel = opened(Line(500, 18, 1e9, 4096, 12), 16384, packet)
+    channel.send(bytes(16384), 1.0)
+    package = channel.next_package(1.0)
+    assert package is not None and len(package) == longest
+
+
+def test_no_block_is_longer_than_those_of_a_line_that_has_no_long_ones() -> None:
+    channel = opened(Line(500, 18, 1e9), 16384, 4096)
+    channel.send(bytes(16384), 1.0)
+    package = channel.next_package(1.0)
+    assert package is not None and len(package) == 500
+
+
+@pytest.mark.parametrize(
+    ("limit", "best"), [(232, 232), (480, 480), (500, 480), (576, 480), (944, 944), (968, 968), (2048, 1944)]
+)
+def test_the_best_message_fills_its_blocks_or_is_the_longest(limit: int, best: int) -> None:
+    assert opened(Line(500, 18, 1e9), limit).best_size == best
+
+
 @pytest.mark.parametrize("size", [1, 467, 468, 469, 944, 945, 5000, 16384])
 def test_messages_of_any_size_arrive_and_are_answered(size: int) -> None:
     device = FakeDevice(reverse)
@@ -145,8 +188,23 @@ def test_unknown_line_rates_are_used_as_well() -> None:
     assert throughput(FakeLine(device, known_rate=False), device, 8) > 0.92
 
 
-def test_a_bad_line_still_carries_two_fifths() -> None:
+def test_long_packets_use_97_percent_of_the_line() -> None:
     device = FakeDevice(acknowledge)
+    device.packet_size = 2048
+    assert throughput(FakeLine(device), device, 8) > 0.97
+    assert device.longest_packet == 2048
+
+
+def test_a_device_that_does_not_say_so_gets_no_long_packets() -> None:
+    device = FakeDevice(acknowledge)
+    throughput(FakeLine(device), device, 2)
+    assert device.longest_packet == 512
+
+
+@pytest.mark.parametrize("packet_size", [0, 2048])
+def test_a_bad_line_still_carries_two_fifths(packet_size: int) -> None:
+    device = FakeDevice(acknowledge)
+    device.packet_size = packet_size
     line = FakeLine(device, to_device=damage(3, 0.001), to_client=damage(4, 0.001))
     assert throughput(line, device, 30) > 0.4
 
@@ -165,9 +223,18 @@ def exchange_surely(connection: Connection, message: bytes) -> bytes:
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.integers(0, 2**32), st.sampled_from([0.0003, 0.001]), st.integers(1, 6000), st.booleans())
-def test_messages_arrive_intact_over_bad_lines(seed: int, rate: float, size: int, known_rate: bool) -> None:
+@given(
+    st.integers(0, 2**32),
+    st.sampled_from([0.0003, 0.001]),
+    st.integers(1, 6000),
+    st.booleans(),
+    st.sampled_from([0, 708, 2048]),
+)
+def test_messages_arrive_intact_over_bad_lines(
+    seed: int, rate: float, size: int, known_rate: bool, packet_size: int
+) -> None:
     device = FakeDevice(reverse)
+    device.packet_size = packet_size
     line = FakeLine(device, to_device=damage(seed, rate), to_client=damage(seed + 1, rate), known_rate=known_rate)
     connection = connect(line)
     for n in range(3):

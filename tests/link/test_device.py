@@ -53,6 +53,14 @@ def test_flash_brings_the_image_and_starts_it(controller: Controller) -> None:
     assert result.seconds > 0
 
 
+def test_flash_asks_and_starts_without_waiting_in_between(controller: Controller) -> None:
+    controller.plc.flash(controller.image)
+    app = lib.SG_APPLICATION
+    status, start = (app, lib.SRV_APP_READ_STATUS), (app, lib.SRV_APP_START)
+    download, login = (app, lib.SRV_APP_DOWNLOAD_COMPACT), (app, lib.SRV_APP_LOGIN)
+    assert controller.fake.requests[1:] == [status, download, download, login, start, status]
+
+
 def test_flash_takes_bytes_as_well(controller: Controller) -> None:
     controller.plc.flash(controller.data, start=False)
     assert controller.fake.image == controller.data

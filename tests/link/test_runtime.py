@@ -14,65 +14,12 @@ from small_app import RETURN, make_application
 
 from plctool.core import ffi, lib
 from plctool.errors import DeviceError, LinkError
-from plctool.link import services, simplecom
+from plctool.link import services
 from plctool.link.connection import Connection
 from plctool.link.session import Session
 from plctool.link.sim import SimTransport
-from plctool.link.transport import BITS_PER_BYTE, NO_PLACES, BlockTransport
-from plctool.testing.line import Damage
-
-TICK_NS = 500_000
-
-
-class SimSerial:
-    """The simulator's serial line at 115200 baud on virtual time, with bytes that get damaged on the way."""
-
-    name = "simulated serial line"
-    local_address = b"\x00\x02"
-    max_packet = simplecom.MAX_PACKET
-    packet_overhead = simplecom.FRAME_OVERHEAD
-    point_to_point = False
-    places = NO_PLACES
-    byte_rate = 115200 / BITS_PER_BYTE
-    is_slow = True
-
-    def __init__(self, to_device: Damage | None = None, to_client: Damage | None = None) -> None:
-        self._out, self._in = bytearray(), bytearray()
-        self._credit = 0.0
-        self._to_device, self._to_client = to_device or Damage(), to_client or Damage()
-        self._decoder = simplecom.Decoder()
-        self._packets: list[bytes] = []
-
-    def now(self) -> float:
-        return float(lib.SimNow()) / 1e9
-
-    def send(self, *packets: bytes) -> None:
-        self._out += b"".join(map(simplecom.encode, packets))
-
-    def receive(self, timeout: float) -> bytes | None:
-        end = self.now() + timeout
-        while not self._packets:
-            if self.now() >= end:
-                return None
-            self._tick()
-        return self._packets.pop(0)
-
-    def _tick(self) -> None:
-        """What the line carries in a tick, both ways."""
-        assert lib.SimAdvance(TICK_NS) == lib.ERR_OK
-        self._credit += self.byte_rate * TICK_NS / 1e9
-        count = int(self._credit)
-        self._credit -= count
-        data = self._to_device.apply(bytes(self._out[:count]))
-        del self._out[:count]
-        assert lib.SimComPut(data, len(data)) == len(data)
-        buffer = ffi.new("RTS_UI8[]", 4096)
-        self._in += bytes(ffi.buffer(buffer, lib.SimComGet(buffer, 4096)))
-        self._packets += self._decoder.feed(self._to_client.apply(bytes(self._in[:count])))
-        del self._in[:count]
-
-    def close(self) -> None:
-        pass
+from plctool.link.transport import BlockTransport
+from plctool.testing.sim_line import SimSerial
 
 
 @pytest.fixture(autouse=True)
@@ -173,6 +120,17 @@ def test_what_runs_after_a_download_over_a_bad_line_is_what_was_sent(seed: int) 
     assert (status.state, status.image_crc) == ("run", symbols.image_crc)
     code = lib.AppGetAreaAddress(lib.APP_AREA_CODE, 0, 20_000)
     assert bytes(ffi.buffer(code, 20_000)) == RETURN * 20_000
+
+
+def test_19_of_20_bytes_on_the_line_are_of_the_image() -> None:
+    image, _ = make_application(code_size=60_000)
+    line = SimSerial()
+    line.is_slow = False
+    session = Session(Connection(line))
+    session.ensure()
+    begin = line.now()
+    services.download(session, image)
+    assert len(image) / (line.now() - begin) / line.byte_rate > 0.95
 
 
 def test_large_messages_use_nine_tenths_of_the_line_both_ways() -> None:

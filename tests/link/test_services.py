@@ -26,7 +26,7 @@ from plctool.link import bintag, l7, monitoring, services
 from plctool.link.connection import Connection
 from plctool.link.monitoring import AreaRange, Write
 from plctool.link.services import AppException, AppState
-from plctool.link.session import Session
+from plctool.link.session import Request, Session
 
 
 class Bench:
@@ -86,6 +86,38 @@ def test_a_service_error_becomes_a_device_error_with_its_name() -> None:
         bench.session.call(9, 9)
     assert caught.value.code == "l7-unknowncmd"
     assert caught.value.result == lib.ERR_L7_UNKNOWNCMD
+
+
+_STATUS = Request(lib.SG_APPLICATION, lib.SRV_APP_READ_STATUS)
+_ECHO = Request(lib.SG_DEVICE, lib.SRV_DEV_ECHO, [bintag.raw(lib.TAG_DEV_ECHO_DATA, b"ping")])
+
+
+def test_requests_in_one_go_take_less_time_than_one_after_the_other() -> None:
+    bench = Bench()
+    bench.session.ensure()
+    begin = bench.line.now()
+    status, echo = bench.session.call_each([_STATUS, _ECHO])
+    both = bench.line.now() - begin
+    assert status.find(lib.TAG_ERROR) is None and echo.bytes(lib.TAG_DEV_ECHO_DATA) == b"ping"
+    begin = bench.line.now()
+    for request in (_STATUS, _ECHO):
+        bench.session.call(request.group, request.service, request.tags)
+    assert both < 0.75 * (bench.line.now() - begin)
+
+
+def test_the_error_of_one_of_several_requests_is_raised() -> None:
+    bench = Bench()
+    with pytest.raises(DeviceError, match="ERR_L7_UNKNOWNCMD"):
+        bench.session.call_each([Request(9, 9), _STATUS])
+    assert services.read_status(bench.session).state is AppState.RUN
+
+
+def test_requests_in_one_go_are_repeated_after_the_login_has_ended() -> None:
+    bench = Bench()
+    services.read_status(bench.session)
+    bench.plc.LOGIN += 1
+    status, prepared = services.prepare_download(bench.session, bench.plc.image)
+    assert (status.image_crc, prepared.arrived) == (bench.crc, len(bench.plc.image))
 
 
 def test_a_firmware_without_single_cycles_is_named_with_what_to_do() -> None:

@@ -85,6 +85,7 @@ class SocketSerial:
     """Block transport over a serial line that QEMU offers as a socket."""
 
     max_packet = simplecom.MAX_PACKET
+    long_packet = simplecom.LONG_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     point_to_point = False
     places = NO_PLACES

@@ -30,16 +30,17 @@ enum {
     /* A packet with the largest message of the channel in one block. No packet is larger, in either direction. */
     MESSAGE_MAX = ROUTER_HEADER_MAX + CHANNEL_FIRST_SIZE + NETSERVER_MESSAGE_SIZE,
     PACKET_MAX = MESSAGE_MAX < BLK_MAX_SIZE ? MESSAGE_MAX : BLK_MAX_SIZE,
+    TAKES_MAX = CAN_PACKET_SIZE > BLK_MAX_SIZE ? CAN_PACKET_SIZE : PACKET_MAX,
 };
 
-RTS_STATIC_ASSERT(PACKET_MAX <= (int)ISOTP_MAX_PACKET, a_packet_fits_into_isotp);
+RTS_STATIC_ASSERT(CAN_PACKET_SIZE >= BLK_MAX_SIZE && TAKES_MAX <= (int)ISOTP_MAX_PACKET, a_packet_fits_into_isotp);
 RTS_STATIC_ASSERT(NS_REPLY_SIZE + ROUTER_HEADER_MAX <= PACKET_MAX, can_packet_holds_the_name_service_reply);
 RTS_STATIC_ASSERT(sizeof(CAN_SCAN) == CAN_CLASSIC_SIZE && sizeof(CAN_CLAIM) == CAN_CLASSIC_SIZE, they_are_frames);
 
 typedef struct {
     RTS_UI8 tool; /* 0: free */
     ISOTP_RX rx;
-    RTS_UI8 packet[PACKET_MAX];
+    RTS_UI8 packet[TAKES_MAX];
 } RX_SESSION;
 
 typedef struct {
@@ -431,6 +432,9 @@ static void open_bus(void)
     can.driver.point_to_point = 1;
     can.driver.address_words = 1;
     can.driver.address[1] = (RTS_UI8)can.own.node;
+#if BLK_LONG_PACKETS
+    can.driver.takes = CAN_PACKET_SIZE;
+#endif
     can.driver.send = can_send;
     RTS_RESULT result = open_controller();
     can.open = result == ERR_OK;

@@ -27,7 +27,10 @@ enum {
     /* A packet with the largest message of the channel in one block. No packet is larger, in either direction. */
     MESSAGE_MAX = ROUTER_HEADER_MAX + CHANNEL_FIRST_SIZE + NETSERVER_MESSAGE_SIZE,
     PACKET_MAX = MESSAGE_MAX < BLK_MAX_SIZE ? MESSAGE_MAX : BLK_MAX_SIZE,
+    TAKES_MAX = COM_PACKET_SIZE > BLK_MAX_SIZE ? COM_PACKET_SIZE : PACKET_MAX,
 };
+
+RTS_STATIC_ASSERT(COM_PACKET_SIZE >= BLK_MAX_SIZE && COM_PACKET_SIZE <= 0xFFFF, packets_of_the_field_are_taken);
 
 RTS_STATIC_ASSERT(COM_QUEUE_SIZE >= LENGTH_SIZE + PACKET_MAX + CRC_SIZE, com_queue_holds_the_largest_packet);
 RTS_STATIC_ASSERT(NS_REPLY_SIZE + ROUTER_HEADER_MAX <= PACKET_MAX, packet_holds_the_name_service_reply);
@@ -50,7 +53,7 @@ typedef struct {
     BLK_DRV driver;
     RTS_UI8 chunk[WRITE_CHUNK]; /* encoded, not yet taken by the port */
     RTS_UI8 queue[COM_QUEUE_SIZE];
-    RTS_UI8 frame[PACKET_MAX + CRC_SIZE];
+    RTS_UI8 frame[TAKES_MAX + CRC_SIZE];
 } COM_LINE;
 
 static COM_LINE lines[COM_MAX_LINES];
@@ -274,6 +277,9 @@ static void open_lines(void)
         line->driver.point_to_point = 1;
         line->driver.address_words = 1;
         line->driver.address[1] = (RTS_UI8)(i + 1); /* the line's number, as the field counts COM ports */
+#if BLK_LONG_PACKETS
+        line->driver.takes = COM_PACKET_SIZE;
+#endif
         line->driver.instance = line;
         line->driver.send = com_send;
         RTS_RESULT result = SysComOpen(i);

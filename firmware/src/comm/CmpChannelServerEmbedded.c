@@ -87,6 +87,18 @@ static RTS_UI32 open_response_size(const CHANNEL *channel)
     return sizeof(CHANNEL_OPEN_RESPONSE);
 }
 
+/* The longest packet that the client may send, of those it would send; nothing for one that does not ask. */
+static void put_packet_size(WIRE_UI16 packet, const CHANNEL *channel)
+{
+#if BLK_LONG_PACKETS
+    RTS_UI16 takes = channel->peer.driver->takes;
+
+    BytesPut16(packet, takes < channel->wanted ? takes : channel->wanted);
+#endif
+    RTS_UNUSED(packet);
+    RTS_UNUSED(channel);
+}
+
 static RTS_RESULT send_open_response(const CHANNEL *channel)
 {
     CHANNEL_OPEN_RESPONSE response = {0};
@@ -96,6 +108,7 @@ static RTS_RESULT send_open_response(const CHANNEL *channel)
     BytesPut16(response.id, channel->id);
     BytesPut32(response.limit, channel->limit);
     response.address_words = channel->address_words;
+    put_packet_size(response.packet, channel);
     return send_meta(&channel->peer, CHANNEL_PKG_OPEN_RESP, &response, open_response_size(channel));
 }
 
@@ -179,6 +192,9 @@ typedef struct {
 #if SRV_OTHER_CLIENTS
     bool is_version_1_0;
 #endif
+#if BLK_LONG_PACKETS
+    RTS_UI16 packet;
+#endif
 } OPEN_REQUEST;
 
 /* False when this path or buffer size is no basis for a channel. */
@@ -193,6 +209,9 @@ static bool read_open_request(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_
     request->limit = BytesGet32(open->limit);
 #if SRV_OTHER_CLIENTS
     request->is_version_1_0 = size < sizeof(*open);
+#endif
+#if BLK_LONG_PACKETS
+    request->packet = size < sizeof(*open) ? 0 : BytesGet16(open->packet);
 #endif
     if (size >= sizeof(*open) && open->address_words > words)
         words = open->address_words < 2 * ROUTER_MAX_ADDRESS ? open->address_words : 2 * ROUTER_MAX_ADDRESS;
@@ -289,6 +308,9 @@ static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPE
     channel->fresh = true;
 #if SRV_OTHER_CLIENTS
     channel->is_version_1_0 = request->is_version_1_0;
+#endif
+#if BLK_LONG_PACKETS
+    channel->wanted = request->packet;
 #endif
     if (COMM_ENDPOINTS)
         channel->anonymous_since = now_ms;

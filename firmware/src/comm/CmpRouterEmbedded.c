@@ -11,7 +11,10 @@
 #include "CmpPackets.h"
 #include "rts_config.h"
 
-enum { HEADER_WORDS = sizeof(ROUTER_HEADER) / 2, WORDS_MASK = (1 << ROUTER_HOP_SHIFT) - 1 };
+enum {
+    HEADER_WORDS = sizeof(ROUTER_HEADER) / 2,
+    WORDS_MASK = (1 << ROUTER_HOP_SHIFT) - 1,
+};
 
 /* A parsed header. */
 typedef struct {
@@ -34,7 +37,7 @@ static bool parse_header(const RTS_UI8 *data, RTS_UI32 size, HEADER *header)
 {
     const ROUTER_HEADER *fixed = (const ROUTER_HEADER *)data;
 
-    if (size < sizeof(*fixed) || size > BLK_MAX_SIZE || fixed->magic != ROUTER_MAGIC)
+    if (size < sizeof(*fixed) || size > BLK_LONGEST_PACKET || fixed->magic != ROUTER_MAGIC)
         return false;
     RTS_UI32 words = fixed->hops & WORDS_MASK;
     if (words < HEADER_WORDS)

@@ -164,12 +164,20 @@ class SharedDevice:
     ) -> None:
         """Requests one after the other; `reply` gets each reply. No other tool has the device until the end. `check`
         is called again and again; what it raises, or `reply`, ends the stream and closes the channel."""
+        sent: deque[bytes] = deque()  # without a reply yet
+
+        def noted(message: bytes) -> bytes:
+            self._note(message)
+            sent.append(message)
+            return message
+
         with (
             self._turn(tool, generation),
             self._claimed_meanwhile(tool),
-            closing(self._connection.stream(map(self._noted, messages), patience, check)) as answers,
+            closing(self._connection.stream(map(noted, messages), patience, check)) as answers,
         ):
             for answer in answers:
+                self._note_end(sent.popleft(), answer)
                 reply(answer)
 
     def scan(self, tool: Tool, seconds: float, enough: int) -> list[Node]:
@@ -244,10 +252,6 @@ class SharedDevice:
         claim.owner.drop()
 
     # ---- the login to the application ----
-
-    def _noted(self, message: bytes) -> bytes:
-        self._note(message)
-        return message
 
     def _note(self, message: bytes) -> None:
         """The login to the application holds for the one that is there. A tool may end before it can say that it

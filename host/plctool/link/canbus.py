@@ -32,6 +32,7 @@ from plctool.link.wire import Layout
 for _name in ("can", "isotp"):
     logging.getLogger(_name).addHandler(logging.NullHandler())  # what matters is in our errors
 
+_LONGEST_PACKET = 4095  # of ISO-TP [bytes]
 _SCAN = Layout("CAN_SCAN")
 _CLAIM = Layout("CAN_CLAIM")
 _REQUEST = Layout("NS_REQUEST")
@@ -234,6 +235,7 @@ class CanTransport:
     ) -> None:
         self.name = name
         self.max_packet = int(lib.BLK_MAX_SIZE)
+        self.long_packet = _LONGEST_PACKET
         self.packet_overhead = 0
         self.byte_rate = math.inf  # `send` waits for the bus
         self.is_slow = True

@@ -25,7 +25,8 @@ from plctool.link.wire import Layout
 
 _META = Layout("CHANNEL_META_HEADER")
 _OPEN_REQUEST = Layout("CHANNEL_OPEN_REQUEST")
-_OPEN_RESPONSE = Layout("CHANNEL_OPEN_RESPONSE", before="byte_order")  # version 1.0 has no more
+_OPEN_RESPONSE = Layout("CHANNEL_OPEN_RESPONSE")
+_OLD_RESPONSE = Layout("CHANNEL_OPEN_RESPONSE", before="byte_order")  # version 1.0 has no more
 _CLOSE = Layout("CHANNEL_CLOSE")
 _CHANNEL = Layout("CHANNEL_HEADER")  # how every channel package starts
 _DATA = Layout("CHANNEL_DATA")
@@ -44,6 +45,7 @@ _POLL_EVERY = 4  # blocks, on a bad line
 _WINDOW = 2 * _POLL_EVERY  # most blocks under way on a bad line
 _MAX_LOSSES = 40  # of one block
 _MIN_PAYLOAD = 64
+_REQUEST_COST = 44  # bytes of a request that are not its content, about
 _LOSS_COST = 3  # blocks that have to be sent again for each that is lost
 _RATE_MEMORY = 8192  # bytes over which the error rate of the line is averaged
 
@@ -65,6 +67,8 @@ class Line:
     max_package: int  # longest layer 4 package, bytes
     overhead: int  # bytes the line carries for each package besides it
     byte_rate: float  # math.inf when unknown
+    long_packet: int = 0  # longest packet to a device that says it takes so much, bytes; 0: as all others
+    header: int = 0  # bytes of a packet before the package
 
 
 @dataclass
@@ -85,7 +89,7 @@ class RoundTrip:
 
     def __init__(self, floor: float) -> None:
         self.shortest = 0.0
-        self._floor = floor  # shortest time-out
+        self.floor = floor  # shortest time-out
         self._smoothed = _FIRST_TIMEOUT
         self._variation = 0.0
         self._measured = False
@@ -111,7 +115,7 @@ class RoundTrip:
 
     @property
     def timeout(self) -> float:
-        plain = max(self._smoothed + 4 * self._variation, self._floor)
+        plain = max(self._smoothed + 4 * self._variation, self.floor)
         return min(plain * self._backoff, max(plain, _LONGEST_RETRY))
 
 
@@ -153,7 +157,8 @@ class Channel:
         self._request_id = request_id
         self._id = 0
         self._opens = 0
-        self._round_trip = RoundTrip(max(_SHORTEST_TIMEOUT, 2 * line.max_package / line.byte_rate))
+        self._max_package = line.max_package
+        self._round_trip = RoundTrip(_floor(line.max_package, line.byte_rate))
         self._error_rate = ErrorRate()
         self._line_free = 0.0  # when the line will have carried all that was sent
         self._timer = math.inf
@@ -178,10 +183,15 @@ class Channel:
 
     @property
     def best_size(self) -> int:
-        """Longest message that fills its blocks: a short last block costs as much as a full one."""
-        first = self._line.max_package - _DATA.size - _MESSAGE.size
-        more = max(0, self.buffer_size - first) // (self._line.max_package - _DATA.size)
-        return min(self.buffer_size, first + more * (self._line.max_package - _DATA.size))
+        """Length of message with the largest share of content on the line: the longest one, or the longest one that
+        fills its blocks, as a short last block costs as much as a full one."""
+        room = self._max_package - _DATA.size
+        filled = (self.buffer_size + _MESSAGE.size) // room * room - _MESSAGE.size
+        return max((size for size in (filled, self.buffer_size) if size > 0), key=self._content_share, default=0)
+
+    def _content_share(self, size: int) -> float:
+        blocks = -(-(size + _MESSAGE.size) // (self._max_package - _DATA.size))
+        return (size - _REQUEST_COST) / (size + _MESSAGE.size + blocks * (_DATA.size + self._line.overhead))
 
     # ---- commands ----
 
@@ -264,7 +274,7 @@ class Channel:
         head = self._data_head(flags, number)
         if first:
             head += _MESSAGE.pack(size=len(message), crc=zlib.crc32(message))
-        size = self._error_rate.best_payload(self._line.overhead + len(head), self._line.max_package - len(head))
+        size = self._error_rate.best_payload(self._line.overhead + len(head), self._max_package - len(head))
         end = min(self._cut + size, len(message))
         package = head + message[self._cut : end]
         self._newest = _Block(number, message, self._cut, package, is_last=end == len(message))
@@ -280,7 +290,8 @@ class Channel:
     def _on_timeout(self, now: float) -> None:
         if self.state is State.OPENING:
             wanted = {"request_id": self._request_id, "limit": WANTED_BUFFER, "address_words": self._address_words}
-            self._control.append(_meta(_OPEN_REQUEST, lib.CHANNEL_PKG_OPEN_REQ, **wanted))
+            packet = self._line.long_packet
+            self._control.append(_meta(_OPEN_REQUEST, lib.CHANNEL_PKG_OPEN_REQ, **wanted, packet=packet))
             self._opens += 1
             self._timer = now + min(_OPEN_RETRY * self._opens, _LONGEST_RETRY)
             return
@@ -337,7 +348,7 @@ class Channel:
 
     def _receive_meta(self, kind: int, package: bytes, now: float) -> None:
         size = len(package) if _is_whole(package) else 0
-        if kind == lib.CHANNEL_PKG_OPEN_RESP and self.state is State.OPENING and size >= _OPEN_RESPONSE.size:
+        if kind == lib.CHANNEL_PKG_OPEN_RESP and self.state is State.OPENING and size >= _OLD_RESPONSE.size:
             self._receive_opened(package, now)
         elif kind == lib.CHANNEL_PKG_CLOSE and self.state is State.OPEN and size >= _CLOSE.size:
             close = _CLOSE.unpack(package)
@@ -347,7 +358,7 @@ class Channel:
                 raise ChannelLost(f"The device closed the connection ({reason}); try again.", "closed")
 
     def _receive_opened(self, package: bytes, now: float) -> None:
-        opened = _OPEN_RESPONSE.unpack(package)
+        opened = _OLD_RESPONSE.unpack(package)
         if opened.request_id != self._request_id:
             return
         if opened.result != lib.CHANNEL_OPEN_OK:
@@ -357,6 +368,13 @@ class Channel:
             self._round_trip.sample(now - self._line_free)
         self._id, self.buffer_size = opened.id, min(opened.limit, WANTED_BUFFER)
         self.state, self._timer = State.OPEN, math.inf
+        if len(package) >= _OPEN_RESPONSE.size:
+            self._take_packet_size(min(_OPEN_RESPONSE.unpack(package).packet, self._line.long_packet))
+
+    def _take_packet_size(self, longest: int) -> None:
+        """What the device takes beyond what all take; 0: nothing."""
+        self._max_package = max(self._max_package, longest - self._line.header)
+        self._round_trip.floor = _floor(self._max_package, self._line.byte_rate)
 
     def _receive_ack(self, number: int, now: float) -> None:
         """Everything up to block `number` has arrived."""
@@ -466,6 +484,11 @@ class Channel:
         """The oldest request is done with."""
         self.outstanding -= 1
         self._unanswered -= 1
+
+
+def _floor(package: int, byte_rate: float) -> float:
+    """The shortest time-out on a line with packages of up to that many bytes."""
+    return max(_SHORTEST_TIMEOUT, 2 * package / byte_rate)
 
 
 def _meta(layout: Layout, kind: int, **body: int) -> bytes:

@@ -145,7 +145,11 @@ class Connection:
             self._peer = self._find(self._choice).address
         header = router.header_size(self._peer, self.transport.local_address)
         line = Line(
-            self.transport.max_packet - header, header + self.transport.packet_overhead, self.transport.byte_rate
+            self.transport.max_packet - header,
+            header + self.transport.packet_overhead,
+            self.transport.byte_rate,
+            self.transport.long_packet,
+            header,
         )
         words = (len(self._peer) + len(self.transport.local_address)) // 2
         channel = Channel(line, words, secrets.randbits(32))

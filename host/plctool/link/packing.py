@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 _AT_A_TIME = 4096  # bytes for which the best way is looked for together
-_CHAIN = 16  # earlier places with the same three bytes that are looked at
+_CHAIN = 32  # earlier places with the same three bytes that are looked at
 _SEARCHED = 3  # bytes that are looked for
 _ALL_CUTS = 16  # up to so many bytes, shorter copies are tried too
 _LONGEST = 4096  # copy, bytes

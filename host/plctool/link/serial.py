@@ -28,6 +28,7 @@ class SerialTransport:
         self.name = url
         self.local_address = TOOL_ADDRESS
         self.max_packet = simplecom.MAX_PACKET
+        self.long_packet = simplecom.LONG_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
         self.point_to_point = False
         self.places = NO_PLACES

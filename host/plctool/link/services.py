@@ -16,11 +16,12 @@ from plctool.debug.trace import Trace
 from plctool.errors import DeviceError
 from plctool.image.file import image_crc
 from plctool.link import bintag, l7
+from plctool.link.ahead import ahead
 from plctool.link.channel import ChannelLost
 from plctool.link.names import version_text
 from plctool.link.packing import Packer
 from plctool.link.passwords import verifier_of
-from plctool.link.session import Session
+from plctool.link.session import Request, Session
 from plctool.link.wire import Layout, signed32
 
 _SLOW = 30.0  # patience for what may erase flash or run initialisation code [s]
@@ -192,8 +193,14 @@ def set_password(session: Session, password: str | None) -> None:
 # ---- application -----------------------------------------------------------------------------------------------------
 
 
+_READ_STATUS = Request(lib.SG_APPLICATION, lib.SRV_APP_READ_STATUS)
+
+
 def read_status(session: Session) -> Status:
-    tags = session.recover(lambda: session.call(lib.SG_APPLICATION, lib.SRV_APP_READ_STATUS))
+    return _status_of(session.recover(lambda: session.call(lib.SG_APPLICATION, lib.SRV_APP_READ_STATUS)))
+
+
+def _status_of(tags: bintag.Tags) -> Status:
     status = tags.container(lib.TAG_APP_STATUS)
     state = _STATE.unpack(status.bytes(lib.TAG_APP_STATE, _STATE.size))
     l7.check_result(state.result, "status")
@@ -223,21 +230,27 @@ def app_state(state: int, operating: int) -> AppState:
     return {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN}.get(state, AppState.STOP)
 
 
-def start(session: Session, checked: bool = False) -> None:
-    """Starts the application; `checked`: the channel has just been used. Not again when no reply came and it is stopped
-    with an exception: a controller that went down with it, and came back, would start the previous one."""
-    if not checked:
-        read_status(session)  # a channel that was lost before is opened again here
+def start(session: Session) -> None:
+    """Starts the application. Not again when no reply came and it is stopped with an exception: a controller that went
+    down with it, and came back, would start the previous one."""
+    read_status(session)  # a channel that was lost before is opened again here
+    start_checked(session)
+
+
+def start_checked(session: Session) -> Status:
+    """As `start`, on a channel that has just been used. Returns the status after it, which is asked for at once."""
     try:
-        _check_control(_control(session, lib.SRV_APP_START), "start")
-        return
+        started, status = session.call_each([_control_request(session, lib.SRV_APP_START), _READ_STATUS], _SLOW)
+        _check_control(started, "start")
+        return _status_of(status)
     except ChannelLost:
-        status = read_status(session)
-    if status.exception is not None:
+        found = read_status(session)
+    if found.exception is not None:
         message = "No reply came to the start, and the program is stopped with an exception; see the log."
         raise DeviceError(message, "died")
-    if status.state is not AppState.RUN:
+    if found.state is not AppState.RUN:
         _check_control(_control(session, lib.SRV_APP_START), "start")
+    return read_status(session)
 
 
 def stop(session: Session) -> None:
@@ -267,9 +280,13 @@ def reset(session: Session, option: int) -> None:
 
 
 def _control(session: Session, service: int, *options: bintag.Tag) -> bintag.Tags:
+    request = _control_request(session, service, *options)
+    return session.call(request.group, request.service, request.tags, _SLOW)
+
+
+def _control_request(session: Session, service: int, *options: bintag.Tag) -> Request:
     number = bintag.u32(lib.TAG_APP_SESSION, session.application().session)
-    descriptor = bintag.container(lib.TAG_APP_DESCRIPTOR, number, *options)
-    return session.call(lib.SG_APPLICATION, service, [descriptor], _SLOW)
+    return Request(lib.SG_APPLICATION, service, [bintag.container(lib.TAG_APP_DESCRIPTOR, number, *options)])
 
 
 def _check_control(reply: bintag.Tags, action: str) -> None:
@@ -302,26 +319,71 @@ def read_tasks(session: Session) -> list[TaskInfo]:
 # ---- download --------------------------------------------------------------------------------------------------------
 
 _BLOCK_OVERHEAD = 44  # layer 7 header and tags around the data of a block, bytes
-_PACKED_SIZE = 4096  # of packed data at most: searching for so much takes less time than the line is ahead, bytes
+_PACKED_SIZE = 8192  # of packed data at most, bytes
 _FIRST_PACKED_SIZE = 900  # of the first message: the line need not wait for a long search, and is busy during the next
+_PACKED_AHEAD = 2  # blocks that are packed while the line carries others
 _BLOCK_ALIGN = 16  # flash is written best in whole program units
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """What a device has said before a download: the `arrived` bytes of this image that it has, and how many bytes of it
+    a packed block may be; 0: it cannot unpack."""
+
+    arrived: int
+    unpacks: int
+
+
+def prepare_download(session: Session, image: bytes) -> tuple[Status, Prepared]:
+    """The status, and what `download` of this image asks first, in one go."""
+    requests = [_READ_STATUS, _question(image)]
+    status, answer = session.recover(lambda: session.call_each(requests))
+    return _status_of(status), _prepared(answer)
+
+
+def _question(image: bytes) -> Request:
+    """How much of this image the device has; all of it when it is the application already."""
+    position = _position(image, lib.DLF_CONTINUEDOWNLOAD, 0)
+    return Request(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, [position])
+
+
+def _prepared(answer: bintag.Tags) -> Prepared:
+    return Prepared(
+        _arrived(answer), 0 if answer.find(lib.TAG_CDL_UNPACKS) is None else answer.u32(lib.TAG_CDL_UNPACKS)
+    )
+
+
+def _position(image: bytes, flags: int, offset: int) -> bintag.Tag:
+    content = _POSITION.pack(flags=flags, offset=offset, total_size=len(image), crc=image_crc(image))
+    return bintag.raw(lib.TAG_CDL_POSITION, content)
+
+
+def _arrived(tags: bintag.Tags) -> int:
+    l7.check_result(tags.u16(lib.TAG_SERVICE_RESULT), "download", tags.text(lib.TAG_CDL_REASON))
+    return tags.u32(lib.TAG_CDL_NEXT)
+
+
 def download(
-    session: Session, image: bytes, restart: bool = False, progress: Callable[[int], None] = lambda done: None
+    session: Session,
+    image: bytes,
+    restart: bool = False,
+    progress: Callable[[int], None] = lambda done: None,
+    prepared: Prepared | None = None,
 ) -> None:
     """Sends an image; the device checks it and makes it its application, stopped.
 
     Continues an aborted transfer of the same image, also automatically after the channel was lost; `restart`
     begins at the first byte in any case. `progress` is called with the bytes that have arrived. Raises DeviceError with
-    the device's reason when it refuses the image; its old application is untouched then.
+    the device's reason when it refuses the image; its old application is untouched then. `prepared`: what
+    `prepare_download` has just found.
     """
     transfer = _Transfer(session, image, progress)
     tries = 0
     while True:
         arrived = transfer.arrived
         try:
-            start_at = transfer.ask()
+            start_at = transfer.begin(prepared)
+            prepared = None
             if restart:
                 start_at, restart = 0, False
             if start_at < len(image):
@@ -341,17 +403,16 @@ class _Transfer:
         self.arrived = 0
         self._session = session
         self._image = image
-        self._crc = image_crc(image)
         self._progress = progress
-        self._packer: Packer | None = None
         self._unpacks = 0  # bytes of the image that a packed block may be; 0: the device cannot unpack
 
-    def ask(self) -> int:
-        """How much of this image the device has; all of it when it is the application already."""
-        position = self._position(lib.DLF_CONTINUEDOWNLOAD, 0)
-        tags = self._session.call(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, [position])
-        self._take(tags)
-        self._unpacks = 0 if tags.find(lib.TAG_CDL_UNPACKS) is None else tags.u32(lib.TAG_CDL_UNPACKS)
+    def begin(self, prepared: Prepared | None) -> int:
+        """Where to begin; asks the device, unless that is known."""
+        if prepared is None:
+            question = _question(self._image)
+            prepared = _prepared(self._session.call(question.group, question.service, question.tags))
+        self._unpacks = prepared.unpacks
+        self._take(prepared.arrived)
         return self.arrived
 
     def run(self, start_at: int) -> None:
@@ -359,14 +420,14 @@ class _Transfer:
         self._session.ensure()
         request = self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, b"")
         for reply in self._session.connection.stream(self._messages(start_at), _TRANSFER_PATIENCE):
-            self._take(l7.decode_reply(reply, request))
+            self._take(_arrived(l7.decode_reply(reply, request)))
         if self.arrived != len(self._image):
             raise DeviceError(f"The device took {self.arrived} of {len(self._image)} bytes; try again.", "incomplete")
 
     def _messages(self, start_at: int) -> Iterator[bytes]:
         offset = start_at
         for data, size in self._blocks(start_at):
-            position = self._position(lib.DLF_CONTINUEDOWNLOAD if offset else 0, offset)
+            position = _position(self._image, lib.DLF_CONTINUEDOWNLOAD if offset else 0, offset)
             content = bintag.encode([position, data])
             yield l7.encode(self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, content))
             offset += size
@@ -384,24 +445,19 @@ class _Transfer:
             yield bintag.raw(lib.TAG_CDL_DATA, part), len(part)
 
     def _packed_blocks(self, start_at: int, room: int, longest: int) -> Iterator[tuple[bintag.Tag, int]]:
-        self._packer = self._packer or Packer(self._image)
         offset = start_at
         most = min(room - _PACKED.size, _PACKED_SIZE)
-        for block in self._packer.blocks(start_at, most, longest, _FIRST_PACKED_SIZE):
+        blocks = Packer(self._image).blocks(start_at, most, longest, _FIRST_PACKED_SIZE)
+        for block in ahead(blocks, _PACKED_AHEAD):
             if len(block.data) + _PACKED.size < block.size:
                 yield bintag.raw(lib.TAG_CDL_PACKED, _PACKED.pack(unpacked=block.size) + block.data), block.size
             else:
                 yield bintag.raw(lib.TAG_CDL_DATA, self._image[offset : offset + block.size]), block.size
             offset += block.size
 
-    def _position(self, flags: int, offset: int) -> bintag.Tag:
-        content = _POSITION.pack(flags=flags, offset=offset, total_size=len(self._image), crc=self._crc)
-        return bintag.raw(lib.TAG_CDL_POSITION, content)
-
-    def _take(self, tags: bintag.Tags) -> None:
-        l7.check_result(tags.u16(lib.TAG_SERVICE_RESULT), "download", tags.text(lib.TAG_CDL_REASON))
-        self.arrived = tags.u32(lib.TAG_CDL_NEXT)
-        self._progress(self.arrived)
+    def _take(self, arrived: int) -> None:
+        self.arrived = arrived
+        self._progress(arrived)
 
 
 # ---- PLC shell -------------------------------------------------------------------------------------------------------

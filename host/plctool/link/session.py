@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import TypeVar
@@ -36,6 +36,15 @@ class Application:
         return int.from_bytes(self.data_guid[:4], "little")
 
 
+@dataclass(frozen=True)
+class Request:
+    """What `Session.call_each` asks for."""
+
+    group: int
+    service: int
+    tags: Sequence[bintag.Tag] = ()
+
+
 class Session:
     """Calls services of one device. Channel and logins are made when first needed."""
 
@@ -54,14 +63,38 @@ class Session:
         try:
             reply = self._exchange(self.message(group, service, bintag.encode(tags)), patience)
         except DeviceError as error:
-            if error.result != lib.ERR_INVALID_SESSION_ID:
-                raise
+            self._check_login(error)
+            raise
+        self._check_application_login(group, reply)
+        return reply
+
+    def call_each(self, requests: Sequence[Request], patience: float = PATIENCE) -> list[bintag.Tags]:
+        """The replies to requests that are sent without waiting. Raises as `call`, also ChannelLost when a reply was
+        lost; whether the device took the requests is not known then."""
+        messages = [self.message(r.group, r.service, bintag.encode(r.tags)) for r in requests]
+        replies = list(self.connection.stream(map(l7.encode, messages), patience))
+        if len(replies) < len(requests):
+            raise ChannelLost("A reply of the device was lost; try again.", "timeout")
+        try:
+            found = [l7.decode_reply(reply, message) for reply, message in zip(replies, messages, strict=True)]
+        except DeviceError as error:
+            self._check_login(error)
+            raise
+        for request, tags in zip(requests, found, strict=True):
+            self._check_application_login(request.group, tags)
+        return found
+
+    def _check_login(self, error: DeviceError) -> None:
+        """Raises ChannelLost when a service was refused because the login has ended."""
+        if error.result == lib.ERR_INVALID_SESSION_ID:
             self.forget_login()
             raise ChannelLost("The login on the device has ended; try again.", "closed") from None
+
+    def _check_application_login(self, group: int, reply: bintag.Tags) -> None:
+        """Raises ChannelLost when a service was refused because the login to the application has ended."""
         if _wants_application_login(group, reply):
             self.forget_application()
             raise ChannelLost("Another tool took the login to the application; try again.", "closed")
-        return reply
 
     def message(self, group: int, service: int, content: bytes) -> l7.Message:
         """A request with the id of the session, which is created when there is none."""

@@ -17,6 +17,7 @@ class SimTransport:
     name = "the simulator"
     local_address = TOOL_ADDRESS
     max_packet = int(lib.BLK_MAX_SIZE)
+    long_packet = 0
     packet_overhead = 0
     byte_rate = math.inf
     is_slow = False

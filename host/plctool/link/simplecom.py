@@ -20,7 +20,7 @@ _STUFFED = bytes([lib.SIMPLECOM_ESCAPE, lib.SIMPLECOM_STUFF])
 
 FRAME_OVERHEAD = len(_START) + CRC_SIZE + len(_END)  # bytes a frame adds, besides escapes
 MAX_PACKET = int(lib.BLK_MAX_SIZE)
-MAX_FRAME = 2 * (MAX_PACKET + CRC_SIZE) + len(_START) + len(_END)
+LONG_PACKET = 4096  # the longest that is sent to a device that says it takes it: longer ones gain nothing
 
 
 def crc16(data: bytes) -> int:
@@ -35,9 +35,11 @@ def encode(packet: bytes) -> bytes:
 
 
 class Decoder:
-    """Finds frames in a byte stream that comes in pieces and may be damaged. `dropped` counts damaged frames."""
+    """Finds frames with packets of up to `longest` bytes in a byte stream that comes in pieces and may be damaged.
+    `dropped` counts damaged frames."""
 
-    def __init__(self) -> None:
+    def __init__(self, longest: int = MAX_PACKET) -> None:
+        self._longest = longest
         self._buffer = bytearray()
         self.dropped = 0
 
@@ -46,7 +48,7 @@ class Decoder:
         self._buffer += data
         packets = []
         while (body := self._next_body()) is not None:
-            packet = _unpack(body)
+            packet = _unpack(body, self._longest)
             if packet is None:
                 self.dropped += 1
             else:
@@ -72,17 +74,17 @@ class Decoder:
             self.dropped += 1
         elif start < 0 and len(self._buffer) > 1:
             del self._buffer[:-1]
-        if len(self._buffer) > MAX_FRAME:
+        if len(self._buffer) > 2 * (self._longest + CRC_SIZE) + len(_START) + len(_END):
             self._buffer.clear()
             self.dropped += 1
 
 
-def _unpack(body: bytes) -> bytes | None:
+def _unpack(body: bytes, longest: int) -> bytes | None:
     """The packet in a frame's body, None when it is damaged."""
     if body.count(_ESCAPE) != body.count(_STUFFED):
         return None
     data = body.replace(_STUFFED, _ESCAPE)
     packet, crc = data[:-CRC_SIZE], data[-CRC_SIZE:]
-    if not packet or len(packet) > MAX_PACKET or crc16(packet) != int.from_bytes(crc, "little"):
+    if not packet or len(packet) > longest or crc16(packet) != int.from_bytes(crc, "little"):
         return None
     return packet

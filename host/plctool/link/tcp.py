@@ -29,6 +29,7 @@ class TcpTransport:
         host, port = network.split_place(place)
         self.name = place
         self.max_packet = int(lib.BLK_MAX_SIZE)
+        self.long_packet = 0
         self.packet_overhead = _HEADER.size
         self.byte_rate = math.inf
         self.is_slow = False

@@ -19,6 +19,7 @@ class BlockTransport(Protocol):
     name: str  # for messages: the port or address the user named
     local_address: bytes  # router address of this end
     max_packet: int  # longest packet it takes and gives, in bytes
+    long_packet: int  # longest packet it takes for a device that says it takes more than others, bytes; 0: max_packet
     packet_overhead: int  # bytes the line carries for a packet besides the packet itself
     byte_rate: float  # bytes the line carries per second; math.inf if unknown or irrelevant
     is_slow: bool  # it pays to pack what is sent

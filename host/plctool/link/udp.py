@@ -33,6 +33,7 @@ class UdpTransport:
         first = int(lib.UDP_PORT)
         self.name = place
         self.max_packet = int(lib.BLK_MAX_SIZE)
+        self.long_packet = 0
         self.packet_overhead = 0
         self.byte_rate = math.inf
         self.is_slow = False

@@ -19,6 +19,7 @@
 #define RTS_MAIN_STACK_SIZE 3584 /* a driver refuses its configuration, and what ran before is loaded again */
 #define RTS_IEC_STACK_SIZE 2048
 #define NETSERVER_MESSAGE_SIZE 2048
+#define COM_PACKET_SIZE 708 /* three of them are a message */
 #define COMM_PASSWORD 1
 #define SRV_MAX_GROUPS 10
 #define SRV_OTHER_CLIENTS 1
