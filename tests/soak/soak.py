@@ -47,6 +47,9 @@ from plctool.testing.plcrt import Plcrt  # noqa: E402
 
 KINDS = ("serial", "can", "tcp", "udp")
 PATIENCE = 30.0  # a client that is shut out for longer has been locked out [s]
+POLITE = 6.0  # while a client has waited for longer others begin nothing: the places of the vanished are free by then [s]
+    6.0  # others begin nothing new while a client has waited for longer: the places of the vanished are free then [s]
+)
 SETTLED = 8.0  # the device waits for no client longer than that [s]
 WARM_UP = 20  # channels of each line at least, or a tenth, after which memory is measured first
 MAX_GROWTH = 64  # KiB: pages of stacks that are used for the first time
@@ -120,6 +123,7 @@ class Line:
     done: Counter[str] = field(default_factory=Counter)
     refused: Counter[str] = field(default_factory=Counter)
     longest: float = 0.0  # turn, with all tries [s]
+    waiting_since: float | None = None  # for a place [s of time.monotonic]
 
     def __str__(self) -> str:
         done = ", ".join(f"{count} {name}" for name, count in sorted(self.done.items()))
@@ -131,7 +135,7 @@ class Line:
         hold theirs until the device misses them, and a new channel is given away before others. Raises PlcError when
         that takes too long, or the device says what it must not."""
         name, action = self.random.choice(TURNS)
-        begin = time.monotonic()
+        begin = self.waiting_since = time.monotonic()
         while not self._try(action):
             if time.monotonic() > begin + PATIENCE:
                 raise PlcError(f"there was no place for longer than {PATIENCE} s", "soak")
@@ -153,6 +157,7 @@ class Line:
             self.refused[error.code] += 1
             return False
         self.channels += 1
+        self.waiting_since = None
         try:
             action(self, connection)
         except Vanished:
@@ -315,11 +320,23 @@ class Soak:
     def _serve(self, line: Line, channels: int) -> None:
         try:
             while line.channels < channels and not self.errors:
+                self._let_others_in()
                 line.turn()
         except PlcError as error:
             self.errors.append(f"{line.kind}, channel {line.channels}: {error} ({error.code})")
         except Exception:
             self.errors.append(f"{line.kind}, channel {line.channels}:\n{traceback.format_exc()}")
+
+    def _let_others_in(self) -> None:
+        """Lines take a place that is free as fast as they can, and a slow one would come too late each time. What is to
+        be found is a client that the device shuts out, not one whom others outrun."""
+        while not self.errors and any(self._waits_long(line) for line in self.lines):
+            time.sleep(0.02)
+
+    @staticmethod
+    def _waits_long(line: Line) -> bool:
+        since = line.waiting_since
+        return since is not None and time.monotonic() > since + POLITE
 
     def _settled(self) -> Use:
         """When the number of files has been the same for longer than the device waits for a client."""
