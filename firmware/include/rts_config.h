@@ -418,6 +418,12 @@
 #define MODBUS_MAX_CONNECTIONS 0
 #endif
 
+/* 1: tools can reach the device through Modbus, on the serial line that the port names (ModbusTunnel.h): one more line of
+ * the block driver (COM_MAX_LINES), 760 bytes of RAM and 0.6 KiB of flash. */
+#ifndef MODBUS_TUNNEL
+#define MODBUS_TUNNEL 0
+#endif
+
 /* Sockets of field buses at a time. */
 #ifndef SYSSOCK_MAX_FIELD_BUS
 #define SYSSOCK_MAX_FIELD_BUS (MODBUS_MAX_CONNECTIONS + 1 + MODBUS_MAX_SERVERS + MODBUS_MAX_CLIENTS)
