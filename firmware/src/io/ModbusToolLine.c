@@ -12,7 +12,7 @@
 #include "SysTarget.h"
 
 #if MODBUS_TUNNEL
-static MODBUS_TUNNEL_LINE line; /* that of the port */
+static MODBUS_TUNNEL_LINE line = MODBUS_TUNNEL_DEFAULT;
 static MODBUS_LINK link;
 static MODBUS_SERVER server;
 static bool is_open;
