@@ -48,6 +48,24 @@ typedef struct {
     WIRE_UI32 number; /* random; of the tool that sends the frame */
 } CAN_CLAIM;
 
+/* ---- layer 2: within Modbus (own) ---- */
+
+/* Then bytes to the device, none with sequence MODBUS_TUNNEL_BEGIN. */
+typedef struct {
+    RTS_UI8 function; /* MODBUS_ENCAPSULATED */
+    RTS_UI8 mei;      /* MODBUS_TUNNEL_MEI */
+    RTS_UI8 sequence; /* MODBUS_TUNNEL_BEGIN, then 1 to 255 and again from 1 on; the last one: the reply was lost */
+} MODBUS_TUNNEL_REQUEST;
+
+/* Then bytes from the device. */
+typedef struct {
+    RTS_UI8 function;
+    RTS_UI8 mei;
+    RTS_UI8 sequence; /* of the request */
+    RTS_UI8 taken;    /* so many of its bytes: the others have to be sent again */
+    RTS_UI8 size;     /* of what follows: where the frame ends, for who cannot measure silence */
+} MODBUS_TUNNEL_REPLY;
+
 /* ---- layer 3: router [2.1] ---- */
 
 /* Then the receiver's address, the sender's, and zeros up to a multiple of 4. */

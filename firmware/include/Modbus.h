@@ -23,6 +23,8 @@ enum {
     MODBUS_ENCAPSULATED = 43,
     MODBUS_DEVICE_IDENTIFICATION = 14, /* MEI type of MODBUS_ENCAPSULATED */
     MODBUS_ID_HEAD = 7,                /* bytes of its reply before the first object */
+    MODBUS_TUNNEL_MEI = 128,           /* another: bytes of a tool (ModbusTunnel.h) */
+    MODBUS_TUNNEL_BEGIN = 0,           /* its first sequence number */
     MODBUS_EXCEPTION = 0x80,           /* set in the function code of a reply: an exception code follows */
 };
 

@@ -25,6 +25,7 @@ typedef struct {
     RTS_UI8 unit;        /* 1..247; TCP: 0: replies to every unit, else to its own, 0 and 255 */
     RTS_UI8 range_count; /* ranges of one table do not overlap */
     bool tcp;
+    bool tunnel;       /* tools reach this device through it (ModbusTunnel.h); MODBUS_TUNNEL 1 */
     bool running;      /* the application, for MODBUS_REPORT_SERVER_ID */
     RTS_UI32 requests; /* that were for this unit */
     RTS_UI32 errors;   /* replied to with an exception */

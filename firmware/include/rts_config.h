@@ -432,6 +432,17 @@
 #define MODBUS_MAX_CONNECTIONS 0
 #endif
 
+/* 1: tools can reach the device through Modbus, on a serial line (ModbusTunnel.h): one more line of the block driver
+ * (COM_MAX_LINES), 1160 bytes of RAM and 1.0 KiB of flash. */
+#ifndef MODBUS_TUNNEL
+#define MODBUS_TUNNEL 0
+#endif
+
+/* That line, a MODBUS_TUNNEL_LINE, if the port does not set it: {"COM2", {38400, SYSCOM_PARITY_EVEN, 1, false}, 247}. */
+#ifndef MODBUS_TUNNEL_DEFAULT
+#define MODBUS_TUNNEL_DEFAULT {NULL, {0, 0, 0, false}, 0}
+#endif
+
 /* Sockets of field buses at a time. */
 #ifndef SYSSOCK_MAX_FIELD_BUS
 #define SYSSOCK_MAX_FIELD_BUS (MODBUS_MAX_CONNECTIONS + 1 + MODBUS_MAX_SERVERS + MODBUS_MAX_CLIENTS)

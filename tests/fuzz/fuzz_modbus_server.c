@@ -11,6 +11,7 @@
 #include "ModbusPdu.h"
 #include "ModbusRtu.h"
 #include "ModbusServerTcp.h"
+#include "ModbusTunnel.h"
 #include "fuzz.h"
 #include "modbus_fakes.h"
 
@@ -37,10 +38,12 @@ size_t fuzz_seed(unsigned index, uint8_t *out, size_t capacity)
         {0x7F, 7, 22, 0, 4, 0, 0xF2, 0, 0x25},
         {0x7F, 4, 43, 14, 1, 0},
         {0x7F, 1, 17},
+        {0x7F, 3, 43, 128, 0, 0x7F, 6, 43, 128, 1, 9, 8, 7, 0x7F, 3, 43, 128, 2},
+        {0x7F, 3, 43, 128, 0, 0x7F, 4, 43, 128, 1, 9, 0x7F, 4, 43, 128, 1, 9},
         {0x80 | 12, 0, 1, 0, 0, 0, 6, UNIT, 3, 0, 0, 0, 2},
         {0x80 | 3, 0, 1, 0, 0x80 | 9, 0, 0, 6, UNIT, 3, 0, 0, 0, 2},
     };
-    static const uint8_t sizes[] = {7, 7, 7, 12, 10, 15, 9, 6, 3, 13, 14};
+    static const uint8_t sizes[] = {7, 7, 7, 12, 10, 15, 9, 6, 3, 18, 17, 13, 14};
 
     if (index >= sizeof(sizes) || capacity < sizes[index])
         return 0;
@@ -52,6 +55,18 @@ static MODBUS_SERVER server_of_line;
 static MODBUS_SERVER server_of_net;
 static MODBUS_LINK link;
 
+/* The block driver: what comes from tools goes back to them, and sometimes more. */
+static void echo(void)
+{
+    RTS_UI8 bytes[64];
+    RTS_UI32 size = ModbusTunnelRead(bytes, sizeof(bytes));
+
+    FUZZ_CHECK(size <= sizeof(bytes));
+    FUZZ_CHECK(ModbusTunnelWrite(bytes, size) <= size);
+    if (size != 0 && bytes[0] == GUARD)
+        FUZZ_CHECK(ModbusTunnelWrite(data, sizeof(data)) <= sizeof(data));
+}
+
 static void run(RTS_UI32 ms)
 {
     RTS_UI8 sent[512];
@@ -59,6 +74,7 @@ static void run(RTS_UI32 ms)
     for (RTS_UI32 i = 0; i < 2 * ms; i++, fakes.now_ns += MS / 2) {
         (void)ModbusServerPoll(&server_of_line, &link, fakes.now_ns);
         ModbusServerTcpPoll(fakes.now_ns);
+        echo();
         (void)line_take(sent, sizeof(sent));
         for (RTS_UI32 k = 0; k < fakes.used; k++)
             fakes.sockets[k].out_size = 0;
@@ -72,6 +88,7 @@ static void begin(void)
     static MODBUS_MEMORY memory[] = {{&ranges[0], data + 1}, {&ranges[1], data + 1 + 125}, {&ranges[2], bits + 1}};
 
     ModbusServerTcpClose();
+    ModbusTunnelReset();
     fakes_begin();
     fakes.char_ns = 95000;
     memset(data, GUARD, sizeof(data));
@@ -84,6 +101,7 @@ static void begin(void)
     server_of_line.object[0] = "vendor";
     server_of_net = server_of_line;
     server_of_net.tcp = true;
+    server_of_line.tunnel = true;
     ModbusRtuBegin(&link, 0, &settings);
     (void)ModbusServerTcpOpen(&server_of_net, &own);
 }
@@ -102,6 +120,7 @@ static FAKE_SOCKET *connection(void)
 static void check_that_both_work(void)
 {
     static const RTS_UI8 on_line[] = {UNIT, 3, 0, 0, 0, 1};
+    static const RTS_UI8 of_tool[] = {UNIT, 43, 128, 0};
     static const RTS_UI8 on_net[] = {3, 0, 0, 0, 1};
     RTS_UI32 before = server_of_line.requests;
     FAKE_SOCKET *socket;
@@ -110,6 +129,10 @@ static void check_that_both_work(void)
     line_send_frame(on_line, sizeof(on_line));
     run(20);
     FUZZ_CHECK(server_of_line.requests == before + 1);
+    before = server_of_line.errors;
+    line_send_frame(of_tool, sizeof(of_tool));
+    run(20);
+    FUZZ_CHECK(server_of_line.errors == before);
     if (fakes.used == FAKE_SOCKETS)
         return;
     socket = net_dial();

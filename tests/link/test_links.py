@@ -58,6 +58,11 @@ def test_a_link_is_its_kind_its_place_and_its_options(text: str, place: str, bau
         ("can:socketcan:can0?bitrate=1/2/3", "'1/2/3' is not a bit rate"),
         ("can:socketcan:can0?can-base=0x123", "'0x123' is not a base"),
         ("can:socketcan:can0?can-base=0x20000000", "is not a base"),
+        ("modbus:", "'modbus:' is not a link"),
+        ("modbus:/dev/ttyUSB0?unit=0", "'0' is not the address of a Modbus device, 1 to 247"),
+        ("modbus-tcp:host?unit=248", "'248' is not the address of a Modbus device"),
+        ("modbus:/dev/ttyUSB0?parity=mark", "'mark' is not a parity; write even, odd, none"),
+        ("modbus-tcp:host?parity=even", "no option 'parity'; it has unit, baud"),
     ],
 )
 def test_what_is_no_link_is_refused_with_what_to_write(text: str, said: str) -> None:
@@ -75,8 +80,22 @@ def test_a_network_link_has_a_place_and_needs_no_gateway(text: str) -> None:
 
 def test_no_option_means_two_things() -> None:
     flags = [kind.flag for kind in TRANSPORTS.values() if kind.flag]
-    options = [name for kind in TRANSPORTS.values() for name in kind.options]
-    assert len({*flags, *options}) == len(flags) + len(options)
+    options = {(name, option.help) for kind in TRANSPORTS.values() for name, option in kind.options.items()}
+    assert len({*flags, *(name for name, _ in options)}) == len(flags) + len(options)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "is_shared"),
+    [
+        ("modbus:/dev/ttyUSB0", {"unit": 247, "baud": 38400, "parity": "even"}, True),
+        ("modbus:/dev/ttyUSB0?unit=3&baud=9600&parity=none", {"unit": 3, "baud": 9600, "parity": "none"}, True),
+        ("modbus-tcp:192.168.0.9?unit=3", {"unit": 3, "baud": 38400}, False),
+    ],
+)
+def test_link_within_modbus_has_an_address_there(text: str, options: dict[str, int | str], is_shared: bool) -> None:
+    link = parse_link(text)
+    assert (link.options, link.is_shared, link.nodes) == (options, is_shared, None)
+    assert parse_link(str(link)) == link
 
 
 @pytest.mark.parametrize(

@@ -47,9 +47,7 @@ from plctool.testing.plcrt import Plcrt  # noqa: E402
 
 KINDS = ("serial", "can", "tcp", "udp")
 PATIENCE = 30.0  # a client that is shut out for longer has been locked out [s]
-POLITE = 6.0  # while a client has waited for longer others begin nothing: the places of the vanished are free by then [s]
-    6.0  # others begin nothing new while a client has waited for longer: the places of the vanished are free then [s]
-)
+POLITE = 6.0  # while a client has waited for longer others begin nothing: places of vanished ones are free by then [s]
 SETTLED = 8.0  # the device waits for no client longer than that [s]
 WARM_UP = 20  # channels of each line at least, or a tenth, after which memory is measured first
 MAX_GROWTH = 64  # KiB: pages of stacks that are used for the first time

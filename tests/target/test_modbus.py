@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
 from environment import TARGET, eventually
 from programs import compile_text, program
 from pymodbus.client import ModbusTcpClient
@@ -16,7 +17,9 @@ from pymodbus.framer import FramerType
 from qemu import Board
 
 from plctool.device import Plc
+from plctool.errors import DeviceError
 from plctool.link.connection import Connection
+from plctool.link.transports import open_transport, parse_link
 
 UNIT = 17
 
@@ -31,6 +34,8 @@ as_bits = true
 holding = { 40001 = "Main.setpoint", 40002 = "Main.ratio" }
 input = { 30001 = "Main.half" }
 """
+
+TOOLS = SERVER.replace("baud = 115200", "baud = 38400").replace("unit = 17", "unit = 247")
 
 CLIENT = """
 [[modbus.rs485]]
@@ -160,3 +165,25 @@ def test_the_line_of_the_tool_is_no_field_bus(make_board: Callable[..., Any], tm
     with Plc(Connection(board.line())) as plc:
         assert any(entry.text.startswith(refusal) for entry in plc.log())
         assert plc.status().state == "run"
+
+
+def test_tools_are_on_the_line_of_the_field_bus(make_board: Callable[..., Any], tmp_path: Path) -> None:
+    """Without a server there, with one, and with one that is set up again by the download."""
+    board = make_board("modbus-tunnel")
+    board.power_on("host")
+    host, port = board.field_bus
+    with Plc(Connection(open_transport(parse_link(f"modbus:socket://{host}:{port}")))) as plc:
+        for number, description in enumerate(["", TOOLS, TOOLS + "# changed\n", ""]):
+            folder = tmp_path / str(number)
+            folder.mkdir()
+            if description:
+                (folder / "bus.io.toml").write_text(description)
+            built = compile_text(program(VARIABLES, f"half_int := {number} + setpoint;"), TARGET, folder)
+            plc.flash(built.path)
+            eventually(lambda wanted=number: plc.read("Main.half_int") == wanted)
+        folder = tmp_path / "client"
+        folder.mkdir()
+        (folder / "bus.io.toml").write_text(CLIENT)
+        with pytest.raises(DeviceError, match="only a server can be on it"):
+            plc.flash(compile_text(program(VARIABLES, "half_int := 9;"), TARGET, folder).path)
+        eventually(lambda: plc.read("Main.half_int") == 3)

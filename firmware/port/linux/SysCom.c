@@ -28,7 +28,7 @@
 #include <termios.h>
 #include <unistd.h>
 
-enum { LINES = 1 + PORT_MAX_BUS_LINES };
+enum { LINES = 1 + PORT_MAX_BUS_LINES + 1 }; /* with that of --tunnel */
 
 typedef struct {
     char path[256]; /* of the device, "" for a pseudo terminal */
@@ -244,11 +244,18 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
     return true;
 }
 
+/* TIOCEXCL would hold as long as any process has the device open. */
+static void close_device(const LINE *line)
+{
+    (void)ioctl(line->source.file, TIOCNXCL);
+    close(line->source.file);
+}
+
 static void release(LINE *line)
 {
     PortWaitRemove(&line->source);
     if (line->source.file >= 0) {
-        close(line->source.file);
+        close_device(line);
     }
     line->source.file = -1;
 }
@@ -380,6 +387,27 @@ static LINE *find_free_line(void)
         line++;
     }
     return line < lines + LINES ? line : NULL;
+}
+
+bool PortComCheck(const char *path, const SYSCOM_SETTINGS *settings, PORT_REASON *reason)
+{
+    LINE line;
+    forget(&line);
+    line.settings = *settings;
+    if (strlen(path) >= sizeof(line.path) || is_in_use(path)) {
+        PortReason(reason, "the serial line %s cannot be used twice: name another one", path);
+        return false;
+    }
+    strcpy(line.path, path);
+    if (!open_device(&line)) {
+        int error = errno;
+        PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)settings->baud,
+                   strerror(error));
+        reason->busy = error == EBUSY;
+        return false;
+    }
+    close_device(&line);
+    return true;
 }
 
 RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)

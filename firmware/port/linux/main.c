@@ -12,6 +12,7 @@
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
 #include "CmpSrvNumbers.h"
+#include "ModbusTunnel.h"
 #include "Supervisor.h"
 #include "SysExcept.h"
 #include "SysFileFlash.h"
@@ -33,6 +34,9 @@
 
 enum { EXIT_RUNTIME = 1, EXIT_USAGE = 2, DEFAULT_BAUD = 115200 };
 
+/* As the devices have it that this function of Modbus comes from. */
+enum { TUNNEL_BAUD = 38400, TUNNEL_UNIT = MODBUS_MAX_UNIT };
+
 typedef struct {
     const char *flash;
     const char *serial;
@@ -41,6 +45,7 @@ typedef struct {
     const char *udp;
     const char *can;
     PORT_CAN_OPTIONS can_options;
+    MODBUS_TUNNEL_LINE tunnel;
     char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
     RTS_UI32 event_count;
     bool alone;
@@ -50,6 +55,8 @@ typedef struct {
 static const char usage[] =
     "usage: plcrt --flash FILE [--serial PATH|pty[:LINK]] [--baud N] [--tcp [ADDRESS:]PORT]\n"
     "             [--udp ADDRESS[:INDEX]] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
+    "             [--tunnel PATH] [--tunnel-unit N] [--tunnel-baud N] [--tunnel-parity even|odd|none] "
+    "[--tunnel-drive]\n"
     "             [--event NAME=PIPE]...\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
@@ -69,6 +76,14 @@ static const char usage[] =
     "  --node N        number of the device on CAN, 1..127; 1 if not given\n"
     "  --bitrate N[/M] bits per second of an adapter, 500000 if not given; with M CAN FD, with M for the data\n"
     "  --can-base ID   of the 29-bit identifiers, 0x1F400000 if not given: docs/can.md\n"
+    "  --tunnel PATH   lets tools in within Modbus RTU on this serial device, also beside the program's own Modbus "
+    "server:\n"
+    "                  docs/modbus.md. While the program has none there, plcrt itself answers, with these settings:\n"
+    "  --tunnel-unit N address, 1..247; 247 if not given\n"
+    "  --tunnel-baud N speed, 38400 if not given\n"
+    "  --tunnel-parity P\n"
+    "                  even, odd or none; even if not given\n"
+    "  --tunnel-drive  the port switches the direction of the bus; adapters do it by themselves\n"
     "  --name NAME     of the device in a scan; the name of this machine if not given\n"
     "  --event N=PIPE  each byte written into the named pipe is the external event N of tasks\n"
     "  --reset-password\n"
@@ -96,13 +111,13 @@ static void refuse(const char *format, ...)
     exit(EXIT_USAGE);
 }
 
-static RTS_UI32 parse_baud(const char *text)
+static RTS_UI32 parse_baud(const char *option, const char *text)
 {
     char *end;
     errno = 0;
     unsigned long baud = strtoul(text, &end, 10);
     if (errno != 0 || *end != '\0' || baud > UINT32_MAX || !PortComKnowsBaud((RTS_UI32)baud)) {
-        refuse("--baud %s is not a speed of serial devices: give 9600, 19200, 38400, 57600, 115200 or more", text);
+        refuse("%s %s is not a speed of serial devices: give 9600, 19200, 38400, 57600, 115200 or more", option, text);
     }
     return (RTS_UI32)baud;
 }
@@ -129,6 +144,11 @@ enum {
     OPTION_NAME,
     OPTION_UDP,
     OPTION_TCP,
+    OPTION_TUNNEL,
+    OPTION_TUNNEL_UNIT,
+    OPTION_TUNNEL_BAUD,
+    OPTION_TUNNEL_PARITY,
+    OPTION_TUNNEL_DRIVE,
 };
 
 /* clang-format off */
@@ -148,6 +168,11 @@ static const struct option long_options[] = {
     {"name", required_argument, NULL, OPTION_NAME},
     {"udp", optional_argument, NULL, OPTION_UDP},
     {"tcp", optional_argument, NULL, OPTION_TCP},
+    {"tunnel", required_argument, NULL, OPTION_TUNNEL},
+    {"tunnel-unit", required_argument, NULL, OPTION_TUNNEL_UNIT},
+    {"tunnel-baud", required_argument, NULL, OPTION_TUNNEL_BAUD},
+    {"tunnel-parity", required_argument, NULL, OPTION_TUNNEL_PARITY},
+    {"tunnel-drive", no_argument, NULL, OPTION_TUNNEL_DRIVE},
     {NULL, 0, NULL, 0},
 };
 /* clang-format on */
@@ -227,6 +252,43 @@ static void parse_bit_rate(const char *text, PORT_CAN_OPTIONS *options)
     }
 }
 
+static RTS_UI8 parse_unit(const char *text)
+{
+    char *end = "";
+    RTS_UI32 unit = parse_number(text, MODBUS_MAX_UNIT, &end);
+    if (unit == UINT32_MAX || unit == MODBUS_BROADCAST || *end != '\0') {
+        refuse("--tunnel-unit %s is not an address of Modbus: give 1 to 247", text);
+    }
+    return (RTS_UI8)unit;
+}
+
+static RTS_UI8 parse_parity(const char *text)
+{
+    static const char *const names[] = {
+        [SYSCOM_PARITY_NONE] = "none", [SYSCOM_PARITY_EVEN] = "even", [SYSCOM_PARITY_ODD] = "odd"};
+    for (size_t i = 0; i < RTS_COUNT(names); i++) {
+        if (strcmp(text, names[i]) == 0) {
+            return (RTS_UI8)i;
+        }
+    }
+    refuse("--tunnel-parity %s is not a parity: give even, odd or none", text);
+}
+
+static void take_tunnel_option(MODBUS_TUNNEL_LINE *tunnel, int option)
+{
+    if (option == OPTION_TUNNEL) {
+        tunnel->name = optarg;
+    } else if (option == OPTION_TUNNEL_UNIT) {
+        tunnel->unit = parse_unit(optarg);
+    } else if (option == OPTION_TUNNEL_BAUD) {
+        tunnel->settings.baud = parse_baud("--tunnel-baud", optarg);
+    } else if (option == OPTION_TUNNEL_PARITY) {
+        tunnel->settings.parity = parse_parity(optarg);
+    } else if (option == OPTION_TUNNEL_DRIVE) {
+        tunnel->settings.rs485 = true;
+    }
+}
+
 static void take_can_option(OPTIONS *options, int option)
 {
     if (option == OPTION_CAN) {
@@ -252,7 +314,7 @@ static void take_option(OPTIONS *options, int option)
         options->serial = take_serial(optarg);
         break;
     case OPTION_BAUD:
-        options->baud = parse_baud(optarg);
+        options->baud = parse_baud("--baud", optarg);
         break;
     case OPTION_EVENT:
         take_event(options, optarg);
@@ -277,6 +339,7 @@ static void take_option(OPTIONS *options, int option)
         break;
     default:
         take_can_option(options, option);
+        take_tunnel_option(&options->tunnel, option);
     }
 }
 
@@ -301,7 +364,8 @@ static void take_place(int argc, char **argv, int option)
 static OPTIONS parse_options(int argc, char **argv)
 {
     OPTIONS options = {.baud = DEFAULT_BAUD,
-                       .can_options = {.node = CAN_NODE, .base = CAN_ID_BASE, .bit_rate = CAN_BIT_RATE}};
+                       .can_options = {.node = CAN_NODE, .base = CAN_ID_BASE, .bit_rate = CAN_BIT_RATE},
+                       .tunnel = {NULL, {TUNNEL_BAUD, SYSCOM_PARITY_EVEN, 1, false}, TUNNEL_UNIT}};
     int option;
     opterr = 0;
     while ((option = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
@@ -493,7 +557,8 @@ static bool open_lines(const OPTIONS *options, PORT_REASON *reason)
     return (options->serial == NULL || PortComOpen(options->serial, options->baud, reason)) &&
            (options->tcp == NULL || PortTcpOpen(options->tcp, reason)) &&
            (options->udp == NULL || PortUdpOpen(options->udp, reason)) &&
-           (options->can == NULL || PortCanOpen(options->can, &options->can_options, reason));
+           (options->can == NULL || PortCanOpen(options->can, &options->can_options, reason)) &&
+           (options->tunnel.name == NULL || PortComCheck(options->tunnel.name, &options->tunnel.settings, reason));
 }
 
 static void close_all(void)
@@ -565,6 +630,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "plcrt: %s\n", reason.text);
         return EXIT_RUNTIME;
     }
+    ModbusTunnelSetLine(&options.tunnel);
     int status = options.alone ? run_alone() : PortSupervise(run_supervised);
     SysExceptShutdown();
     PortEventClose();

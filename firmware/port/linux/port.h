@@ -7,6 +7,7 @@
 #define PORT_H
 
 #include "CmpItf.h"
+#include "SysCom.h"
 #include "SysSocket.h"
 #include "SysTimer.h"
 
@@ -84,6 +85,8 @@ void PortComClose(void);
 /* For a process whose child has the line now: closes a device, which the child opens again when it is lost. A pseudo
  * terminal stays open, so that it outlives the child. */
 void PortComHandOver(void);
+/* Whether SysComOpenPort will be able to open a line like that. */
+bool PortComCheck(const char *path, const SYSCOM_SETTINGS *settings, PORT_REASON *reason);
 /* Name of the pseudo terminal, which is its link if it has one; NULL when the line is none. */
 const char *PortComPtyName(void);
 

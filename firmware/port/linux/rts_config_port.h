@@ -108,6 +108,9 @@
 #define MODBUS_MAX_RANGES 512
 #define MODBUS_DATA_SIZE 65536
 
+/* plcrt --tunnel */
+#define MODBUS_TUNNEL 1
+
 /* What main may wait for at a time: lines, sockets, inputs. */
 #define PORT_MAX_SOURCES 96
 

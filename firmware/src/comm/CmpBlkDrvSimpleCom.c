@@ -14,6 +14,7 @@
 #include "CmpChecksum.h"
 #include "CmpLog.h"
 #include "CmpPackets.h"
+#include "ModbusTunnel.h"
 #include "SysCom.h"
 #include "rts_config.h"
 
@@ -56,14 +57,35 @@ typedef struct {
     RTS_UI8 frame[TAKES_MAX + CRC_SIZE];
 } COM_LINE;
 
-static COM_LINE lines[COM_MAX_LINES];
-static COM_COUNTERS counters[COM_MAX_LINES];
+enum {
+    TUNNEL_LINE = COM_MAX_LINES, /* within Modbus, after those of the port */
+    LINES = COM_MAX_LINES + (MODBUS_TUNNEL ? 1 : 0),
+};
+
+static COM_LINE lines[LINES];
+static COM_COUNTERS counters[LINES];
 
 static const char *const counter_names[] = {"frames",      "CRC errors", "too long",          "too short",
                                             "bad escapes", "unfinished", "ends without start"};
 RTS_STATIC_ASSERT(sizeof(COM_COUNTERS) == sizeof(RTS_UI32) * RTS_COUNT(counter_names), each_counter_has_a_name);
-const BLK_COUNTERS BlkDrvComCounters = {"serial", counter_names, RTS_COUNT(counter_names), &counters[0].frames,
-                                        COM_MAX_LINES};
+const BLK_COUNTERS BlkDrvComCounters = {"serial", counter_names, RTS_COUNT(counter_names), &counters[0].frames, LINES};
+
+/* ---- lines ---- */
+
+#if MODBUS_TUNNEL
+static RTS_UI32 read_line(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
+{
+    return index == TUNNEL_LINE ? ModbusTunnelRead(data, size) : SysComRead(index, data, size);
+}
+
+static RTS_UI32 write_line(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
+{
+    return index == TUNNEL_LINE ? ModbusTunnelWrite(data, size) : SysComWrite(index, data, size);
+}
+#else
+#define read_line SysComRead
+#define write_line SysComWrite
+#endif
 
 /* ---- receiving ---- */
 
@@ -146,7 +168,7 @@ static void receive(COM_LINE *line)
     RTS_UI32 size;
 
     do {
-        size = SysComRead(line->index, chunk, sizeof(chunk));
+        size = read_line(line->index, chunk, sizeof(chunk));
         for (RTS_UI32 i = 0; i < size; i++)
             receive_byte(line, chunk[i]);
         total += size;
@@ -250,7 +272,7 @@ static void transmit(COM_LINE *line)
         RTS_UI32 offered = line->chunk_size - line->chunk_sent;
         if (offered == 0)
             return;
-        RTS_UI32 taken = SysComWrite(line->index, line->chunk + line->chunk_sent, offered);
+        RTS_UI32 taken = write_line(line->index, line->chunk + line->chunk_sent, offered);
         line->chunk_sent += taken < offered ? taken : offered;
         if (taken < offered)
             return;
@@ -266,22 +288,31 @@ static void reset_lines(void)
         CMP_CLEAR(counters);
 }
 
+static COM_LINE *begin_line(RTS_UI32 index)
+{
+    COM_LINE *line = &lines[index];
+
+    line->index = index;
+    line->driver.type = BLK_DRV_TYPE_COM;
+    line->driver.point_to_point = 1;
+    line->driver.address_words = 1;
+    line->driver.address[1] = (RTS_UI8)(index + 1); /* the line's number, as the field counts COM ports */
+#if BLK_LONG_PACKETS
+    line->driver.takes = COM_PACKET_SIZE;
+#endif
+    line->driver.instance = line;
+    line->driver.send = com_send;
+    return line;
+}
+
 static void open_lines(void)
 {
     RTS_UI32 count = SysComGetCount();
 
+    if (MODBUS_TUNNEL)
+        begin_line(TUNNEL_LINE)->open = true;
     for (RTS_UI32 i = 0; i < COM_MAX_LINES && i < count; i++) {
-        COM_LINE *line = &lines[i];
-        line->index = i;
-        line->driver.type = BLK_DRV_TYPE_COM;
-        line->driver.point_to_point = 1;
-        line->driver.address_words = 1;
-        line->driver.address[1] = (RTS_UI8)(i + 1); /* the line's number, as the field counts COM ports */
-#if BLK_LONG_PACKETS
-        line->driver.takes = COM_PACKET_SIZE;
-#endif
-        line->driver.instance = line;
-        line->driver.send = com_send;
+        COM_LINE *line = begin_line(i);
         RTS_RESULT result = SysComOpen(i);
         line->open = result == ERR_OK;
         if (!line->open)
@@ -291,18 +322,19 @@ static void open_lines(void)
 
 static void close_lines(void)
 {
-    for (RTS_UI32 i = 0; i < COM_MAX_LINES; i++) {
+    for (RTS_UI32 i = 0; i < LINES; i++) {
         if (!lines[i].open)
             continue;
         transmit(&lines[i]);
-        SysComClose(i);
+        if (i != TUNNEL_LINE)
+            SysComClose(i);
         lines[i].open = false;
     }
 }
 
 static void cycle(void)
 {
-    for (RTS_UI32 i = 0; i < COM_MAX_LINES; i++) {
+    for (RTS_UI32 i = 0; i < LINES; i++) {
         if (!lines[i].open)
             continue;
         receive(&lines[i]);
@@ -312,7 +344,7 @@ static void cycle(void)
 
 const COM_COUNTERS *BlkDrvComGetCounters(RTS_UI32 line)
 {
-    return line < COM_MAX_LINES ? &counters[line] : NULL;
+    return line < LINES ? &counters[line] : NULL;
 }
 
 RTS_RESULT CmpBlkDrvSimpleCom_Hook(CMP_HOOK hook)

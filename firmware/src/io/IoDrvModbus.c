@@ -15,6 +15,7 @@
 #include "ModbusScan.h"
 #include "ModbusServerTcp.h"
 #include "ModbusSetup.h"
+#include "ModbusToolLine.h"
 #include "SysLock.h"
 #include "SysTime.h"
 
@@ -408,16 +409,39 @@ static const ICmpIoDrv functions = {
     .IoDrvReadParameter = read_parameter,
 };
 
+static void begin_tools(void)
+{
+    if (MODBUS_TUNNEL)
+        ModbusTunnelReset();
+    ModbusToolLineOpen();
+}
+
+static void end(void)
+{
+    (void)update_configuration(NULL, 0);
+    (void)ModbusToolLineClose();
+}
+
+static void pass(void)
+{
+    if (ModbusToolLinePoll(SysTimeGetNs()))
+        SysTimeWantPass(1);
+    if (is_running)
+        cycle();
+}
+
 RTS_RESULT IoDrvModbus_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT2)
         return IoMgrRegisterInstance(&driver);
-    if (hook == CH_INIT3)
+    if (hook == CH_INIT3) {
+        begin_tools();
         return ModbusCallsRegister();
-    if (hook == CH_COMM_CYCLE && is_running)
-        cycle();
+    }
+    if (hook == CH_COMM_CYCLE)
+        pass();
     else if (hook == CH_EXIT3)
-        (void)update_configuration(NULL, 0);
+        end();
     else if (hook == CH_EXIT2)
         (void)IoMgrUnregisterInstance(&driver);
     return ERR_OK;

@@ -12,6 +12,7 @@
 #include "ModbusRtu.h"
 #include "ModbusServerTcp.h"
 #include "ModbusTcp.h"
+#include "ModbusToolLine.h"
 #include "SysCom.h"
 #include "SysTarget.h"
 
@@ -74,11 +75,37 @@ static RTS_RESULT refuse_line(const IoConfigConnector *connector, RTS_RESULT res
     }
 }
 
-static RTS_RESULT open_line(MODBUS_LINK *link, const IoConfigConnector *connector)
+/* A client would ask the devices on the line of tools, and a tool could not: only a server can have it. */
+static RTS_RESULT refuse_client(const IoConfigConnector *connector, RTS_UI32 line, const char *name)
+{
+    SysComClose(line);
+    ModbusToolLineOpen();
+    return MODBUS_REFUSE(connector, ERR_DUPLICATE, "tools have the serial line \"%s\"; only a server can be on it.",
+                         name);
+}
+
+/* As SysComOpenPort. The line of tools is open until a server takes it, by whatever name, and then *of_tools. */
+static RTS_RESULT open_port(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *line, bool *of_tools)
+{
+    RTS_RESULT result = SysComOpenPort(name, settings, line);
+
+    *of_tools = false;
+    if (result != ERR_DUPLICATE || !ModbusToolLineClose())
+        return result;
+    result = SysComOpenPort(name, settings, line);
+    *of_tools = result == ERR_OK;
+    if (result != ERR_OK)
+        ModbusToolLineOpen();
+    return result;
+}
+
+/* `server`: of which it is; NULL: of a client. */
+static RTS_RESULT open_line(MODBUS_LINK *link, MODBUS_SERVER *server, const IoConfigConnector *connector)
 {
     const char *name = IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(connector, MODBUS_PARAM_LINE));
     RTS_UI32 line;
     RTS_RESULT result;
+    bool of_tools;
     const SYSCOM_SETTINGS settings = {
         number(connector, MODBUS_PARAM_BAUD, DEFAULT_BAUD),
         (RTS_UI8)number(connector, MODBUS_PARAM_PARITY, SYSCOM_PARITY_EVEN),
@@ -91,9 +118,13 @@ static RTS_RESULT open_line(MODBUS_LINK *link, const IoConfigConnector *connecto
     if (settings.baud < LEAST_BAUD || settings.parity > SYSCOM_PARITY_ODD || settings.stop_bits < 1 ||
         settings.stop_bits > 2)
         return refuse_line(connector, ERR_NOT_SUPPORTED, name);
-    result = SysComOpenPort(name, &settings, &line);
+    result = open_port(name, &settings, &line, &of_tools);
     if (result != ERR_OK)
         return refuse_line(connector, result, name);
+    if (of_tools && server == NULL)
+        return refuse_client(connector, line, name);
+    if (server != NULL)
+        server->tunnel = of_tools;
     ModbusRtuBegin(link, line, &settings);
     return ERR_OK;
 }
@@ -233,7 +264,7 @@ static RTS_RESULT add_client(MODBUS_SETUP *setup, const IO_DRIVER *driver, const
     if (is_tcp)
         begin_client(&line->client.link, connector);
     else
-        result = open_line(&line->client.link, connector);
+        result = open_line(&line->client.link, NULL, connector);
     if (result != ERR_OK)
         return result;
     line->noted.connector = connector;
@@ -321,7 +352,7 @@ static RTS_RESULT add_server(MODBUS_SETUP *setup, const IoConfigConnector *conne
     line->server.unit = (RTS_UI8)number(connector, MODBUS_PARAM_UNIT, is_tcp ? 0 : 1);
     describe(&line->server, connector);
     if (!is_tcp)
-        result = open_line(&line->link, connector);
+        result = open_line(&line->link, &line->server, connector);
     if (result != ERR_OK)
         return result;
     line->noted.connector = connector;
@@ -366,6 +397,7 @@ void ModbusGiveBack(MODBUS_SETUP *setup)
 {
     close_all(setup);
     memset(setup, 0, sizeof(*setup));
+    ModbusToolLineOpen();
 }
 
 RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver)

@@ -61,7 +61,7 @@ RTS_RESULT ModbusRefused(RTS_RESULT result);
  * is to be called again. */
 RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver);
 
-/* Closes what is open. */
+/* Closes what is open; the line of tools is the firmware's again. */
 void ModbusGiveBack(MODBUS_SETUP *setup);
 
 /* What a connector is: one of them, or none if both are NULL. */

@@ -12,6 +12,7 @@
 
 #include "CMUtils.h"
 #include "ModbusPdu.h"
+#include "ModbusTunnel.h"
 #include "SysLock.h"
 
 enum { TEXT_MAX = 100, REGISTER_SIZE = 2, ANY_UNIT = 255, LATE_NS = 100000000 };
@@ -272,14 +273,32 @@ static RTS_UI32 reply(MODBUS_SERVER *server, MODBUS_REQUEST *request, RTS_UI8 *p
     }
 }
 
-RTS_UI32 ModbusServerReply(MODBUS_SERVER *server, RTS_UI8 *pdu, RTS_UI32 size)
+static RTS_UI32 reply_request(MODBUS_SERVER *server, RTS_UI8 *pdu, RTS_UI32 size, RTS_UI8 *exception)
 {
     MODBUS_REQUEST request;
+
+    *exception = ModbusReadRequest(pdu, size, &request);
+    if (request.function != NULL && request.function->table != 0 && server->range_count == 0)
+        *exception = MODBUS_ILLEGAL_FUNCTION; /* it has no memory at all */
+    return *exception == 0 ? reply(server, &request, pdu, exception) : 0;
+}
+
+static RTS_UI32 reply_tunnel(const MODBUS_SERVER *server, RTS_UI8 *pdu, RTS_UI32 size, RTS_UI8 *exception)
+{
+    if (MODBUS_TUNNEL && server->tunnel)
+        return ModbusTunnelReply(pdu, size, exception);
+    *exception = MODBUS_ILLEGAL_FUNCTION;
+    return 0;
+}
+
+RTS_UI32 ModbusServerReply(MODBUS_SERVER *server, RTS_UI8 *pdu, RTS_UI32 size)
+{
     RTS_UI8 function = pdu[0];
-    RTS_UI8 exception = ModbusReadRequest(pdu, size, &request);
+    RTS_UI8 exception = 0;
 
     server->requests++;
-    size = exception == 0 ? reply(server, &request, pdu, &exception) : 0;
+    size = ModbusTunnelIsRequest(pdu, size) ? reply_tunnel(server, pdu, size, &exception)
+                                            : reply_request(server, pdu, size, &exception);
     if (exception == 0)
         return size;
     server->errors++;
@@ -288,10 +307,11 @@ RTS_UI32 ModbusServerReply(MODBUS_SERVER *server, RTS_UI8 *pdu, RTS_UI32 size)
     return 2;
 }
 
-static bool is_for(const MODBUS_SERVER *server, RTS_UI8 unit)
+/* What tools say is for one device: its reply is a part of it. */
+static bool is_for(const MODBUS_SERVER *server, RTS_UI8 unit, bool of_tool)
 {
     if (!server->tcp)
-        return unit == server->unit || unit == MODBUS_BROADCAST;
+        return unit == server->unit || (unit == MODBUS_BROADCAST && !of_tool);
     return server->unit == 0 || unit == server->unit || unit == 0 || unit == ANY_UNIT;
 }
 
@@ -327,7 +347,7 @@ bool ModbusServerPoll(MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64 now_ns)
         give_up_late(server, link, now_ns);
         return false;
     }
-    if (is_for(server, unit))
+    if (is_for(server, unit, ModbusTunnelIsRequest(pdu, size)))
         size = ModbusServerReply(server, pdu, size);
     else
         size = server->tcp ? reply_no_target(pdu) : 0;

@@ -12,7 +12,7 @@ from plctool.errors import UsageError
 from plctool.files import usable_path
 from plctool.iec.dialect import DIALECTS
 from plctool.image.targets import DEFAULT_TARGET, TARGETS
-from plctool.link.transports import TRANSPORTS
+from plctool.link.transports import TRANSPORTS, Value
 from plctool.templates import DEFAULT_TEMPLATE, TEMPLATES
 
 if TYPE_CHECKING:
@@ -389,10 +389,8 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
     for kind in TRANSPORTS.values():
         if kind.flag:
             link.add_argument(f"--{kind.flag}", metavar=kind.shape, help=kind.help)
-    options = {name: option for kind in TRANSPORTS.values() for name, option in kind.options.items()}
-    for name, option in options.items():
-        default = f"; default: {option.default}" if option.default else ""
-        link.add_argument(f"--{name}", metavar="N", help=f"{option.help}{default}")
+    for name, text in _option_helps().items():
+        link.add_argument(f"--{name}", metavar="N", help=text)
     link.add_argument("--no-gateway", action="store_true", help="do not share the port, as with PLCTOOL_GATEWAY=off")
     link.add_argument(
         "--password-file", type=Path, metavar="FILE",
@@ -402,6 +400,22 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
         parser.add_argument(
             "--symbols", type=usable_path, metavar="FILE.sym", help="if they are not found automatically"
         )
+
+
+def _option_helps() -> dict[str, str]:
+    """What is said of each option of links; one that several kinds have may have a default of its own in each."""
+    helps: dict[str, str] = {}
+    defaults: dict[str, dict[Value, str]] = {}
+    for kind in TRANSPORTS.values():
+        for name, option in kind.options.items():
+            helps[name] = option.help
+            defaults.setdefault(name, {}).setdefault(option.default, kind.flag)
+    for name, of_kinds in defaults.items():
+        texts = [
+            f"{value} with --{flag}" if i else f"default: {value}" for i, (value, flag) in enumerate(of_kinds.items())
+        ]
+        helps[name] += "; " + ", ".join(texts) if any(of_kinds) else ""
+    return helps
 
 
 def _count(text: str) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+from typing import Any
 
 from plctool.errors import LinkError, UsageError
 from plctool.files import read_utf8
@@ -33,7 +34,7 @@ def find_link(args: argparse.Namespace) -> Link | None:
         flags = " or ".join(f"--{TRANSPORTS[scheme].flag}" for scheme in given)
         raise UsageError(f"Name one link only, {flags}.", "no-link")
     if given:
-        return make_link(given[0], getattr(args, TRANSPORTS[given[0]].flag), **_options(args))
+        return make_link(given[0], _argument(args, TRANSPORTS[given[0]].flag), **_options(args))
     link = _default_link()
     return None if link is None else make_link(link.scheme, link.place, **{**link.options, **_options(args)})
 
@@ -50,12 +51,17 @@ def all_serial_ports(args: argparse.Namespace) -> list[Link]:
 
 def _given(args: argparse.Namespace) -> list[str]:
     """The kinds of link that the arguments name."""
-    return [scheme for scheme, kind in TRANSPORTS.items() if kind.flag and getattr(args, kind.flag)]
+    return [scheme for scheme, kind in TRANSPORTS.items() if kind.flag and _argument(args, kind.flag)]
+
+
+def _argument(args: argparse.Namespace, name: str) -> Any:
+    """What follows --`name`; None if it is not there."""
+    return getattr(args, name.replace("-", "_"))
 
 
 def _options(args: argparse.Namespace) -> dict[str, Value]:
     names = {name for kind in TRANSPORTS.values() for name in kind.options}
-    return {name: value for name in sorted(names) if (value := getattr(args, name.replace("-", "_"))) is not None}
+    return {name: value for name in sorted(names) if (value := _argument(args, name)) is not None}
 
 
 def _default_link() -> Link | None:

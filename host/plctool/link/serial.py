@@ -32,12 +32,12 @@ class SerialTransport:
         self.packet_overhead = simplecom.FRAME_OVERHEAD
         self.point_to_point = False
         self.places = NO_PLACES
-        real = _is_real_line(url) if paced is None else paced
+        real = is_real_line(url) if paced is None else paced
         self.byte_rate = baud / BITS_PER_BYTE / (1 + 1 / _ESCAPE_SHARE) if real else math.inf
         self.is_slow = self.byte_rate < _FAST
         self._decoder = simplecom.Decoder()
         self._packets: deque[bytes] = deque()
-        self._port = _open(url, baud)
+        self._port = open_port(url, baud)
 
     def now(self) -> float:
         return time.monotonic()
@@ -71,19 +71,27 @@ class SerialTransport:
         self._port.close()
 
     def _lost(self, error: OSError) -> LinkError:
-        return LinkError(f"The serial line {self.name} was lost ({error}); check the cable and try again.", "link-lost")
+        return lost_port(self.name, error)
 
 
-def _is_real_line(url: str) -> bool:
+def lost_port(name: str, error: OSError) -> LinkError:
+    """The error of a line that was there."""
+    return LinkError(f"The serial line {name} was lost ({error}); check the cable and try again.", "link-lost")
+
+
+def is_real_line(url: str) -> bool:
     """Whether bytes take the time the baud rate says."""
     return "://" not in url and not os.path.realpath(url).startswith("/dev/pts/")
 
 
-def _open(url: str, baud: int) -> Any:
+def open_port(url: str, baud: int, parity: str = "N") -> Any:
+    """A port of pyserial, which may be open once, and whose reads wait for a moment. Raises LinkError."""
     import serial  # slow to import, and only needed here
 
     try:
-        return serial.serial_for_url(url, baudrate=baud, timeout=_POLL, write_timeout=_WRITE_TIMEOUT, exclusive=True)
+        return serial.serial_for_url(
+            url, baudrate=baud, parity=parity, timeout=_POLL, write_timeout=_WRITE_TIMEOUT, exclusive=True
+        )
     except ValueError as error:
         raise LinkError(f"Cannot open {url}: {error}.", "open") from error
     except OSError as error:

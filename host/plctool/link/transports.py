@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from plctool.link.canbus import Bus, SharedBus
 
 Value = int | str
+PARITIES = ("even", "odd", "none")
 _LAST_NODE = 127  # CAN_NODE_MAX; the command line starts without the core
+_LAST_UNIT = 247  # MODBUS_MAX_UNIT
+_MODBUS_BAUD = 38400
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,18 @@ def _can_base(text: str) -> str:
     return f"0x{base:08X}"
 
 
+def _unit(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= _LAST_UNIT:
+        raise ValueError(f"'{text}' is not the address of a Modbus device, 1 to {_LAST_UNIT}")
+    return int(text)
+
+
+def _parity(text: str) -> str:
+    if text not in PARITIES:
+        raise ValueError(f"'{text}' is not a parity; write {', '.join(PARITIES)}")
+    return text
+
+
 def _open_can(link: Link) -> BlockTransport:
     from plctool.link import canbus
 
@@ -146,6 +161,19 @@ def _open_serial(link: Link) -> BlockTransport:
     return SerialTransport(link.place, int(link.options["baud"]))
 
 
+def _open_modbus(link: Link) -> BlockTransport:
+    from plctool.link.modbus import ModbusTransport, RtuBus
+
+    unit, baud = int(link.options["unit"]), int(link.options["baud"])
+    return ModbusTransport(RtuBus(link.place, unit, baud, str(link.options["parity"])))
+
+
+def _open_modbus_tcp(link: Link) -> BlockTransport:
+    from plctool.link.modbus import GatewayBus, ModbusTransport
+
+    return ModbusTransport(GatewayBus(link.place, int(link.options["unit"]), int(link.options["baud"])))
+
+
 def _open_tcp(link: Link) -> BlockTransport:
     from plctool.link.tcp import TcpTransport
 
@@ -164,6 +192,12 @@ def _open_sim(link: Link) -> BlockTransport:
     return SimTransport()
 
 
+_BAUD_HELP = "bits per second"
+_MODBUS_OPTIONS = {
+    "unit": Option(_LAST_UNIT, _unit, "address of the device on a Modbus line"),
+    "baud": Option(_MODBUS_BAUD, _above_zero, _BAUD_HELP),
+}
+
 TRANSPORTS: dict[str, Transport] = {
     "serial": Transport(
         _open_serial,
@@ -171,7 +205,7 @@ TRANSPORTS: dict[str, Transport] = {
         shape="PORT",
         example="/dev/ttyS0",
         help="serial port or pyserial URL, for example /dev/ttyS0",
-        options={"baud": Option(DEFAULT_BAUD, _above_zero, "bits per second")},
+        options={"baud": Option(DEFAULT_BAUD, _above_zero, _BAUD_HELP)},
         is_shared=True,
     ),
     "tcp": Transport(
@@ -200,6 +234,23 @@ TRANSPORTS: dict[str, Transport] = {
             "can-base": Option("0x1F400000", _can_base, "of the identifiers"),
         },
         is_bus=True,
+    ),
+    "modbus": Transport(
+        _open_modbus,
+        flag="modbus",
+        shape="PORT",
+        example="/dev/ttyUSB0",
+        help="controller on an RS-485 line, within the Modbus RTU of others there",
+        options={**_MODBUS_OPTIONS, "parity": Option("even", _parity, "of a Modbus line: even, odd or none")},
+        is_shared=True,
+    ),
+    "modbus-tcp": Transport(
+        _open_modbus_tcp,
+        flag="modbus-tcp",
+        shape="HOST[:PORT]",
+        example="192.168.1.5",
+        help="the same through a Modbus TCP gateway, whose line has this baud rate",
+        options=_MODBUS_OPTIONS,
     ),
     "sim": Transport(_open_sim),  # the simulator of this process, which has to be on
 }
