@@ -15,6 +15,7 @@ from pathlib import Path
 import compiling
 import latency
 import links
+import modbus
 import overheads
 import serial_share
 import targets
@@ -220,6 +221,7 @@ def main() -> None:
     bench_can()
     links.main()
     latency.main()
+    modbus.main()
 
 
 if __name__ == "__main__":
