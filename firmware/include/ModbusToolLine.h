@@ -3,12 +3,26 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * It is open, with the firmware's own settings, whenever no server of the application has it. All from main.
+ * The application's server has it if it has one there; else it is open with the firmware's own settings. All from main.
  */
 #ifndef MODBUSTOOLLINE_H
 #define MODBUSTOOLLINE_H
 
-#include "ModbusTunnel.h"
+#include "SysCom.h"
+#include "rts_config.h"
+
+/* ---- for a port ---- */
+
+typedef struct {
+    const char *name; /* as SysComOpenPort; NULL: there is no tunnel */
+    SYSCOM_SETTINGS settings;
+    RTS_UI8 unit;
+} MODBUS_TOOL_LINE;
+
+/* Instead of MODBUS_TOOL_LINE_DEFAULT. The name stays. Before CMInit; MODBUS_TUNNEL 1. */
+void ModbusToolLineSet(const MODBUS_TOOL_LINE *line);
+
+/* ---- for the driver ---- */
 
 #if MODBUS_TUNNEL
 /* Opens it, if the port names one and it is not open. */

@@ -12,7 +12,6 @@
 #define MODBUSTUNNEL_H
 
 #include "Modbus.h"
-#include "SysCom.h"
 #include "rts_config.h"
 
 /* ---- for servers ---- */
@@ -35,17 +34,5 @@ RTS_UI32 ModbusTunnelWrite(const RTS_UI8 *data, RTS_UI32 size);
 
 /* Forgets all, as at power on. */
 void ModbusTunnelReset(void);
-
-/* ---- for a port ---- */
-
-/* The line on which it is: that of the application's server if it has one there, else one of the firmware's own, with
- * these settings. The name stays. Before CMInit. */
-typedef struct {
-    const char *name; /* as SysComOpenPort; NULL: there is no tunnel */
-    SYSCOM_SETTINGS settings;
-    RTS_UI8 unit;
-} MODBUS_TUNNEL_LINE;
-
-void ModbusTunnelSetLine(const MODBUS_TUNNEL_LINE *line);
 
 #endif

@@ -438,9 +438,9 @@
 #define MODBUS_TUNNEL 0
 #endif
 
-/* That line, a MODBUS_TUNNEL_LINE, if the port does not set it: {"COM2", {38400, SYSCOM_PARITY_EVEN, 1, false}, 247}. */
-#ifndef MODBUS_TUNNEL_DEFAULT
-#define MODBUS_TUNNEL_DEFAULT {NULL, {0, 0, 0, false}, 0}
+/* That line, a MODBUS_TOOL_LINE, if the port does not set it: {"COM2", {38400, SYSCOM_PARITY_EVEN, 1, false}, 247}. */
+#ifndef MODBUS_TOOL_LINE_DEFAULT
+#define MODBUS_TOOL_LINE_DEFAULT {NULL, {0, 0, 0, false}, 0}
 #endif
 
 /* Sockets of field buses at a time. */

@@ -7,6 +7,7 @@
  */
 #include "IoDrvModbus.h"
 #include "ModbusRtu.h"
+#include "ModbusToolLine.h"
 #include "ModbusTunnel.h"
 #include "io_driver.h"
 
@@ -114,12 +115,12 @@ static bool has_tools(RTS_UI8 unit)
 
 static void begin(void)
 {
-    static const MODBUS_TUNNEL_LINE own = {"bus", {OWN_BAUD, SYSCOM_PARITY_EVEN, 1, false}, OWN_UNIT};
+    static const MODBUS_TOOL_LINE own = {"bus", {OWN_BAUD, SYSCOM_PARITY_EVEN, 1, false}, OWN_UNIT};
 
     (void)IoDrvModbus_Hook(CH_EXIT3);
     begin_io();
     memset(&line, 0, sizeof(line));
-    ModbusTunnelSetLine(&own);
+    ModbusToolLineSet(&own);
     CHECK_EQUAL(IoDrvModbus_Hook(CH_INIT2), ERR_OK);
     CHECK_EQUAL(IoDrvModbus_Hook(CH_INIT3), ERR_OK);
     CHECK_EQUAL(line.baud, OWN_BAUD);

@@ -12,7 +12,8 @@
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
 #include "CmpSrvNumbers.h"
-#include "ModbusTunnel.h"
+#include "Modbus.h"
+#include "ModbusToolLine.h"
 #include "Supervisor.h"
 #include "SysExcept.h"
 #include "SysFileFlash.h"
@@ -45,7 +46,7 @@ typedef struct {
     const char *udp;
     const char *can;
     PORT_CAN_OPTIONS can_options;
-    MODBUS_TUNNEL_LINE tunnel;
+    MODBUS_TOOL_LINE tunnel;
     char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
     RTS_UI32 event_count;
     bool alone;
@@ -274,7 +275,7 @@ static RTS_UI8 parse_parity(const char *text)
     refuse("--tunnel-parity %s is not a parity: give even, odd or none", text);
 }
 
-static void take_tunnel_option(MODBUS_TUNNEL_LINE *tunnel, int option)
+static void take_tunnel_option(MODBUS_TOOL_LINE *tunnel, int option)
 {
     if (option == OPTION_TUNNEL) {
         tunnel->name = optarg;
@@ -630,7 +631,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "plcrt: %s\n", reason.text);
         return EXIT_RUNTIME;
     }
-    ModbusTunnelSetLine(&options.tunnel);
+    ModbusToolLineSet(&options.tunnel);
     int status = options.alone ? run_alone() : PortSupervise(run_supervised);
     SysExceptShutdown();
     PortEventClose();

@@ -16,6 +16,7 @@
 #include "ModbusServerTcp.h"
 #include "ModbusSetup.h"
 #include "ModbusToolLine.h"
+#include "ModbusTunnel.h"
 #include "SysLock.h"
 #include "SysTime.h"
 

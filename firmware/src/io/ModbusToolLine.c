@@ -12,12 +12,12 @@
 #include "SysTarget.h"
 
 #if MODBUS_TUNNEL
-static MODBUS_TUNNEL_LINE line = MODBUS_TUNNEL_DEFAULT;
+static MODBUS_TOOL_LINE line = MODBUS_TOOL_LINE_DEFAULT;
 static MODBUS_LINK link;
 static MODBUS_SERVER server;
 static bool is_open;
 
-void ModbusTunnelSetLine(const MODBUS_TUNNEL_LINE *wanted)
+void ModbusToolLineSet(const MODBUS_TOOL_LINE *wanted)
 {
     line = *wanted;
 }
