@@ -24,6 +24,8 @@ class Value:
         return self.text
 
 
+_USES_MEMORY = ("load ", "call ", "tail call ", "cmpxchg ", "atomicrmw ")
+
 TRUE, FALSE, NULL = Value("true"), Value("false"), Value("null")
 
 
@@ -123,6 +125,7 @@ class Function:
         self._phis: dict[str, int] = {}  # the index of the line, by name
         self._dead = False
         self.block = "entry"
+        self.barriers = 0  # grows with all that ends a block or may use memory, but `load` and `store`
         self.scope = -1  # its DISubprogram
         self.debug = ""  # e.g. ', !dbg !7', added to every instruction
 
@@ -130,6 +133,12 @@ class Function:
 
     def value(self, text: str) -> Value:
         """Writes an instruction that gives a value."""
+        if text.startswith(_USES_MEMORY):
+            self.barriers += 1
+        return self.load(text)
+
+    def load(self, text: str) -> Value:
+        """Writes a load of which the caller keeps account, as `value`."""
         if self._dead:
             self.begin(self.label("dead"))
         self._count += 1
@@ -139,9 +148,19 @@ class Function:
 
     def do(self, text: str) -> None:
         """Writes an instruction without a value."""
+        self.barriers += 1
+        self.store(text)
+
+    def store(self, text: str) -> int:
+        """Writes a store of which the caller keeps account, as `do`. Returns its line, for `remove`."""
         if self._dead:
             self.begin(self.label("dead"))
         self._lines.append(f"  {text}{self.debug}")
+        return len(self._lines) - 1
+
+    def remove(self, line: int) -> None:
+        """Takes out an instruction without a value."""
+        self._lines[line] = ""
 
     def phi(self, llvm_type: str, *incoming: tuple[Value, str]) -> Value:
         """At the beginning of a block, the value that belongs to the block before: pairs of both. `add_incoming` adds
@@ -197,6 +216,7 @@ class Function:
         """Starts the block `label`, falling through to it when the block before is still open."""
         if not self._dead:
             self._lines.append(f"  br label %{label}{self.debug}")
+        self.barriers += 1
         self._lines.append(f"{label}:")
         self.block = label
         self._dead = False
@@ -226,7 +246,7 @@ class Function:
     def definition(self, linkage: str) -> str:
         scope = f"!dbg !{self.scope}" if self.scope >= 0 else ""
         head = " ".join(filter(None, ("define", linkage, self._signature, self.inlining, self._attributes, scope, "{")))
-        return "\n".join([head, "entry:", *self._allocas, *self._prologue, *self._lines, "}"])
+        return "\n".join([head, "entry:", *self._allocas, *self._prologue, *filter(None, self._lines), "}"])
 
     def declaration(self, linkage: str) -> str:
         return f"declare {linkage} {self._signature}"

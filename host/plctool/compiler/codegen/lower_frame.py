@@ -14,11 +14,12 @@ from typing import Any, TypeVar
 from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import NULL, Function, Value, number
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, Check, Unit, value_type
+from plctool.compiler.codegen.memory import Memory
 from plctool.compiler.internal import note_position
 from plctool.compiler.typed import Dispatch, Expr, Label, Place, Pos, Pou, Statement, Variable
 from plctool.core import ffi, lib
 from plctool.iec.areas import Area
-from plctool.iec.types import MAX_ALIGN, Elementary, StringType, Type, alignment_at, base_of, is_scalar
+from plctool.iec.types import DINT, MAX_ALIGN, Elementary, StringType, Type, alignment_at, base_of, is_scalar
 
 TAGGED_AREAS = frozenset((Area.DATA, Area.RETAIN))  # variables of the other areas may overlap (%MW0, %MX0.3)
 FrameType = TypeVar("FrameType", bound="Frame")
@@ -147,6 +148,7 @@ class Frame:
         self._bases: dict[Area, Value] = {}
         self._addresses: dict[tuple[str, Value, int], Value] = {}  # by block, so that none lives longer than it must
         self._raises: dict[Handler, dict[tuple[int | None, str], str]] = {}
+        self._known = Memory()
         self._free: dict[tuple[int, int], list[Value]] = {}
         self._busy: list[tuple[tuple[int, int], Value]] = []
         self.pointer_int = f"i{8 * unit.target.pointer_size}"
@@ -305,7 +307,7 @@ class Frame:
         """The scalar at `ref`."""
         fn = self.fn
         text = value_type(ref.type)
-        value = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.align}{ref.tag}")
+        value = self._loaded(ref, text)
         if ref.loose:
             return fn.value(f"freeze {text} {value}")
         if ref.bit >= 0:
@@ -316,22 +318,40 @@ class Frame:
 
     def store(self, ref: Ref, value: Value) -> None:
         """Stores a scalar."""
-        fn = self.fn
         text = value_type(ref.type)
-        address = self.address(ref)
         if ref.bit >= 0:
             value = self._with_bit(ref, text, value)
-        fn.do(f"store {text} {value}, ptr {address}, align {ref.align}{ref.tag}")
         if text == "ptr" and self.unit.target.pointer_size == 4:  # pointers take 8 bytes in memory on every target
-            upper = self.address(replace(ref, offset=ref.offset + 4))
-            fn.do(f"store i32 0, ptr {upper}, align {min(4, ref.align)}{ref.tag}")
+            self._put(ref.member(4, DINT, ref.tag), "i32", number(0))
+        self._put(ref, text, value)
+
+    def _loaded(self, ref: Ref, text: str) -> Value:
+        """What is in memory, without an instruction if that is known."""
+        value = self._memory().value(ref.pointer, ref.offset, text)
+        if value is None:
+            value = self.fn.load(f"load {text}, ptr {self.address(ref)}, align {ref.align}{ref.tag}")
+            self._memory().note_load(ref.pointer, ref.offset, text, value)
+        return value
+
+    def _put(self, ref: Ref, text: str, value: Value) -> None:
+        """Stores; takes out the instruction of an earlier store that nothing reads."""
+        line = self.fn.store(f"store {text} {value}, ptr {self.address(ref)}, align {ref.align}{ref.tag}")
+        useless = self._memory().note_store(ref.pointer, ref.offset, text, value, line)
+        if useless is not None:
+            self.fn.remove(useless)
+
+    def _memory(self) -> Memory:
+        """What is known here."""
+        if self._known.since != self.fn.barriers or not self.unit.options.opt_level:
+            self._known = Memory(self.fn.barriers)
+        return self._known
 
     def _with_bit(self, ref: Ref, text: str, value: Value) -> Value:
         fn = self.fn
         base = base_of(ref.type)
         assert isinstance(base, Elementary)
         mask = 1 << ref.bit
-        old = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.align}{ref.tag}")
+        old = self._loaded(ref, text)
         if value.constant == 1:
             return fn.value(f"or {text} {old}, {mask}")
         cleared = fn.value(f"and {text} {old}, {~mask}")
