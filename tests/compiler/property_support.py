@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal
 
-from hypothesis import HealthCheck, settings
+from hypothesis import settings
 from hypothesis import strategies as st
 
 from plctool.compiler import compile_sources
@@ -21,8 +21,7 @@ from plctool.sim import Simulator
 
 Value = bool | int | float | str
 
-SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
-PROGRAM = settings(max_examples=12, deadline=None, suppress_health_check=SLOW, report_multiple_bugs=False)
+PROGRAM = settings(max_examples=12, report_multiple_bugs=False)
 EXPRESSIONS = 30  # per program
 OPTIMISED = 4  # one program in so many, because optimising takes ten times as long as all else
 

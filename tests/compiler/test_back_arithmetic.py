@@ -51,7 +51,7 @@ INTEGERS = [SINT, INT, DINT, LINT, USINT, UINT, UDINT, ULINT]
 BITS = [BYTE, WORD, DWORD, LWORD]
 DIVIDEBYZERO = 0x102
 NO_DIV = ALL_CHECKS - {Check.DIV}
-few = settings(max_examples=30, deadline=None)
+few = settings(max_examples=30)
 
 
 def wrap(value: int, t: Elementary) -> int:
@@ -204,7 +204,7 @@ def test_comparisons(t: Elementary) -> None:
     }  # fmt: skip
     strategy = reals if t in (REAL, LREAL) else values(t)
 
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=25)
     @given(strategy, strategy)
     def check(a: float, b: float) -> None:
         for op, model in table.items():
@@ -239,7 +239,7 @@ def test_bool_conversions() -> None:
 def test_reals_to_integers_round_and_saturate(source: Elementary, target: Elementary, how: str) -> None:
     low, high = limits(target)
 
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=40)
     @given(reals)
     def check(a: float) -> None:
         got = evaluate(how, (source,), target, a)

@@ -327,7 +327,7 @@ def test_string_assignment_cuts_and_leaves_the_neighbours_alone(source: int, tar
     run = p.run(assign(b, load(a)))
     run["before"] = run["after"] = 0xA5
 
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=40)
     @given(text)
     def check(value: str) -> None:
         run["a"] = value[:source]
@@ -347,7 +347,7 @@ def test_strings_compare_byte_by_byte(capacities: tuple[int, int]) -> None:
     results = [p.variable(op.name, BOOL) for op in ops]
     run = p.run(*(assign(r, binary(op, load(a), load(b))) for op, r in zip(ops, results, strict=True)))
 
-    @settings(max_examples=80, deadline=None)
+    @settings(max_examples=80)
     @given(text, st.one_of(text, st.none()), st.integers(0, 80))
     def check(left: str, right: str | None, cut: int) -> None:
         x = left[: capacities[0]]

@@ -157,7 +157,7 @@ def test_for_runs_as_specified_at_all_limits(t: Elementary, modified: bool) -> N
     number = edge.map(lambda v: min(max(v, low), high))
     steps = st.sampled_from([1, 2, 3, 7, 100] + ([-1, -2, -7, -100] if t.signed else []))
 
-    @settings(max_examples=150, deadline=None)
+    @settings(max_examples=150)
     @given(number, number, steps, st.booleans(), st.sampled_from([0, 2]))
     def check(start: int, stop: int, step: int, constant: bool, level: int) -> None:
         run = for_loop(t, step if constant else None, modified, level)

@@ -96,7 +96,7 @@ def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
 
 
 @pytest.mark.parametrize("level", LEVELS)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(units=UNITS)
 @example(
     units=[

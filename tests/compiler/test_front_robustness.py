@@ -126,13 +126,13 @@ def test_mutated_programs_are_diagnosed(seed: int) -> None:
             raise AssertionError(f"seed {seed}:\n{text}") from error
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.text())
 def test_any_text_is_diagnosed(text: str) -> None:
     all_of(text)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.sampled_from([*KEYWORDS, *OPERATORS, *VALUES, "x", ";", ":", ","]), max_size=40))
 def test_any_tokens_are_diagnosed(tokens: list[str]) -> None:
     all_of(" ".join(tokens))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from plcopen_support import pou, project, variables
 from test_codesys2_exports import HARDWARE, LIBRARY, PROGRAM, SETTINGS, TASKS, VISUALISATION
@@ -53,7 +53,7 @@ SPLICES = [
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60)
 @given(data=st.data())
 def test_a_mutated_file_gives_diagnostics_with_a_line(tmp_path: Path, name: str, data: st.DataObject) -> None:
     text = SAMPLES[name]

@@ -66,7 +66,7 @@ run = st.builds(
 )  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.builds(
         Image,
@@ -105,7 +105,7 @@ def test_the_crc_is_that_of_zlib_with_its_own_word_zero() -> None:
     assert zlib.crc32(data) == crc == parse_image(build_image(SAMPLE)).crc
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.data())
 def test_every_changed_bit_is_refused(data: st.DataObject) -> None:
     image = bytearray(build_image(SAMPLE))
@@ -122,7 +122,7 @@ def test_every_truncated_image_is_refused() -> None:
             parse_image(image[:length])
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(st.integers(0, 103), st.integers(0, 255)), min_size=1, max_size=4))
 def test_a_damaged_header_with_a_good_checksum_never_crashes(changes: list[tuple[int, int]]) -> None:
     image = bytearray(build_image(SAMPLE))
@@ -134,7 +134,7 @@ def test_a_damaged_header_with_a_good_checksum_never_crashes(changes: list[tuple
         assert error.message.endswith("build it again.")
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.data())
 def test_damaged_tables_with_a_good_checksum_never_crash(data: st.DataObject) -> None:
     image = bytearray(build_image(SAMPLE))

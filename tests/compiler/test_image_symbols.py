@@ -251,7 +251,7 @@ def test_without_a_pattern_all_variables_are_listed_as_they_were_declared() -> N
     assert names[:3] == ["Main.n", "Main.word", "Main.fb"] and names[-3:] == ["GVL.x", "Main.limit", "Main.title"]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.text("Mainfb.arr[]234,^-xyq ", max_size=24))
 def test_any_text_is_resolved_or_refused(path: str) -> None:
     try:

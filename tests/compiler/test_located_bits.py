@@ -23,13 +23,13 @@ def run(p: BitProgram) -> None:
         assert {name: plc.read(name) for name in p.expected} == p.expected
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(bit_programs())
 def test_a_write_reaches_its_bit_only(p: BitProgram) -> None:
     run(p)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(block_programs())
 def test_bits_of_blocks_are_copied_alone(p: BitProgram) -> None:
     run(p)

@@ -30,7 +30,7 @@ ACCESSES = st.lists(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(ACCESSES)
 def test_memory_and_values_are_as_with_every_load_and_store(accesses: list[tuple[bool, Value, int, str]]) -> None:
     whole, held = bytearray(ROOM), Memory()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler import compile_sources
@@ -17,7 +17,7 @@ from plctool.sim import Simulator
 
 CYCLE_MS = 10
 CYCLES = 40
-CASES = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+CASES = settings(max_examples=40)
 
 PROGRAM = """
 PROGRAM Main

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.cli.io_documents import export_board, init
@@ -94,9 +94,7 @@ def written(folder: Path, device: dict[str, Any]) -> Path | None:
 
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only"]
 COMMENTED = re.compile(r"^# (?=\[|\w+ = )", re.MULTILINE)
-SETTINGS = settings(
-    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
-)
+SETTINGS = settings(max_examples=30)
 
 
 @SETTINGS

@@ -38,7 +38,7 @@ CONFIGURATIONS = st.builds(
 )
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(CONFIGURATIONS)
 def test_what_is_read_is_what_was_written(configuration: Configuration) -> None:
     packed = pack_configuration(configuration)
@@ -46,7 +46,7 @@ def test_what_is_read_is_what_was_written(configuration: Configuration) -> None:
     assert len(packed) % 4 == 0
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(CONFIGURATIONS, st.data())
 def test_what_is_cut_off_is_refused(configuration: Configuration, data: st.DataObject) -> None:
     packed = pack_configuration(configuration)
@@ -54,7 +54,7 @@ def test_what_is_cut_off_is_refused(configuration: Configuration, data: st.DataO
         parse_configuration(packed[: data.draw(st.integers(0, len(packed) - 1))])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(CONFIGURATIONS, st.data())
 def test_changed_bytes_are_read_or_refused(configuration: Configuration, data: st.DataObject) -> None:
     packed = bytearray(pack_configuration(configuration))

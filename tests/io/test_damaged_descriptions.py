@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.cli.io_documents import export_board, init
@@ -144,7 +144,7 @@ def taken_or_reported(folder: Path, description: str, device: str) -> None:
             compile_sources([folder], target="cortex-m3")
 
 
-HOW = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+HOW = settings(max_examples=40)
 
 
 @HOW

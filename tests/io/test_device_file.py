@@ -123,7 +123,7 @@ VALUES = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.sampled_from(NAMES), VALUES)
 def test_default_that_is_taken_is_a_value_of_its_type(name: str, value: str) -> None:
     device, found = read(parameter(f"type = '{name}', default = {value}"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from io_support import addresses, build, messages
 
@@ -86,7 +86,7 @@ INDICES = st.integers(-3, 3)
 SPELLINGS = st.sampled_from(["{}", " {}", "{} ", "0{}", "00{}"])
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40)
 @given(INDICES, INDICES, SPELLINGS, SPELLINGS)
 def test_elements_are_the_same_if_their_numbers_are(tmp_path: Path, i: int, j: int, one: str, other: str) -> None:
     program = "PROGRAM Main\nVAR list : ARRAY[-3..3] OF INT; END_VAR\nlist := list;\nEND_PROGRAM\n"

@@ -46,7 +46,7 @@ def _paths(value: Any, path: Path = ()) -> list[tuple[Path, Any]]:
     return found
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(TABLES, st.booleans())
 def test_keys_and_values_are_where_they_stand(tables: dict[str, dict[str, Any]], arrays: bool) -> None:
     opening, closing = ("[[", "]]") if arrays else ("[", "]")

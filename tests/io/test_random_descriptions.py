@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from io_support import build, configuration
 
@@ -17,7 +17,7 @@ DEVICES = st.lists(st.tuples(st.booleans(), st.booleans(), CHANNELS), min_size=1
 STOPS = {0: '"hold"', 1: '"zero"', 2: "1"}
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12)
 @given(DEVICES)
 def test_image_has_what_was_described(tmp_path: Path, devices: list[Any]) -> None:
     declared, used, text = [], [], ""

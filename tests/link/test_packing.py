@@ -50,7 +50,7 @@ def runtime() -> Iterator[None]:
     yield
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(code=CODE)
 def test_what_was_packed_arrives(code: bytes) -> None:
     power_on()
@@ -128,7 +128,6 @@ def test_wrong_packed_data_are_refused(data: bytes) -> None:
         assert reply.u16(lib.TAG_SERVICE_RESULT) in (lib.ERR_NO_CONSISTENCY, lib.ERR_OUT_OF_LIMITS)
 
 
-@settings(deadline=None)
 @given(
     image=CODE,
     start=st.integers(0, 8000),

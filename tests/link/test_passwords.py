@@ -52,7 +52,7 @@ def test_the_keys_are_those_of_scram_sha_256() -> None:
 
 
 @given(st.text(min_size=8, max_size=40), st.binary(min_size=16, max_size=16))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_proof_shows_the_key_of_the_verifier(password: str, nonce: bytes) -> None:
     verifier = verifier_of(password)
     challenge = nonce + verifier[32:]

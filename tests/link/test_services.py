@@ -565,7 +565,7 @@ def test_a_lost_verdict_is_asked_for_again() -> None:
     assert bench.plc.image == image
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(st.integers(0, 2**32), st.sampled_from([2048, 16384]))
 def test_what_arrives_over_a_bad_line_is_what_was_sent(seed: int, buffer_size: int) -> None:
     bench = Bench(buffer_size, to_device=damage(seed, 0.001), to_client=damage(seed + 1, 0.001))

@@ -28,7 +28,7 @@ def programs() -> list[BitProgram]:
     """The same ones at every run."""
     found: list[BitProgram] = []
 
-    @settings(max_examples=PROGRAMS, derandomize=True, database=None, phases=[Phase.generate], deadline=None)
+    @settings(max_examples=PROGRAMS, derandomize=True, database=None, phases=[Phase.generate])
     @given(bit_programs() | block_programs())
     def collect(p: BitProgram) -> None:
         found.append(p)

@@ -132,7 +132,7 @@ def build(tmp_path_factory):
     return compile_text
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(old=programs, new=programs, cut=st.booleans())
 def test_only_what_changed_begins_again(build, old, new, cut) -> None:
     before, after = build(source(old)), build(source(new))
@@ -149,7 +149,7 @@ def test_only_what_changed_begins_again(build, old, new, cut) -> None:
         assert plc.read_all(new_leaves) == expected_values(old_leaves, new_leaves)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(old=programs, new=programs)
 def test_the_host_names_what_the_device_keeps(build, old, new) -> None:
     changes = kept_changes(build(source(old)).symbols.kept, build(source(new)).symbols.kept)
