@@ -42,7 +42,7 @@ RESET_OPTIONS = {
 @dataclass(frozen=True)
 class ExceptionInfo:
     """What stopped the program. `task` is None for initialisation code; the location is None without symbols. `calls`
-    led there, the nearest first."""
+    led there, the nearest first. `detail`: which index or value was outside, if that is known."""
 
     code: int
     name: str
@@ -51,12 +51,14 @@ class ExceptionInfo:
     file: str | None = None
     line: int | None = None
     calls: list[SourceLine] = field(default_factory=list)
+    detail: str = ""
 
     def __str__(self) -> str:
         task = f" in task {self.task}" if self.task else ""
         place = f", {self.pou}, {self.file}:{self.line}" if self.file else ""
         calls = "".join(f", called from {c.pou}, {c.file}:{c.line}" for c in self.calls)
-        return f"{self.name}{task}{place}{calls}"
+        detail = f": {self.detail}" if self.detail else ""
+        return f"{self.name}{task}{place}{calls}{detail}"
 
 
 class ProgramStopped(DeviceError):
@@ -244,8 +246,13 @@ class Controller(ABC):
         places = table.call_stack(exception.code_offset, exception.trace) if table else []
         if not places:
             return ExceptionInfo(exception.code, exception.name, task)
-        place = places[0]
-        return ExceptionInfo(exception.code, exception.name, task, place.pou, place.file, place.line, places[1:])
+        place, detail = places[0], ""
+        if table is not None and exception.code == lib.RTSEXCPT_ARRAYBOUNDS:
+            with suppress(DeviceError, UsageError):
+                detail = table.what_was_outside(place, lambda symbols: self._read(table, symbols).values)
+        return ExceptionInfo(
+            exception.code, exception.name, task, place.pou, place.file, place.line, places[1:], detail
+        )
 
     @abstractmethod
     def tasks(self) -> list[TaskInfo]:

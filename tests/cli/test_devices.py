@@ -115,7 +115,7 @@ def test_status_after_an_exception_names_task_pou_file_and_line(tool: Any, runni
     document = tool("status", *PORT, "--json").json
     assert document["state"] == "exception"
     what = {"code": lib.RTSEXCPT_DIVIDEBYZERO, "name": "DIVIDEBYZERO", "task": "Main"}
-    assert document["exception"] == what | {"pou": "Main", "file": "main.st", "line": 8, "calls": []}
+    assert document["exception"] == what | {"pou": "Main", "file": "main.st", "line": 8, "calls": [], "detail": ""}
     assert "DIVIDEBYZERO in task Main, Main, main.st:8" in tool("status", *PORT).out
 
 

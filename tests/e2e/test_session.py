@@ -132,6 +132,17 @@ def test_division_by_zero_is_reported_with_task_pou_file_and_line(tool, plcrt, e
     assert tool.ok("status", "--port", plcrt.port)["state"] == "stop"
 
 
+def test_index_out_of_bounds_is_reported_with_its_value_and_the_bounds(tool, plcrt, eventually):
+    text = "PROGRAM Main VAR list : ARRAY[1..4] OF INT; i : INT; END_VAR\ni := i + 1;\nlist[i] := i;\nEND_PROGRAM"
+    tool.ok("flash", "--port", plcrt.port, str(tool.build("outside", text)))
+    status = eventually(lambda: (s := tool.ok("status", "--port", plcrt.port))["state"] == "exception" and s)
+    said = "the index of Main.list is 5, outside 1..4"
+    assert status["exception"]["name"] == "ARRAYBOUNDS" and status["exception"]["detail"] == said
+    entries = tool.ok("log", "--port", plcrt.port)["entries"]
+    assert said in [entry.get("detail") for entry in entries]
+    assert said in tool("status", "--port", plcrt.port).out and said in tool("log", "--port", plcrt.port).out
+
+
 def test_endless_loop_is_broken_out_of_and_the_device_answers(tool, plcrt, eventually):
     text = """
     PROGRAM Main VAR n : DINT; END_VAR

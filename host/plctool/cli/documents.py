@@ -593,7 +593,7 @@ def log(plc: Controller) -> Document:
     last = next((e for e in reversed(entries) if e["class"] == "exception"), None)
     if exception and exception.file and last:
         known = exception_document(exception)
-        last |= {name: known[name] for name in ("pou", "file", "line", "calls")}
+        last |= {name: known[name] for name in ("pou", "file", "line", "calls", "detail")}
     return {"entries": entries}
 
 

@@ -60,6 +60,11 @@ def place_text(place: dict[str, Any]) -> str:
     return f", {place['pou']}, {place['file']}:{place['line']}" if place.get("file") else ""
 
 
+def detail_text(place: dict[str, Any]) -> str:
+    """What is known of an exception besides its location."""
+    return f": {place['detail']}" if place.get("detail") else ""
+
+
 def calls_text(place: dict[str, Any], column: int = 2) -> str:
     """A line for each call that led to a location, indented to a column."""
     return "".join(
@@ -188,14 +193,15 @@ def status_text(document: dict[str, Any]) -> str:
         lines.append(f"image: {document['image_crc']}")
     if exception := document["exception"]:
         task = f" in task {exception['task']}" if exception["task"] else ""
-        lines.append(f"exception: {exception['name']}{task}{place_text(exception)}{calls_text(exception)}")
+        where = f"{place_text(exception)}{detail_text(exception)}{calls_text(exception)}"
+        lines.append(f"exception: {exception['name']}{task}{where}")
     return "\n".join(lines)
 
 
 def log_text(document: dict[str, Any]) -> str:
     return "\n".join(
         f"{e['time_s']:12.6f} s  {e['class']:<9}  {e['component']}: {e['text']}{place_text(e)}"
-        f"{calls_text(e, _LOG_COLUMN)}"
+        f"{detail_text(e)}{calls_text(e, _LOG_COLUMN)}"
         for e in document["entries"]
     )
 

@@ -187,6 +187,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         _classes(program),
         {n: constant_symbol(n, c.type, encode(base_of(c.type), c.value)) for n, c in program.constants.items()},
         linked.debug,
+        bounds=lowered.bounds,
     )
 
 

@@ -18,6 +18,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from plctool.debug.bounds import BoundsCheck, Read, what_was_outside
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Symbol, Units, constant_symbol, walk
 from plctool.errors import UsageError
@@ -70,7 +71,8 @@ class SymbolTable:
     """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry goes up to
     the next one. `aliases`: other names of variables. `classes`: the numbers by which instances show their class.
     `constants`: those that are not in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
-    lose. `io`: devices and channels of inputs and outputs (`compiler/io_configuration.py`), empty for none."""
+    lose. `io`: devices and channels of inputs and outputs (`compiler/io_configuration.py`), empty for none. `bounds`:
+    what the code checks."""
 
     image_crc: int
     target: str
@@ -86,6 +88,7 @@ class SymbolTable:
     debug: list[bytes] = field(default_factory=list)
     kept: list[KeptName] = field(default_factory=list)
     io: dict[str, Any] = field(default_factory=dict)
+    bounds: list[BoundsCheck] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -193,6 +196,11 @@ class SymbolTable:
             places += [self._in_pou(o.pou, i.call_file, i.call_line) for i, o in pairwise(scopes) if i.call_line]
         return places
 
+    def what_was_outside(self, place: SourceLine, read: Read) -> str:
+        """In words, the index or value that a program which stopped there with ARRAYBOUNDS has; "" if unknown."""
+        checks = [check for check in self.bounds if (check.file, check.line) == (place.file, place.line)]
+        return what_was_outside(checks, list(self.variables.values()), read)
+
     def _in_pou(self, pou: str, file: str, line: int) -> SourceLine:
         """A line of a POU. What initialises all variables has none of its own: then of the POU that declares them."""
         made = any(unit.name == pou and not unit.file for unit in self.pous)
@@ -234,6 +242,7 @@ class SymbolTable:
             "files": self.files,
             "kept": [[k.name, k.type, k.persistent, k.size] for k in self.kept],
             "io": self.io,
+            "bounds": [check.to_list() for check in self.bounds],
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))
@@ -264,6 +273,7 @@ class SymbolTable:
                 [zlib.decompress(base64.b64decode(text)) for text in document["debug"]],
                 [KeptName(*entry) for entry in document.get("kept", [])],
                 document.get("io", {}),
+                [BoundsCheck.from_list(entry) for entry in document.get("bounds", [])],
             )
         except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None

@@ -197,7 +197,7 @@ class _Bench:
         if info is None:
             return None
         where = f" in {info.pou}" if info.pou and not TEST_NAME.fullmatch(info.pou) else ""
-        text = _EXCEPTIONS.get(info.code, "run-time exception") + where
+        text = (info.detail or _EXCEPTIONS.get(info.code, "run-time exception")) + where
         place = (info.file, info.line) if info.file and info.line else (case.pos.file, case.pos.line)
         return Failure(info.name, text, *place, is_exception=True, pou=info.pou, calls=_calls(info))
 

@@ -18,6 +18,7 @@ from plctool.compiler.codegen.string_functions import string_function
 from plctool.compiler.internal import note_position
 from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
+from plctool.debug.bounds import BoundsCheck
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import BOOL, is_scalar
@@ -31,13 +32,14 @@ GLOBAL_EXIT = "global_exit"
 class Lowered:
     """LLVM IR, in parts to be compiled each by itself, and what an image of it needs. `tasks`: entry symbols
     in the order of the program's tasks; `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `pous`: by
-    symbol, all that are part of it; `imports`: in the order of their slots."""
+    symbol, all that are part of it; `imports`: in the order of their slots; `bounds`: what is checked."""
 
     texts: list[str]
     tasks: list[str]
     functions: dict[int, str]
     pous: dict[str, Pou]
     imports: list[External]
+    bounds: list[BoundsCheck]
 
 
 def lower(program: TypedProgram, options: Options) -> Lowered:
@@ -78,7 +80,7 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     for name in sorted(unit.helpers):
         unit.module.add_helper(string_function(name, unit.target, unit.strings))
     pous = {name: pou for (pou, _), name in unit.pous.items()}
-    return Lowered(texts(unit.module), tasks, functions, pous, unit.imports)
+    return Lowered(texts(unit.module), tasks, functions, pous, unit.imports, [*dict.fromkeys(unit.bounds)])
 
 
 def _task_entry(unit: Unit, number: int, task: Task) -> str:

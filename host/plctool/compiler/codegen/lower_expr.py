@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from plctool.compiler.codegen.bounds import bounds_check
 from plctool.compiler.codegen.ir import FALSE, TRUE, Value
 from plctool.compiler.codegen.lower_arith import (
     COMPARISONS,
@@ -49,7 +50,6 @@ from plctool.compiler.typed import (
     Intrinsic,
     IntrinsicCall,
     Load,
-    Pos,
     Unary,
     VarPlace,
 )
@@ -169,25 +169,26 @@ def converted(frame: Frame, e: Convert) -> Value:
         return convert(frame, value, source, e.type, rounding=e.rounding)
     if type_range(source) is None:  # a real: the limits are tested on the integer
         value = convert(frame, value, source, e.type, rounding=e.rounding)
-        _check_limits(frame, value, e.type, type_range(e.type), e.check, e.pos)
+        _check_limits(frame, e, value, e.type, type_range(e.type), e.check)
         return value
-    _check_limits(frame, value, source, value_range(e.operand, frame.ranges), e.check, e.pos)
+    _check_limits(frame, e, value, source, value_range(e.operand, frame.ranges), e.check)
     return convert(frame, value, source, e.type)
 
 
 def _check_limits(
-    frame: Frame, value: Value, t: Type, known: tuple[int, int] | None, limits: tuple[int, int], pos: Pos
+    frame: Frame, e: Convert, value: Value, t: Type, known: tuple[int, int] | None, limits: tuple[int, int]
 ) -> None:
     assert known is not None
     low, high = max(limits[0], known[0]), min(limits[1], known[1])
     if (low, high) == known:
         return
+    frame.unit.bounds.append(bounds_check(frame.pou, None, e.operand, *limits, e.pos))
     text = value_type(t)
     if low > high:
-        frame.require(FALSE, ARRAY_BOUNDS, pos)
+        frame.require(FALSE, ARRAY_BOUNDS, e.pos)
         return
     relative = frame.fn.value(f"sub {text} {value}, {low}") if low else value
-    frame.require(frame.fn.value(f"icmp ule {text} {relative}, {high - low}"), ARRAY_BOUNDS, pos)
+    frame.require(frame.fn.value(f"icmp ule {text} {relative}, {high - low}"), ARRAY_BOUNDS, e.pos)
 
 
 @rule(VALUES, IntrinsicCall)

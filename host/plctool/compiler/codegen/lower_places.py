@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from plctool.compiler.codegen.bounds import bounds_check
 from plctool.compiler.codegen.ir import FALSE, Value
 from plctool.compiler.codegen.lower_arith import bits_of, is_signed, known_integer, resize
 from plctool.compiler.codegen.lower_frame import (
@@ -139,7 +140,7 @@ def indexed(frame: Frame, place: IndexPlace) -> Ref:
         if known is not None and low <= known <= high:
             constant_part += known - low
             continue
-        part, within = _subscript(frame, expr, low, high, place.pos)
+        part, within = _subscript(frame, expr, low, high, place)
         counted = counted and within
         dynamic = part if dynamic is None else frame.fn.value(f"add {frame.pointer_int} {dynamic}, {part}")
     base = base.member(constant_part * element.size, element, base.tag)
@@ -166,8 +167,9 @@ def _open_index(frame: Frame, place: IndexPlace, limits: list[tuple[Expr, Expr]]
     return total if frame.pointer_int == "i64" else fn.value(f"trunc i64 {total} to {frame.pointer_int}")
 
 
-def _subscript(frame: Frame, expr: Expr, low: int, high: int, pos: Pos) -> tuple[Value, bool]:
-    """An index counted from 0 as a pointer-sized integer, and whether it is known to be within the bounds."""
+def _subscript(frame: Frame, expr: Expr, low: int, high: int, place: IndexPlace) -> tuple[Value, bool]:
+    """An index of an array counted from 0 as a pointer-sized integer, and whether it is known to be within the
+    bounds."""
     index = frame.value(expr)
     limits = value_range(expr, frame.ranges)
     within = limits is not None and low <= limits[0] and limits[1] <= high
@@ -182,7 +184,8 @@ def _subscript(frame: Frame, expr: Expr, low: int, high: int, pos: Pos) -> tuple
     if low < 0 and not is_signed(expr.type):  # what is below `low` when read as signed is far above `high`
         tested, last = wide, high
     ok = frame.fn.value(f"icmp ule i{work} {tested}, {last}") if last >= 0 else FALSE
-    frame.require(ok, ARRAY_BOUNDS, pos)
+    frame.unit.bounds.append(bounds_check(frame.pou, place.base, expr, low, high, place.pos))
+    frame.require(ok, ARRAY_BOUNDS, place.pos)
     return _widen(frame, relative, work), True
 
 
@@ -197,6 +200,8 @@ def _character(frame: Frame, base: Ref, place: IndexPlace) -> Ref:
         work = max(32, bits_of(expr.type))
         index = resize(frame, index, expr.type, work)
         capacity = resize(frame, base.capacity, UDINT, work)
+        if last is not None:
+            frame.unit.bounds.append(bounds_check(frame.pou, place.base, expr, 0, last, place.pos))
         frame.require(frame.fn.value(f"icmp ule i{work} {index}, {capacity}"), ARRAY_BOUNDS, place.pos)
         index, inside = _widen(frame, index, work), True
     else:

@@ -13,6 +13,7 @@ from plctool.compiler.codegen.ir import Module, escape
 from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
 from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable
 from plctool.core import ffi, lib
+from plctool.debug.bounds import BoundsCheck
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import Elementary, Kind, PointerType, StructType, Type, base_of
@@ -109,6 +110,7 @@ class Unit:
         self.helpers: set[str] = set()
         self.dispatchers: dict[tuple[Dispatch, bool], str] = {}  # symbols of what chooses among targets
         self.files: dict[str, int] = {}
+        self.bounds: list[BoundsCheck] = []  # that are in the code
         self._import_slots: dict[str, int] = {}
         self._symbols: set[str] = set()
         self._locations: dict[tuple[int, str, int], str] = {}
