@@ -64,6 +64,12 @@ def test_what_computes_has_a_stand_in_and_what_reaches_the_system_has_none(tool:
     }
 
 
+def test_a_name_is_known_whatever_stands_in_front_of_it(tool: Any, scratch: Path) -> None:
+    (scratch / "a.st").write_text("PROGRAM Main VAR a : Acme.FB_MBReadCoils; END_VAR a(); END_PROGRAM")
+    missing = tool("check", "--missing", "a.st", "--json").json["missing"]
+    assert [(m["name"], m["library"]) for m in missing] == [("Acme.FB_MBReadCoils", "Tc2_ModbusSrv or ModbusFB")]
+
+
 def test_own_names_are_not_those_of_libraries(tool: Any, scratch: Path) -> None:
     own = "FUNCTION_BLOCK BLINK\nEND_FUNCTION_BLOCK\nTYPE PID : STRUCT MEMCPY : INT; END_STRUCT; END_TYPE\n"
     text = "PROGRAM Main\nVAR b : BLINK; p : PID; x : INT; END_VAR\nb();\nx := p.MEMCPY;\nEND_PROGRAM\n"

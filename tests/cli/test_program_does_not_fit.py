@@ -64,6 +64,14 @@ def test_a_processor_has_the_limits_of_the_boards_here(refused: Any, target: str
     assert "bytes of stack" in refused(DEEP, "--target", target, "-O0")
 
 
+@pytest.mark.parametrize(("target", "board", "has"), [("aarch64-linux", "plcrt", 16), ("cortex-m0", "MPS2 AN385", 4)])
+def test_a_processor_that_no_board_has_is_held_to_the_limits_of_its_like(
+    refused: Any, target: str, board: str, has: int
+) -> None:
+    message = refused(tasks(20), "--target", target)
+    assert f"It needs 20 tasks, the device has {has}" in message and board in message
+
+
 def test_limits_can_be_left_out(refused: Any, tool: Any) -> None:
     assert "build with --no-limits" in refused(BIG_DATA, "--target", "cortex-m3")
     assert tool("build", "app.st", "-o", "app.cdl", "--target", "cortex-m3", "--no-limits").status == 0

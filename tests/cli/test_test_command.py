@@ -363,6 +363,16 @@ def test_warnings_are_reported(tool: Tool) -> None:
     assert [w["code"] for w in tool("test", path, "--json").json["warnings"]] == ["unused"]
 
 
+def test_what_only_a_test_looks_at_is_used(tool: Tool) -> None:
+    units = "FUNCTION_BLOCK F VAR k, unneeded : INT; END_VAR END_FUNCTION_BLOCK "
+    units += "PROGRAM Main VAR r : INT; END_VAR END_PROGRAM "
+    body = "x(); m.r := 3; m(); ASSERT_EQ(x.k, 0); ASSERT_EQ(m.r, 3);"
+    path = str(write(f"{units}TEST 't' VAR x : F; m : Main; END_VAR {body} END_TEST"))
+    for command in ("check", "test", "build"):
+        warnings = tool(command, path, "--json").json["warnings" if command != "check" else "diagnostics"]
+        assert [w["message"] for w in warnings if w["code"] == "unused"] == ["unneeded is never used"]
+
+
 def test_junit_report_holds_every_test(tool: Tool) -> None:
     text = TWO + "TEST 'stops' VAR i : INT; END_VAR i := 1 / i; END_TEST"
     assert tool("test", str(write(text)), "--junit", "report.xml").status == 1

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from plctool.core import lib
 from plctool.image.board import Board, known_boards
 from plctool.image.limits import LIMITS, Need, check_fit
-from plctool.image.targets import Target
+from plctool.image.targets import TARGETS, Target
 from plctool.io.device_file import PROGRAM_LIMITS, DeviceFile
 
 _OTHERWISE = "say so in a device file (docs/io.md) or build with --no-limits"
@@ -17,7 +17,8 @@ def check_program_fits(
     needs: Mapping[str, Need], target: Target, board: Board | None, device: DeviceFile | None
 ) -> None:
     """Compares with what `board` has, else with the limits of the device file, else with the most that any firmware of
-    this repository has on this processor. Raises UsageError saying what does not fit, and what needs most of it."""
+    this repository has on this processor, or on its like. Raises UsageError saying what does not fit, and what needs
+    most of it."""
     own: dict[str, int] = {}
     if device is not None and device.target in ("", target.name):  # not when it is built for a simulator
         own = {name: n for name, n in device.limits.items() if name in PROGRAM_LIMITS}
@@ -29,7 +30,14 @@ def check_program_fits(
             f"Make the program smaller; if the firmware has more room, correct {device.path}.",
         )  # fmt: skip
     else:
-        same = [b for b in known_boards() if b.device_id == getattr(lib, target.device_id)]
-        limits = {name: max(b.limits.get(name, 0) for b in same) for name in LIMITS} if same else {}
+        same = _boards_like(target)
+        limits = {name: max(b.limits.get(name, 0) for b in same) for name in LIMITS}
         names = " or ".join(dict.fromkeys(b.name for b in same))
         check_fit(needs, limits, names, f"Make the program smaller; if your firmware has more room, {_OTHERWISE}.")
+
+
+def _boards_like(target: Target) -> list[Board]:
+    """The boards with this processor; of one that no board has, those with a processor of its size."""
+    boards = {t.name: [b for b in known_boards() if b.device_id == getattr(lib, t.device_id)] for t in TARGETS.values()}
+    alike = [b for t in TARGETS.values() if t.compact == target.compact for b in boards[t.name]]
+    return boards[target.name] or alike

@@ -92,9 +92,11 @@ def missing_names(uses: Iterable[Use]) -> list[Missing]:
 
 
 def library_of(name: str) -> str:
-    """The library that seems to have a name; "" when none is known. A qualified name is known by its first part."""
-    first = name.partition(".")[0]
-    return next((library for library, pattern in _LIBRARIES if pattern.fullmatch(first)), "")
+    """The library that seems to have a name; "" when none is known. Of a qualified name the first part says it, else
+    the last one."""
+    parts = name.split(".")
+    found = (library for part in (parts[0], parts[-1]) for library, pattern in _LIBRARIES if pattern.fullmatch(part))
+    return next(found, "")
 
 
 def known_name_like(name: str, candidates: Iterable[str]) -> str:

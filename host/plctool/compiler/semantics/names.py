@@ -272,6 +272,10 @@ class Names:
         named = [line.type.name for line in lines if isinstance(line.type, ast.NamedType)]
         return {name.rpartition(".")[2].casefold() for name in named}
 
+    def members_in_tests(self) -> set[str]:
+        """The names of the members that tests read or write, case-folded, of whatever they may be."""
+        return {member.name.casefold() for member in ast.every(ast.Member, [test.body for test in self.tests])}
+
     def globals(self) -> list[GlobalSymbol]:
         """All global variables the program itself declares; those with a name that others have too, twice."""
         return [*self._globals.values(), *(symbol for same in self._ambiguous.values() for symbol in same)]

@@ -83,8 +83,9 @@ class Program:
         checked = self._check_queue()
         while self.programs.declare_others():
             checked += self._check_queue()
+        in_tests = world.names.members_in_tests()
         for scope in checked:
-            report_unused(scope)
+            report_unused(scope, in_tests)
         write_pools(world)
         self.startup, self.shutdown = construct(world)
         world.pous += world.dispatches.queries.pous()

@@ -5,6 +5,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.checker import Checker, checks_statement
@@ -77,12 +79,13 @@ def report_unreachable(c: Checker, offset: int, why: str = "") -> None:
     c.warning(offset, "unreachable", f"this statement is never reached{why}")
 
 
-def report_unused(scope: Scope) -> None:
-    """Warns of variables that are not used, and of results that are not assigned."""
+def report_unused(scope: Scope, elsewhere: Collection[str] = ()) -> None:
+    """Warns of variables that are not used, not even by these names `elsewhere`, and of results that are not
+    assigned."""
     for symbol in scope.names.values():
         if not isinstance(symbol, VarSymbol) or symbol.used or symbol.name.startswith("%"):
             continue
-        if symbol.role in (Role.LOCAL, Role.TEMP):
+        if symbol.role in (Role.LOCAL, Role.TEMP) and symbol.name.casefold() not in elsewhere:
             scope.globals.diagnostics.warning(symbol.pos, "unused", f"{symbol.name} is never used")
         elif symbol.role is Role.RESULT and symbol.name.casefold() not in INITIALISERS:
             message = f"{symbol.name} never assigns its result; write {symbol.name} := ..."
