@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 import plctool
+from plctool.cli.main import main
 from plctool.errors import LinkError, PlcError
 from plctool.link import services
 from plctool.link.canbus import CanTransport, PythonCanBus, open_bus
@@ -83,6 +84,25 @@ def test_several_devices_are_flashed_at_once(hub: CanHub, tool: Any, counter: Pa
     assert done.status == 3
     good, bad = json.loads(done.out)["devices"]
     assert (good["skipped"], bad["node"], bad["error"]["code"]) == (True, "99", "no-answer")
+
+
+def test_ctrl_c_during_the_flash_of_several_says_what_each_has_now(
+    hub: CanHub, tool: Any, counter: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tool.ok("flash", *options_of(hub, 0, "1,mixer"), str(counter))
+    tool.ok("reset", "origin", *options_of(hub, 0, "mixer"))
+    crc = tool.ok("status", *options_of(hub, 0, "1"))["image_crc"]
+    other = tool.build("other", "PROGRAM Main VAR n : DINT; END_VAR n := n + 2; END_PROGRAM")
+
+    def interrupt(*arguments: Any, **words: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("plctool.link.services.download", interrupt)
+    assert main(["flash", *options_of(hub, 0, "1,mixer"), str(other)]) == 130
+    assert capsys.readouterr().err == (
+        f"plctool: Interrupted. Node 1 has still the previous program (CRC {crc}), state: run. "
+        "Node mixer has no program.\n"
+    )
 
 
 def test_one_tool_flashes_while_another_one_watches(hub: CanHub, tool: Any, counter: Path) -> None:

@@ -441,8 +441,14 @@ def flash(
     }
 
 
-def interrupted_flash(connect: Callable[[], Controller], image: Path) -> Interrupted:
-    """After a download that was given up: what is on the controller now, asked on a link of its own."""
+def interrupted_flash(connections: Mapping[str, Callable[[], Controller]], image: Path) -> Interrupted:
+    """After a download that was given up: what is on each controller now, asked on a link of its own. They have the
+    names of their nodes, the only one perhaps none."""
+    now = [_now_on(f"Node {node}" if node else "The device", connect, image) for node, connect in connections.items()]
+    return Interrupted(" ".join(["Interrupted.", *now]), "interrupted")
+
+
+def _now_on(device: str, connect: Callable[[], Controller], image: Path) -> str:
     from plctool.image.file import image_crc
     from plctool.link.services import AppState
 
@@ -450,14 +456,11 @@ def interrupted_flash(connect: Callable[[], Controller], image: Path) -> Interru
         with connect() as plc:
             status = plc.raw_status()
     except PlcError as error:
-        now = f"What is on the device could not be read, see 'plctool status': {error.message}"
-    else:
-        if status.state is AppState.NONE:
-            now = "The device has no program."
-        else:
-            which = "the new" if status.image_crc == image_crc(read_image(image)) else "still the previous"
-            now = f"The device has {which} program (CRC {status.image_crc:08X}), state: {status.state}."
-    return Interrupted(f"Interrupted. {now}", "interrupted")
+        return f"{device} does not say what it has, see 'plctool status': {error.message}"
+    if status.state is AppState.NONE:
+        return f"{device} has no program."
+    which = "the new" if status.image_crc == image_crc(read_image(image)) else "still the previous"
+    return f"{device} has {which} program (CRC {status.image_crc:08X}), state: {status.state}."
 
 
 def flash_several(
@@ -492,9 +495,7 @@ def flash_several(
                 devices.append({"node": node, "error": {"code": error.code, "message": error.message}})
             except KeyboardInterrupt:
                 ended.set()
-                raise Interrupted(
-                    "Interrupted. Some devices may have the new program; 'plctool status' shows which.", "interrupted"
-                ) from None
+                raise
     return {"devices": devices}, errors
 
 

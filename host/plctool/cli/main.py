@@ -9,6 +9,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stdout, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -171,10 +172,14 @@ def _demo(args: argparse.Namespace) -> int:
 
 
 def _connect(args: argparse.Namespace) -> Plc:
+    return _connect_to(args, link_of(args))
+
+
+def _connect_to(args: argparse.Namespace, link: Link) -> Plc:
     from plctool.device import connect
 
     return connect(
-        link_of(args),
+        link,
         getattr(args, "symbols", None),
         gateway=_gateway_wanted(args),
         tool=_me(args),
@@ -212,14 +217,18 @@ def _on_device(args: argparse.Namespace, operation: Callable[[Plc], Document], t
 def _flash_several(args: argparse.Namespace, link: Link) -> int:
     from plctool.device import connect_several
 
-    with connect_several(link, password=_password_source(args)) as plcs, _Progress(not args.json) as progress:
-        document, errors = documents.flash_several(
-            plcs,
-            args.image,
-            start=not args.no_start,
-            force=args.force,
-            progress=lambda node, done, total: progress.show(done, total, node),
-        )
+    try:
+        with connect_several(link, password=_password_source(args)) as plcs, _Progress(not args.json) as progress:
+            document, errors = documents.flash_several(
+                plcs,
+                args.image,
+                start=not args.no_start,
+                force=args.force,
+                progress=lambda node, done, total: progress.show(done, total, node),
+            )
+    except KeyboardInterrupt:
+        again = {node: partial(_connect_to, args, link.of_node(node)) for node in link.nodes or ()}
+        raise documents.interrupted_flash(again, args.image) from None
     _show(args, document, output.flash_several_text)
     return max((error.exit_code for error in errors), default=EXIT_OK)
 
@@ -251,7 +260,7 @@ def _flash(args: argparse.Namespace) -> int:
     try:
         return _on_device(args, flash, output.flash_text)
     except KeyboardInterrupt:
-        raise documents.interrupted_flash(lambda: _connect(args), args.image) from None
+        raise documents.interrupted_flash({"": partial(_connect, args)}, args.image) from None
 
 
 def _prepared_source(args: argparse.Namespace) -> tuple[Archive, bytes] | None:
