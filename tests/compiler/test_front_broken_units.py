@@ -12,7 +12,7 @@ from plctool.compiler.front import check_sources
 
 BROKEN = "FUNCTION_BLOCK Broken\nVAR_OUTPUT level INT; END_VAR\nlevel := 1;\nEND_FUNCTION_BLOCK\n"
 OTHER = "PROGRAM Main\nVAR n : INT; b : Broken; END_VAR\nn := wrong;\nn := TRUE;\n{more}END_PROGRAM\n"
-SAID = ["2:17: expected :", "7:6: unknown name wrong", "8:6: BOOL does not fit INT; write BOOL_TO_INT(...)"]
+SAID = ["2:17: expected : before INT", "7:6: unknown name wrong", "8:6: BOOL does not fit INT; write BOOL_TO_INT(...)"]
 
 
 def test_errors_of_other_units_are_said_with_it() -> None:

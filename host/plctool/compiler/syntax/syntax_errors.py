@@ -50,8 +50,8 @@ _INSERTIONS = {
     "_TO": ("TO", "expected TO"),
     "_RPAR": (")", "expected )"),
     "_RSQB": ("]", "expected ]"),
-    "_COLON": (":", "expected :"),
-    "_ASSIGN": (":=", "expected :="),
+    "_COLON": (":", "expected : before {next}"),
+    "_ASSIGN": (":=", "expected := before {next}"),
     "_COMMA": (",", "expected ,"),
 }
 _VALUES = {"IDENT", "NUMBER", "TYPED", "STRING", "TRUE", "FALSE"}
@@ -162,7 +162,7 @@ class Recovery:
             if self._shift(stack, kind, token.type) is not None:
                 if kind == "_SEMI" and self.previous is not None and self.previous.type == "RETURN":
                     message = _RETURN
-                self._say(self._gap(token), message.format(item=self._item_words(stack)))
+                self._say(self._gap(token), message.format(item=self._item_words(stack), next=_shown(token)))
                 self._parser.feed(Token(kind, text, self._gap(token)))
                 return True
         if self._shift(stack, "_UNTIL", "IDENT", token.type) is not None:
@@ -408,7 +408,8 @@ class Recovery:
                 f"expected PROGRAM, FUNCTION, FUNCTION_BLOCK, TYPE, VAR_GLOBAL or CONFIGURATION, found {_shown(token)}"
             )
         if self._shift(stack, "_ASSIGN") is not None and self._shift(stack, "_SEMI") is not None:
-            return f"expected := or ;, found {_shown(token)}"
+            pointer = token.text == "-" and self._source.text[token.end : token.end + 1] == ">"
+            return "-> is written ^. here" if pointer else f"expected := or ;, found {_shown(token)}"
         words = [word for kind, word in _WORDS.items() if self._shift(stack, kind) is not None]
         if self._shift(stack, "IDENT") is not None:
             words = ["a name", *(word for word in words if word != "(")]
