@@ -195,6 +195,23 @@ def test_a_diagram_is_refused_by_name_and_the_rest_is_checked(tmp_path: Path, la
     assert [text.splitlines()[d.line - 1] for d in errors] == [f"_{language}_BODY", "m := m + k;"]
 
 
+@pytest.mark.parametrize("first", ["LD\tn", "ldn n", "again:\nLD n", "(* LD *)\nCAL t(IN := x)"])
+def test_a_list_of_instructions_is_refused_by_name_and_the_rest_is_checked(tmp_path: Path, first: str) -> None:
+    text = PROGRAM.replace("n := n + 1;", f"{first}\nADD 1\nCAL t(PT := T#1s)\nST n") + OTHER.replace("m + 1", "m + k")
+    errors = [d for d in found(tmp_path, text) if d.severity == "error"]
+    assert [d.message for d in errors] == [
+        "PLC_PRG is written in IL; only Structured Text can be compiled",
+        "unknown name k",
+    ]
+    assert text.splitlines()[errors[0].line - 1] == first.splitlines()[-1]
+
+
+@pytest.mark.parametrize("statement", ["LD := n;", "LD(n);", "LD; CAL := n;"])
+def test_a_name_like_an_instruction_is_a_name(tmp_path: Path, statement: str) -> None:
+    text = PROGRAM.replace("n := n + 1;", statement)
+    assert [d.message for d in found(tmp_path, text) if " IL" in d.message] == []
+
+
 def test_what_a_person_misspelt_is_still_an_error(tmp_path: Path) -> None:
     errors = found(tmp_path, PROGRAM.replace("PROGRAM PLC_PRG", "PROGRM PLC_PRG"))
     assert any("PROGRM" in d.message for d in errors)

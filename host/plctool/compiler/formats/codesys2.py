@@ -1,7 +1,7 @@
 """Exports of CODESYS 2.3 and TwinCAT 2 (.EXP): units in Structured Text, and sections that describe the project.
 
 Tasks become a CONFIGURATION and the names in the hardware configuration become globals at their addresses. Libraries,
-visualisations and settings of the editor are left out and named. A body that is a diagram is refused by name.
+visualisations and settings of the editor are left out and named. A body in another language is refused by name.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -27,6 +27,7 @@ _OUTSIDE = re.compile(r"\(\*|'(?:\$.|[^'$\n])*'|\"(?:\$.|[^\"$\n])*\"")
 _INSIDE = re.compile(r"\(\*|\*\)")
 _NESTED = re.compile(r"\(\*\s*@NESTEDCOMMENTS\s*:=\s*'(\w+)'\s*\*\)", re.IGNORECASE)
 _DIAGRAM = re.compile(r"^[ \t]*_(LD|FBD|CFC|SFC)_?\w*[ \t]*\r?$", re.MULTILINE)
+_INSTRUCTION = re.compile(r"\s*(?:\w+:\s*)?((?:LDN?|CALC?N?)[ \t]+[\w%'\"-])", re.IGNORECASE)
 _TASK = re.compile(r"\bTASK\s+(\w+)\s*\(([^()]*)\)", re.IGNORECASE)
 _PROPERTY = re.compile(r"(\w+)\s*:=\s*([^,()]+)")
 _INSTANCE = re.compile(r"\bPROGRAM\s+(\w+)(?:\s+WITH\s+\w+)?\s*:\s*(\w+)", re.IGNORECASE)
@@ -66,7 +67,7 @@ class _Export:
         first: _Span | None = None
         for span in self._spans():
             if span.kind in _ENDS:
-                self._diagram(span)
+                self._other_language(span)
                 continue
             first = first or span
             made = self._instead_of(span)
@@ -165,13 +166,23 @@ class _Export:
             return [f"the library {name.strip()}" for name in libraries] or ["a library"]
         return [f"{span.kind} {span.name}".strip() if span.kind == "VISUALISATION" else span.kind]
 
-    def _diagram(self, span: _Span) -> None:
+    def _other_language(self, span: _Span) -> None:
+        """Refuses a body that is a diagram or a list of instructions."""
         match = _DIAGRAM.search(self._masked, span.start, span.end)
-        if match is None:
+        if match is not None:
+            self._refuse(span, match.start(), match.start(1) - 1, match[1])
             return
-        self._findings.refuse(self._place(match.start(1) - 1), span.name or span.kind, match[1])
+        declared = self._masked.upper().rfind("END_VAR", span.start, span.end)
+        body = self._line_end(span.start) if declared < 0 else declared + len("END_VAR")
+        instruction = _INSTRUCTION.match(self._masked, body, span.end)
+        if instruction is not None:
+            self._refuse(span, body, instruction.start(1), "IL")
+
+    def _refuse(self, span: _Span, start: int, at: int, language: str) -> None:
+        """Leaves out a body that begins at `start`."""
+        self._findings.refuse(self._place(at), span.name or span.kind, language)
         end = span.end - len(_ENDS[span.kind])
-        self._edits.append((match.start(), max(match.start(), end), "\n"))
+        self._edits.append((start, max(start, end), "\n"))
 
     # ---- what sections become ----
 
