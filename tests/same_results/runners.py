@@ -134,8 +134,8 @@ def _cortex_m(target: str, flags: tuple[str, ...], machine: str, share: int = 1)
 RUNNERS = {
     runner.target: runner
     for runner in (
-        # There is no board with a Cortex-M0 and enough memory in QEMU; a Cortex-M3 runs its code.
-        _cortex_m("cortex-m0", ("-mcpu=cortex-m0",), "mps2-an385"),
+        # There is no board with a Cortex-M0 and enough memory in QEMU; a Cortex-M3 runs its code. No port is for it.
+        _cortex_m("cortex-m0", ("-mcpu=cortex-m0",), "mps2-an385", share=3),
         _cortex_m("cortex-m3", ("-mcpu=cortex-m3",), "mps2-an385"),
         _cortex_m("cortex-m4f", ("-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"), "mps2-an386"),
         # As the Cortex-M4F in all but a few instructions.
