@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
+from contextlib import suppress
 
 import pytest
 from fake_device import (
@@ -137,6 +139,36 @@ def test_random_answers_are_errors_of_ours(content: bytes) -> None:
     )
     with pytest.raises((LinkError, DeviceError)):
         services.read_status(bench.session)
+
+
+READERS: dict[str, Callable[[Session], object]] = {
+    "identity": services.read_identity,
+    "stack": services.read_stack,
+    "status": services.read_status,
+    "tasks": services.read_tasks,
+    "info": services.read_application_info,
+    "log": services.read_log,
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+@settings(max_examples=150)
+@given(st.integers(0, 400), st.integers(0, 255), st.integers(-8, 8))
+def test_answers_with_a_changed_byte_are_values_or_errors_of_ours(reader: str, at: int, byte: int, longer: int) -> None:
+    bench = Bench()
+    bench.plc.log = [(n, 10**9, lib.LOG_INFO, "CmpApp", "entry") for n in (1, 2, 7)]
+    bench.plc.tasks = [([0, 1, 20000, 100, 7, 8, 5, 30, 12, 3], "Main")]
+    bench.session.ensure()
+    handler = bench.device.handler
+
+    def changed(message: bytes) -> bytes:
+        answer = bytearray(handler(message))
+        answer[at % len(answer)] ^= byte
+        return bytes(answer[: len(answer) + longer] if longer < 0 else answer + bytes(longer))
+
+    bench.device.handler = changed
+    with suppress(LinkError, DeviceError):
+        READERS[reader](bench.session)
 
 
 # ---- device and application ------------------------------------------------------------------------------------------
@@ -276,6 +308,13 @@ def test_the_log_is_read_to_its_end_in_several_requests() -> None:
     assert [e.handle for e in entries] == list(range(1, 9))
     assert (entries[2].text, entries[2].component, entries[2].time_ns) == ("entry 3", "CmpApp", 3 * 10**9)
     assert [e.handle for e in services.read_log(bench.session, after=6)] == [7, 8]
+
+
+def test_the_log_ends_with_the_last_handle_there_can_be() -> None:
+    bench = Bench()
+    bench.plc.log = [(n, 10**9, lib.LOG_INFO, "CmpApp", "entry") for n in (1, 0xFFFFFFFF)]
+    assert [e.handle for e in services.read_log(bench.session)] == [1, 0xFFFFFFFF]
+    assert services.read_log(bench.session, after=0xFFFFFFFF) == []
 
 
 def test_a_long_answer_of_the_shell_comes_in_parts() -> None:

@@ -483,10 +483,13 @@ def run_shell(session: Session, command: str) -> str:
 # ---- log -------------------------------------------------------------------------------------------------------------
 
 
+_LAST_HANDLE = 0xFFFFFFFF
+
+
 def read_log(session: Session, after: int = 0) -> list[LogEntry]:
     """The entries that the device still has with a handle above `after`, oldest first."""
     entries: list[LogEntry] = []
-    while batch := session.recover(partial(_read_log_batch, session, after + 1)):
+    while after < _LAST_HANDLE and (batch := session.recover(partial(_read_log_batch, session, after + 1))):
         entries += batch
         after = batch[-1].handle
     return entries
