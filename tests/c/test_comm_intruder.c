@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  */
 #include "channel_fixture.h"
+#include "tag_sweep.h"
 
 RTS_STATIC_ASSERT(COMM_ENDPOINTS, built_for_a_network);
 RTS_STATIC_ASSERT(COMM_MAX_CLIENTS == 4, built_for_four_clients);
@@ -224,44 +225,18 @@ static void there_are_no_services_but_those_of_the_documentation(void)
 
 static const RTS_UI16 groups[] = {SG_DEVICE,   SG_APPLICATION, SG_LOG,        SG_SETTINGS,
                                   SG_PLCSHELL, SG_USERMGR,     SG_MONITORING2};
-enum { LAST_TAG = 0x90, LONG_CONTENT = 1000 };
 
-/* One element after another in a container, or none of them: of this tag, and of `size` bytes. */
-static void send_tag(RTS_UI32 group, RTS_UI32 service, RTS_UI32 container, RTS_UI32 tag, RTS_UI32 size)
+static void log_in(void)
 {
-    static RTS_UI8 content[LONG_CONTENT + 32];
-    BTAG_WRITER writer;
-
-    BTagWriterInit(&writer, content, sizeof(content));
-    if (container != 0)
-        BTagOpen(&writer, container, BTAG_ALIGN_0);
-    BTagOpen(&writer, tag, BTAG_ALIGN_0);
-    memset(BTagReserve(&writer, size), 0xFF, size);
-    BTagClose(&writer);
-    if (container != 0)
-        BTagClose(&writer);
-    CHECK(client_request(&client, (RTS_UI16)group, (RTS_UI16)service, content, writer.size, &answer));
+    if (!SrvIsLoggedIn(ChannelGetClient(0)))
+        CHECK(client_login(&client) && client_login_app(&client));
 }
 
 static void every_service_survives_every_tag_of_every_size(void)
 {
-    static const RTS_UI32 containers[] = {0, 0x81, 0x82, 0x83};
-    static const RTS_UI32 sizes[] = {0, 1, 2, 3, 4, 7, 8, 12, 16, 61, 255, LONG_CONTENT};
-
     start();
     for (RTS_UI32 g = 0; g < RTS_COUNT(groups); g++)
-        for (RTS_UI32 service = 1; service < L7_REPLY; service++)
-            for (RTS_UI32 c = 0; c < RTS_COUNT(containers); c++) {
-                send_tag(groups[g], service, containers[c], 0, 0);
-                if (reply_error(&answer) == ERR_L7_UNKNOWNCMD)
-                    break;
-                for (RTS_UI32 tag = 0; tag <= LAST_TAG; tag++)
-                    for (RTS_UI32 s = 0; s < RTS_COUNT(sizes); s++) {
-                        if (!SrvIsLoggedIn(ChannelGetClient(0)))
-                            CHECK(client_login(&client) && client_login_app(&client));
-                        send_tag(groups[g], service, containers[c], tag, sizes[s]);
-                    }
-            }
+        (void)sweep_tags(&client, groups[g], log_in);
     CHECK(client_login(&client) && client_login_app(&client) && is_served(&client));
 }
 

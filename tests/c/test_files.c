@@ -6,6 +6,7 @@
 #include "SysFileFlash.h"
 #include "app_image.h"
 #include "files_client.h"
+#include "tag_sweep.h"
 #include "test.h"
 
 enum { SECTOR = 1024, STORE = 16 * SECTOR, MOST = 14 * SECTOR };
@@ -334,6 +335,21 @@ static void story(void *unused)
         story_result = ask_named(SRV_FILE_DELETE, "b", 1, 0);
 }
 
+static void stay(void)
+{
+    /* No service of these groups ends the login. */
+}
+
+static void every_service_survives_every_tag_of_every_size(void)
+{
+    setup();
+    CHECK_EQUAL(put("a.bin", pattern, 100), ERR_OK);
+    CHECK(sweep_tags(&client, SG_FILE_TRANSFER, stay) >= 8);
+    CHECK(sweep_tags(&client, SG_IOMGR, stay) >= 1);
+    CHECK(reconnect());
+    CHECK(has("a.bin", pattern, 100));
+}
+
 static void a_power_cut_leaves_the_previous_file_or_the_new_one(void)
 {
     for (RTS_UI32 mode = 0; mode < 3; mode++) {
@@ -378,6 +394,7 @@ int main(void)
     RUN(the_program_and_the_log_are_files);
     RUN(a_device_without_store_has_the_program_and_the_log);
     RUN(a_catalog_of_garbage_is_an_empty_store);
+    RUN(every_service_survives_every_tag_of_every_size);
     RUN(a_power_cut_leaves_the_previous_file_or_the_new_one);
     return test_result();
 }
