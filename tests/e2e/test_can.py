@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import random
+import re
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -103,6 +106,32 @@ def test_ctrl_c_during_the_flash_of_several_says_what_each_has_now(
         f"plctool: Interrupted. Node 1 has still the previous program (CRC {crc}), state: run. "
         "Node mixer has no program.\n"
     )
+
+
+def test_each_of_several_downloads_has_a_progress_bar(hub: CanHub, tool: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    program = "PROGRAM Main VAR a : ARRAY[0..2999] OF DINT := [3000(9)]; END_VAR a[0] := a[1]; END_PROGRAM"
+    shown = Terminal()
+    monkeypatch.setattr(sys, "stderr", shown)
+    monkeypatch.setenv("TERM", "xterm")
+    assert main(["flash", *options_of(hub, 0, "1,mixer"), str(tool.build("bars", program))]) == 0
+    drawn = re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", shown.getvalue())
+    assert set(re.findall(r"(\w+) +━+ +\d+/\d+ bytes", drawn)) == {"1", "mixer"}
+
+
+def test_buses_with_other_identifiers_do_not_hear_each_other(tmp_path: Path, tool: Any, counter: Path) -> None:
+    with CanHub(3) as hub, ExitStack() as stack:
+        for name, base in (("usual", "0x1F400000"), ("other", "0x10050000")):
+            options = ("--can", f"slcan:{hub.paths[1 + (name == 'other')]}", "--node", "5", "--name", name)
+            stack.enter_context(Plcrt(tmp_path / f"{name}.flash", *options, "--can-base", base))
+        for name, words in (("usual", []), ("other", ["--can-base", "0x10050000"])):
+            line = ["--can", f"slcan:{hub.paths[0]}", *words]
+            assert [d["node_name"] for d in tool.ok("scan", *line)["devices"]] == [name]
+            assert tool.ok("flash", *line, "--node", "5", str(counter))["state"] == "run"
+            assert tool.ok("status", *line, "--node", name)["state"] == "run"
 
 
 def test_one_tool_flashes_while_another_one_watches(hub: CanHub, tool: Any, counter: Path) -> None:

@@ -23,7 +23,7 @@ PROGRAM M WITH Slow : Main; PROGRAM O WITH Fast : Often; PROGRAM W WITH Event : 
 END_RESOURCE END_CONFIGURATION
 """
 COUNTS = ["M.count", "O.count", "W.count"]
-RESULT_OK, NO_RIGHT, RUNS, NOT_LOADED = 0, 0x19, 0x37, 0x504
+RESULT_OK, NOT_SUPPORTED, NO_RIGHT, RUNS, NOT_LOADED = 0, 0x18, 0x19, 0x37, 0x504
 
 
 @pytest.fixture
@@ -126,6 +126,14 @@ def test_settings_are_refused_for_want_of_a_right(client):
     limit = client.tag(0x81, client.tag(0x10, b"CmpChannelServer\0") + client.tag(0x11, b"MaxChannels\0"))
     for service in range(1, 8):
         assert u16(find(client.call(6, service, limit), 0xFF7F)) == NO_RIGHT
+
+
+def test_the_operation_mode_is_debug_and_stays_so(client):
+    def put(mode: int) -> int:
+        return u16(find(client.call(1, 6, client.tag(0x54, struct.pack("<I", mode))), 1))
+
+    assert (put(1), put(2), put(0)) == (RESULT_OK, NOT_SUPPORTED, NOT_SUPPORTED)
+    assert struct.unpack("<I", find(client.call(1, 7), 0x54)) == (1,)
 
 
 def test_the_shell_knows_the_words_of_published_clients(client, values):
