@@ -14,7 +14,6 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <sys/time.h>
 #include <unistd.h>
 
 enum { FILTERS = 8 };
@@ -124,10 +123,7 @@ static void take_error(const struct canfd_frame *in, CAN_STATE *state)
 static void take_frame(const struct canfd_frame *in, bool fd, CAN_FRAME *frame)
 {
     bool extended = (in->can_id & CAN_EFF_FLAG) != 0;
-    struct timeval now;
-    gettimeofday(&now, NULL);
     frame->id = in->can_id & (extended ? CAN_EFF_MASK : CAN_SFF_MASK);
-    frame->time_us = (RTS_UI32)((RTS_UI64)now.tv_sec * 1000000 + (RTS_UI64)now.tv_usec);
     frame->flags = extended ? CAN_FLAG_EXTENDED : 0;
     frame->flags |= (in->can_id & CAN_RTR_FLAG) != 0 ? CAN_FLAG_REMOTE : 0;
     frame->flags |= fd ? CAN_FLAG_FD : 0;

@@ -336,12 +336,12 @@ RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)
     if (!ready(index)) {
         return ERR_NOTHING_TO_DO;
     }
+    RTS_RESULT result =
+        can.is_slcan ? SlcanReceive(&can.slcan, frame) : CanSocketReceive(can.line.file, frame, &can.state);
+    frame->time_us = (RTS_UI32)(SysTimeGetNs() / 1000);
     if (can.is_slcan) {
-        RTS_RESULT result = SlcanReceive(&can.slcan, frame);
-        frame->time_us = (RTS_UI32)(SysTimeGetNs() / 1000);
         return result;
     }
-    RTS_RESULT result = CanSocketReceive(can.line.file, frame, &can.state);
     if (result == ERR_DEVICE) {
         can.state.bus = CAN_BUS_STOPPED;
         return ERR_NOTHING_TO_DO;
