@@ -1,5 +1,5 @@
-"""What each link carries, with the same client and program: how long a read takes, variables per second as 'watch'
-reads them, and how fast an image arrives."""
+"""What each link carries, with the same client and program: how long a read takes, variables per second with 'watch',
+and how fast an image arrives. Of a network also the share of the image in all that is sent for it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from plctool.compiler import compile_sources
 from plctool.device import Plc
@@ -16,11 +17,14 @@ from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
 from plctool.link.transport import BlockTransport
 from plctool.link.transports import open_transport, parse_link
+from plctool.link.wire import Layout
 from plctool.testing.can_hub import CanHub
 from plctool.testing.line import SerialLine
 from plctool.testing.plcrt import Plcrt
 
 BAUD = 115200
+NETWORKS = ("UDP", "TCP")  # what IP adds is not counted
+PACKET_HEADERS = 12 + Layout("CHANNEL_DATA").size  # of the router with both addresses, of a block
 SECONDS = 1.0  # for each figure
 WATCHED = 100  # variables
 _VALUES = ", ".join(str(i * i % 65521) for i in range(5000))
@@ -33,11 +37,32 @@ END_PROGRAM
 
 @dataclass(frozen=True)
 class Figures:
-    """Median of a read [s], variables per second, bytes of an image per second."""
+    """Median of a read [s], variables per second, bytes of an image per second, and per byte sent."""
 
     read: float
     variables: float
     image: float
+    share: float
+
+
+class Counted:
+    """A transport that counts what is sent: packets and what the line carries besides them."""
+
+    def __init__(self, transport: BlockTransport) -> None:
+        self._transport = transport
+        self.sent = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
+
+    def send(self, *packets: bytes) -> None:
+        self.sent += sum(len(packet) + self._transport.packet_overhead for packet in packets)
+        self._transport.send(*packets)
+
+    @property
+    def best_share(self) -> float:
+        """Of data in packets of the longest kind."""
+        return (self.max_packet - PACKET_HEADERS) / (self.max_packet + self.packet_overhead)
 
 
 @contextmanager
@@ -60,13 +85,12 @@ def _links(folder: Path) -> Iterator[dict[str, BlockTransport]]:
         }
 
 
-def _figures(plc: Plc, image: Path) -> Figures:
-    begin = time.perf_counter()
+def _figures(plc: Plc, line: Counted, image: Path) -> Figures:
+    plc.identity()
+    sent, begin = line.sent, time.perf_counter()
     size = plc.flash(image).bytes
-    arrived = time.perf_counter() - begin
-    names = [f"Main.v{i}" for i in range(WATCHED)]
-    plc.read_all(names)
-    return Figures(_median_read(plc), WATCHED / _mean_seconds(plc, names), size / arrived)
+    arrived, share = time.perf_counter() - begin, size / (line.sent - sent)
+    return Figures(_median_read(plc), WATCHED / _mean_seconds(plc), size / arrived, share)
 
 
 def _median_read(plc: Plc) -> float:
@@ -77,13 +101,14 @@ def _median_read(plc: Plc) -> float:
     return sorted(times)[len(times) // 2]
 
 
-def _mean_seconds(plc: Plc, names: list[str]) -> float:
-    """Of reading all of them."""
-    reads, begin = 0, time.perf_counter()
-    while (now := time.perf_counter()) < begin + SECONDS or not reads:
-        plc.read_all(names)
-        reads += 1
-    return (now - begin) / max(reads, 1)
+def _mean_seconds(plc: Plc) -> float:
+    """From one reading of all variables to the next while they are watched."""
+    names = [f"Main.v{i}" for i in range(WATCHED)]
+    at = 0.0
+    for readings, (at, _) in enumerate(plc.watch(names, interval=0.0)):
+        if at >= SECONDS:
+            return at / readings
+    return at
 
 
 def main() -> None:
@@ -96,11 +121,15 @@ def main() -> None:
         print(f"\nEach link on this machine: a read, {WATCHED} variables watched, an image of {size} bytes")
         with _links(folder) as links:
             for what, transport in links.items():
-                with Plc(Connection(transport), image.with_suffix(".sym")) as plc:
-                    found = _figures(plc, image)
+                line = Counted(transport)
+                with Plc(Connection(line), image.with_suffix(".sym")) as plc:
+                    found = _figures(plc, line, image)
+                share = (
+                    f", {found.share:.1%} of what is sent ({line.best_share:.1%} at best)" if what in NETWORKS else ""
+                )
                 print(
                     f"  {what:<52}{1e3 * found.read:>11.2f} ms  {found.variables:,.0f} variables/s, "
-                    f"to running with {found.image / 1e3:,.1f} kB/s",
+                    f"to running with {found.image / 1e3:,.1f} kB/s{share}",
                     flush=True,
                 )
 
