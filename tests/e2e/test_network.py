@@ -46,6 +46,20 @@ def plcrt(tmp_path: Path) -> Iterator[Plcrt]:
         yield running
 
 
+def test_it_listens_on_the_loopback_address_unless_told_otherwise(plcrt: Plcrt, tmp_path: Path) -> None:
+    assert _listens_on(plcrt.tcp) == {"127.0.0.1"}
+    with Plcrt(tmp_path / "open.flash", "--tcp", "0.0.0.0:0") as told:
+        assert _listens_on(told.tcp) == {"0.0.0.0"}
+
+
+def _listens_on(place: str) -> set[str]:
+    """The addresses whose port, that of `place`, the kernel has in the state LISTEN."""
+    port = int(place.rpartition(":")[2])
+    rows = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
+    places = [row[1].split(":") for row in rows if row[3] == "0A"]
+    return {socket.inet_ntoa(bytes.fromhex(host)[::-1]) for host, number in places if int(number, 16) == port}
+
+
 def link_of(plcrt: Plcrt, kind: str) -> str:
     place = {"serial": plcrt.port, "tcp": plcrt.tcp, "udp": plcrt.udp, "can": f"slcan:{plcrt.can}"}[kind]
     return f"{kind}:{place}"
