@@ -123,6 +123,31 @@ static void other_units_and_broadcasts_get_no_reply(void)
     CHECK(works());
 }
 
+static void two_masters_are_both_served_and_disturb_only_each_other(void)
+{
+    static const RTS_UI8 to_another[] = {8, 16, 0, 1, 0, 1, 2, 0x12, 0x34};
+    static const RTS_UI8 its_reply[] = {8, 16, 0, 1, 0, 1};
+    static const RTS_UI8 ours[] = {7, 6, 0, 1, 0x12, 0x34};
+
+    begin();
+    for (RTS_UI32 i = 0; i < 10; i++) {
+        RTS_UI32 bad = link.bad_frames;
+
+        line_send_frame(to_another, sizeof(to_another));
+        run_ms(100);
+        line_send_frame(its_reply, sizeof(its_reply));
+        run_ms(100);
+        CHECK(reply_size == 0 && registers[2] == 0 && link.bad_frames == bad);
+        CHECK(works());
+        line_send(ours, sizeof(ours)); /* both at a time: the bytes of one frame within those of the other */
+        line_send_frame(its_reply, sizeof(its_reply));
+        run_ms(100);
+        CHECK(reply_size == 0 && registers[2] == 0);
+        CHECK_EQUAL(link.bad_frames, bad + 1);
+        CHECK(works());
+    }
+}
+
 static void a_wrong_crc_gets_no_reply(void)
 {
     static const RTS_UI8 bad[] = {7, 6, 0, 1, 0x12, 0x34, 0, 0};
@@ -269,6 +294,7 @@ int main(void)
     RUN(a_request_is_replied_to_after_silence);
     RUN(silence_is_shorter_at_higher_speeds_down_to_a_limit);
     RUN(other_units_and_broadcasts_get_no_reply);
+    RUN(two_masters_are_both_served_and_disturb_only_each_other);
     RUN(a_wrong_crc_gets_no_reply);
     RUN(half_a_frame_is_forgotten_after_silence);
     RUN(a_frame_that_is_too_long_is_forgotten);
