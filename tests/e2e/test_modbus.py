@@ -8,7 +8,9 @@ import shutil
 import socket
 import struct
 import subprocess
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -257,12 +259,27 @@ def test_identification_is_that_of_the_description(plant: Plant) -> None:
 
 
 def test_real_is_never_torn(plant: Plant) -> None:
-    """A client writes and reads a REAL as a whole while the program uses it."""
-    with plant.tcp() as client:
-        for value in (1.0, -1.0) * 100:
-            assert not client.write_registers(1, words(value)).isError()
-            assert client.read_holding_registers(1, count=2).registers == words(value)
-            assert plant.plc.read("Main.ratio") in (1.0, -1.0, 2.5)
+    """One client writes a REAL whose registers both change; another one and the program see one of both values."""
+    both = [struct.unpack(">f", bytes.fromhex(bits))[0] for bits in ("3FAA5555", "C055AAAA")]
+    done = threading.Event()
+
+    def write() -> None:
+        with plant.tcp() as writer:
+            while not done.is_set():
+                for value in both:
+                    assert not writer.write_registers(1, words(value)).isError()
+
+    with plant.tcp() as client, ThreadPoolExecutor() as threads:
+        assert not client.write_registers(1, words(both[0])).isError()
+        eventually(lambda: words(plant.plc.read("Main.ratio")) == words(both[0]))
+        writing = threads.submit(write)
+        try:
+            seen = [tuple(client.read_holding_registers(1, count=2).registers) for _ in range(500)]
+            used = [tuple(words(plant.plc.read("Main.ratio"))) for _ in range(200)]
+        finally:
+            done.set()
+        writing.result()
+    assert set(seen + used) == {tuple(words(value)) for value in both}
 
 
 def test_one_client_more_than_there_is_room_for_replaces_the_idlest(plant: Plant) -> None:
