@@ -8,7 +8,7 @@ import random
 import re
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,37 @@ def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CanHub]:
             options = ("--can", f"slcan:{path}", "--node", str(number), "--name", name)
             stack.enter_context(Plcrt(folder / f"{name}.flash", *options))
         yield hub
+
+
+class _Fixed(random.Random):
+    """Chooses the same address first, then others."""
+
+    def __init__(self, first: int) -> None:
+        super().__init__()
+        self.first: int | None = first
+
+    def randint(self, a: int, b: int) -> int:
+        first, self.first = self.first, None
+        return super().randint(a, b) if first is None else first
+
+
+TransportOf = Callable[..., CanTransport]
+
+
+@pytest.fixture
+def transport_of(hub: CanHub) -> Iterator[TransportOf]:
+    """Makes a transport of a tool to a device: `first`, the address it tries first, and how long it listens then [s]."""
+    with ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
+
+        def make(tool: int, node: int, first: int | None = None, claim: float = 0.08) -> CanTransport:
+            patch.setattr("plctool.link.canbus._CLAIM_TIME", claim)
+            bus = PythonCanBus(open_bus(f"slcan:{hub.paths[tool]}", 500000, 0))
+            transport = CanTransport("hub", bus, node, random_source=None if first is None else _Fixed(first))
+            stack.callback(transport.close)
+            patch.undo()
+            return transport
+
+        yield make
 
 
 def link_of(hub: CanHub, tool: int, node: int | str | None = None) -> str:
@@ -134,7 +165,9 @@ def test_buses_with_other_identifiers_do_not_hear_each_other(tmp_path: Path, too
             assert tool.ok("status", *line, "--node", name)["state"] == "run"
 
 
-def test_one_tool_flashes_while_another_one_watches(hub: CanHub, tool: Any, counter: Path) -> None:
+def test_one_tool_flashes_while_another_one_watches(
+    hub: CanHub, transport_of: TransportOf, tool: Any, counter: Path
+) -> None:
     """And a third one talks to a third device: three conversations on one bus."""
     big = tool.build(
         "big", "PROGRAM Main VAR a : ARRAY[0..2999] OF DINT := [3000(7)]; END_VAR a[0] := a[0] + 1; END_PROGRAM"
@@ -155,12 +188,11 @@ def test_one_tool_flashes_while_another_one_watches(hub: CanHub, tool: Any, coun
             errors.append(error)
 
     def talk() -> None:
-        session = Session(Connection(transport_of(hub, 2, 77)))
+        session = Session(Connection(transport_of(2, 77)))
         data = random.Random(1).randbytes(3000)
         while not flashed.is_set():
             if services.echo(session, data) != data:
                 errors.append(PlcError("the echo is another one", "echo"))
-        session.connection.close()
 
     with plctool.connect(link_of(hub, 0, "mixer")) as plc:
         plc.flash(counter)
@@ -179,27 +211,9 @@ def test_one_tool_flashes_while_another_one_watches(hub: CanHub, tool: Any, coun
     assert len(set(readings)) > 1
 
 
-class _Fixed(random.Random):
-    """Chooses the same address first, then others."""
-
-    def __init__(self, first: int) -> None:
-        super().__init__()
-        self.first: int | None = first
-
-    def randint(self, a: int, b: int) -> int:
-        first, self.first = self.first, None
-        return super().randint(a, b) if first is None else first
-
-
-def transport_of(hub: CanHub, tool: int, node: int, first: int | None = None) -> CanTransport:
-    """A transport of a tool to a device. `first`: the address it tries first."""
-    bus = PythonCanBus(open_bus(f"slcan:{hub.paths[tool]}", 500000, 0))
-    return CanTransport("hub", bus, node, random_source=None if first is None else _Fixed(first))
-
-
-def test_two_tools_never_have_one_address(hub: CanHub) -> None:
+def test_two_tools_never_have_one_address(transport_of: TransportOf) -> None:
     """The second one finds the address taken and takes another one; the first one goes on."""
-    first = transport_of(hub, 0, 1, first=200)
+    first = transport_of(0, 1, first=200, claim=0.0)
     session = Session(Connection(first, Choice("1")))
     assert services.echo(session, b"hello") == b"hello"
     done = threading.Event()
@@ -210,28 +224,24 @@ def test_two_tools_never_have_one_address(hub: CanHub) -> None:
 
     thread = threading.Thread(target=go_on)
     thread.start()
-    second = transport_of(hub, 1, 1, first=200)
-    done.set()
-    thread.join()
+    try:
+        second = transport_of(1, 1, first=200, claim=1.0)  # on a busy machine the first one replies late
+    finally:
+        done.set()
+        thread.join()
     assert first.local_address == b"\x00\xc8"
     assert second.local_address != b"\x00\xc8"
-    first.close()
-    second.close()
 
 
-def test_a_collision_that_was_missed_is_noticed_and_mended(hub: CanHub) -> None:
-    first = transport_of(hub, 0, 1, first=201)
+def test_a_collision_that_was_missed_is_noticed_and_mended(transport_of: TransportOf) -> None:
+    first = transport_of(0, 1, first=201, claim=0.0)
     session = Session(Connection(first, Choice("1")))
     assert services.echo(session, b"hello") == b"hello"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("plctool.link.canbus._CLAIM_TIME", 0.0)  # it does not listen before it begins
-        second = transport_of(hub, 1, 2, first=201)
+    second = transport_of(1, 2, first=201, claim=0.0)  # it does not listen before it begins
     other = Session(Connection(second, Choice("2")))
     assert other.recover(lambda: services.echo(other, b"hello")) == b"hello"
     assert session.recover(lambda: services.echo(session, b"hello")) == b"hello"
     assert first.local_address != second.local_address
-    first.close()
-    second.close()
 
 
 def test_an_adapter_belongs_to_one_tool(hub: CanHub, tool: Any) -> None:
