@@ -57,7 +57,7 @@ TransportOf = Callable[..., CanTransport]
 
 @pytest.fixture
 def transport_of(hub: CanHub) -> Iterator[TransportOf]:
-    """Makes a transport of a tool to a device: `first`, the address it tries first, and how long it listens then [s]."""
+    """Makes a transport of a tool to a device. `first`: its first address; `claim`: how long it listens then [s]."""
     with ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
 
         def make(tool: int, node: int, first: int | None = None, claim: float = 0.08) -> CanTransport:
