@@ -102,6 +102,16 @@ static inline bool ModbusClientIsAsking(const MODBUS_CALL *call)
 
 void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns);
 
+/* When the client has to be polled next if nothing arrives before, INT64_MAX: not at all. One that waits for its link:
+ * now. For ports that need not poll all the time. */
+RTS_I64 ModbusClientGetDueNs(const MODBUS_CLIENT *client, RTS_I64 now_ns);
+
+/* Bytes of a group that a job has in reverse order; 0: none are. */
+static inline RTS_UI32 ModbusJobGetReverse(const MODBUS_JOB *job, const MODBUS_FUNCTION *function)
+{
+    return function->count_of_bits == 1 ? 0 : job->flags >> MODBUS_JOB_REVERSE_SHIFT & 14;
+}
+
 /* Whether the device replies. */
 bool ModbusDeviceIsLost(const MODBUS_DEVICE *device);
 /* Whether it replies, and all its jobs were good. */

@@ -22,6 +22,7 @@ from plctool.debug.variables import Change, Symbol, unreachable
 from plctool.errors import DeviceError, UsageError
 from plctool.files import read_image
 from plctool.iec.areas import Area
+from plctool.iec.types import Type
 from plctool.image.file import image_crc, parse_image
 from plctool.image.targets import host_target
 from plctool.link import l7
@@ -29,7 +30,7 @@ from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
 from plctool.link.session import no_application
 from plctool.sim_functions import SimFunctions
-from plctool.sim_io import SimIo, is_input, set_fault, set_modbus
+from plctool.sim_io import SimIo, is_input, read_parameter, set_fault, set_modbus
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
@@ -250,8 +251,13 @@ class Simulator(Controller):
         return self.io.value(name)
 
     def fault(self, device: str, fault: str, value: int = 1) -> None:
-        """Makes a device fail: "absent", "late" (ms), "type", "answers" (how many are bad); 0 ends it."""
+        """Makes a device fail: "absent", "late" (ms), "type", "answers" (how many are bad); 0 ends it. A line of Modbus
+        can only be "absent", which is that it is pulled."""
         set_fault(self._core, device, fault, value)
+
+    def io_read_parameter(self, device: str, number: int, t: Type) -> Any:
+        """The value of a parameter of a device or line, as the driver has it. Raises DeviceError."""
+        return read_parameter(self._core, device, number, t)
 
     def set_modbus(self, device: str, reference: int, value: int) -> None:
         """What a Modbus device replies to MODBUS_READ: `reference` as manuals have it, such as 40001 for the first
@@ -266,6 +272,10 @@ class Simulator(Controller):
         if every <= 0:
             raise UsageError("A plant needs a step of more than 0 ms.", "time")
         self._plants.append(_Plant(step, every, self.now_ns + every))
+
+    def at(self, after_ms: float, step: Callable[[Simulator], None]) -> None:
+        """`step(plc)` is called once, when so much virtual time has passed."""
+        self._plants.append(_Plant(step, 2 * MAX_NS, self.now_ns + round(after_ms * 1e6)))
 
     def _step_plants(self) -> None:
         """Calls the plants whose time has come."""

@@ -16,7 +16,7 @@ from plctool.debug.variables import Symbol
 from plctool.errors import DeviceError, UsageError, did_you_mean
 from plctool.iec.addresses import parse_address
 from plctool.iec.areas import Area
-from plctool.iec.types import BOOL, base_of
+from plctool.iec.types import BOOL, Type, base_of
 from plctool.iec.values import decode, encode
 
 FAULTS = {
@@ -25,8 +25,9 @@ FAULTS = {
     "type": int(lib.IO_SIM_TYPE),
     "answers": int(lib.IO_SIM_ANSWERS),
 }
-"""Faults of a device. absent: 1, it is not there; late: its data is as old as this [ms]; type: 1, it is another device
-than the description says; answers: so many next answers are bad."""
+"""Faults of a device. absent: 1, it is not there; late: its data is as old as this [ms], on Modbus it replies so much
+later; type: 1, it is another device than the description says; answers: so many next answers are bad, on Modbus with a
+wrong CRC, on TCP without their end."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +57,15 @@ class SimChannel:
         """What the device has now."""
         ffi = self.core.ffi
         data = ffi.new("RTS_UI8[]", -(-self.bits // 8))
-        _check(self.core.lib.SimIoRead(self.device.encode(), self.parameter, self.bit, self.bits, data), self.title)
+        _check(self.core.lib.SimIoRead(self.device.encode(), self._place(), data), self.title)
         return self._ordered(bytes(ffi.buffer(data)))
 
     def write(self, data: bytes) -> None:
         """What the device measures from now on."""
-        ordered = self._ordered(data)
-        _check(self.core.lib.SimIoWrite(self.device.encode(), self.parameter, self.bit, self.bits, ordered), self.title)
+        _check(self.core.lib.SimIoWrite(self.device.encode(), self._place(), self._ordered(data)), self.title)
+
+    def _place(self) -> Any:
+        return self.core.ffi.new("SIM_IO_PLACE *", (self.parameter, self.bit, self.bits, self.output))
 
     def _ordered(self, data: bytes) -> bytes:
         return data[::-1] if self.big_endian else data
@@ -125,7 +128,17 @@ def set_fault(core: Core, device: str, fault: str, value: int) -> None:
     """Makes a simulated device fail (FAULTS), or with 0 work again."""
     if fault not in FAULTS:
         raise UsageError(f"There is no fault '{fault}'; choose one of {', '.join(FAULTS)}.", "bad-fault")
-    _check(core.lib.SimIoFault(device.encode("ascii", "replace"), FAULTS[fault], value), device)
+    if core.lib.SimIoFault(device.encode("ascii", "replace"), FAULTS[fault], value) != lib.ERR_OK:
+        hint = "'plctool io map' lists the devices, and a line can only be absent"
+        raise UsageError(f"There is no simulated device {device} that can be '{fault}'; {hint}.", "no-device")
+
+
+def read_parameter(core: Core, device: str, number: int, t: Type) -> Any:
+    """A parameter of a device or line. Raises DeviceError."""
+    data = core.ffi.new("RTS_UI8[]", t.size)
+    place = core.ffi.new("SIM_IO_PLACE *", (number, 0, 8 * t.size, False))
+    _check(core.lib.SimIoRead(device.encode("ascii", "replace"), place, data), f"{device} with parameter {number}")
+    return decode(t, bytes(core.ffi.buffer(data)))
 
 
 def set_modbus(core: Core, device: str, reference: int, value: int) -> None:

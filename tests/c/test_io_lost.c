@@ -41,7 +41,7 @@ static void begin_meter(void)
         map->value = 0xEE;
     }
     start_io();
-    CHECK_EQUAL(SimIoWrite("Meter", INPUTS, 0, 24, (const RTS_UI8 *)"\x11\x22\x33"), ERR_OK);
+    CHECK_EQUAL(SimIoWrite("Meter", &(SIM_IO_PLACE){INPUTS, 0, 24, false}, (const RTS_UI8 *)"\x11\x22\x33"), ERR_OK);
     CHECK_EQUAL(SimAdvance(0), ERR_OK);
     CHECK_EQUAL(inputs(), 0x332211);
 }
@@ -113,7 +113,7 @@ static void data_of_a_late_device_is_old(void)
 {
     begin_meter();
     CHECK_EQUAL(SimIoFault("Meter", IO_SIM_LATE, 200), ERR_OK);
-    CHECK_EQUAL(SimIoWrite("Meter", INPUTS, 0, 8, (const RTS_UI8 *)"\x44"), ERR_OK);
+    CHECK_EQUAL(SimIoWrite("Meter", &(SIM_IO_PLACE){INPUTS, 0, 8, false}, (const RTS_UI8 *)"\x44"), ERR_OK);
     CHECK_EQUAL(SimAdvance(ms(150)), ERR_OK);
     CHECK_EQUAL(inputs(), 0x332211);
     CHECK_EQUAL(state().ok, 1);
@@ -157,11 +157,11 @@ static void nothing_is_written_beyond_a_simulated_device(void)
     RTS_UI8 data[8] = {0};
 
     begin_meter();
-    CHECK_EQUAL(SimIoWrite("Meter", INPUTS, 0, 25, data), ERR_OUT_OF_LIMITS);
-    CHECK_EQUAL(SimIoWrite("Meter", INPUTS, 0xFFFFFFFF, 2, data), ERR_OUT_OF_LIMITS);
-    CHECK_EQUAL(SimIoRead("Meter", INPUTS + 1, 0, 8, data), ERR_NO_OBJECT);
-    CHECK_EQUAL(SimIoRead("Valve", INPUTS, 0, 8, data), ERR_NO_OBJECT);
-    CHECK_EQUAL(SimIoRead("Meter", INPUTS, 4, 8, data), ERR_OK);
+    CHECK_EQUAL(SimIoWrite("Meter", &(SIM_IO_PLACE){INPUTS, 0, 25, false}, data), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(SimIoWrite("Meter", &(SIM_IO_PLACE){INPUTS, 0xFFFFFFFF, 2, false}, data), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(SimIoRead("Meter", &(SIM_IO_PLACE){INPUTS + 1, 0, 8, false}, data), ERR_NO_OBJECT);
+    CHECK_EQUAL(SimIoRead("Valve", &(SIM_IO_PLACE){INPUTS, 0, 8, false}, data), ERR_NO_OBJECT);
+    CHECK_EQUAL(SimIoRead("Meter", &(SIM_IO_PLACE){INPUTS, 4, 8, false}, data), ERR_OK);
     CHECK_EQUAL(data[0], 0x21);
 }
 

@@ -149,8 +149,15 @@ def test_what_cannot_be_asked_is_an_error_at_once(plc: Simulator, inputs: dict[s
 def test_an_absent_device_does_not_reply(plc: Simulator) -> None:
     plc.set_modbus("Meter", 40001, 1)
     plc.fault("Meter", "absent")
-    assert ask(plc, "read", count=1) == (False, 0x104)
+    plc.write({"Main.count": 1})
+    plc.write({"Main.get": True})
+    plc.run_for(900)
+    assert plc.read("Main.read.Busy") is True, "the time-out is a second"
+    plc.run_for(200)
+    assert plc.read("Main.read.ErrorID") == 0x104
+    plc.write({"Main.get": False})
     plc.fault("Meter", "absent", 0)
+    plc.run_for(20)
     assert ask(plc, "read", count=1) == (True, 0)
 
 
@@ -160,7 +167,7 @@ def test_more_requests_than_there_is_room_for_are_an_error(plc: Simulator) -> No
     plc.run_cycles(1)
     errors = [plc.read(f"Main.spare[{i}].ErrorID") for i in range(1, 21)]
     assert errors == [0] * 16 + [0x103] * 4
-    plc.run_for(100)
+    plc.run_for(500)  # one after the other
     assert [plc.read(f"Main.spare[{i}].Done") for i in range(1, 21)] == [True] * 16 + [False] * 4
     assert ask(plc, "read", count=1) == (True, 0), "they gave back their room"
 

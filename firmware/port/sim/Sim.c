@@ -28,6 +28,8 @@
 /* How often background work runs: often while tasks run in it, else only for what watches the clock. */
 #define COMM_BUSY_NS (10 * (RTS_I64)NS_PER_MS)
 #define COMM_IDLE_NS (1000 * (RTS_I64)NS_PER_MS)
+/* Nor does main of a controller come back sooner. */
+#define COMM_PAUSE_NS ((RTS_I64)NS_PER_MS / 4)
 #define RUN_LIMIT_NS (3600 * 1000 * (RTS_I64)NS_PER_MS)
 
 enum { MAX_TIMERS = APP_MAX_TASKS + 4 };
@@ -49,6 +51,7 @@ static struct {
     jmp_buf jump;
     RTS_I64 now_ns;
     RTS_I64 next_comm_ns;
+    RTS_I64 last_comm_ns;
     RTS_I64 group_ns; /* when the timers that run now were due; NEVER when none run */
     bool real_clock;  /* reading the clock costs what it costs on Linux */
     TIMER timer[MAX_TIMERS];
@@ -130,6 +133,7 @@ RTS_RESULT SimStart(void)
     sim.power_lost = false;
     sim.now_ns = 0;
     sim.next_comm_ns = 0;
+    sim.last_comm_ns = -COMM_PAUSE_NS;
     sim.group_ns = NEVER;
     forget_timers();
     SimComPowerOn();
@@ -193,13 +197,7 @@ RTS_UI32 SysTimeGetMs(void)
     return (RTS_UI32)(sim.now_ns / NS_PER_MS);
 }
 
-/* Tasks run one after the other here, but for tests that have threads of their own. */
-void SimWantPass(RTS_I64 in_ns)
-{
-    if (sim.next_comm_ns > sim.now_ns + in_ns)
-        sim.next_comm_ns = sim.now_ns + in_ns;
-}
-
+/* SimBus says when passes are due. */
 void SysTimeWantPass(RTS_UI32 ms)
 {
     RTS_UNUSED(ms);
@@ -361,10 +359,25 @@ static void run_timer(TIMER *timer)
 
 /* ---- the passing of time ---- */
 
+const SIM_BUS *SimBus;
+
+/* The next pass is when a bus needs it. */
+static void serve_bus(void)
+{
+    RTS_I64 due_ns = SimBus != NULL ? SimBus->due_ns(sim.now_ns) : NEVER;
+
+    if (due_ns < sim.last_comm_ns + COMM_PAUSE_NS)
+        due_ns = sim.last_comm_ns + COMM_PAUSE_NS;
+    if (due_ns < sim.next_comm_ns)
+        sim.next_comm_ns = due_ns;
+}
+
 static void run_comm_cycle(void)
 {
+    sim.last_comm_ns = sim.now_ns;
     sim.next_comm_ns = sim.now_ns + (SchedHasBackgroundTasks() ? COMM_BUSY_NS : COMM_IDLE_NS);
     (void)CMCallHook(CH_COMM_CYCLE);
+    serve_bus();
 }
 
 /* Runs all timers that are due at the same time as `timer`, and the tasks that follow them. */
@@ -378,6 +391,7 @@ static void run_group(TIMER *timer)
     sim.group_ns = NEVER;
     if (SchedHasBackgroundTasks())
         SchedBackgroundCycle();
+    serve_bus();
 }
 
 /* Does what comes next and is due before `end_ns`; false when nothing is. */
@@ -408,6 +422,7 @@ static RTS_RESULT advance(void *arg)
     const PASSAGE *passage = arg;
 
     SchedNoteEvents(); /* of variables that were written before */
+    serve_bus();       /* of outputs that a stop has set */
     while (run_next(passage->limit_ns))
         ;
     if (sim.now_ns < passage->end_ns)
@@ -469,6 +484,7 @@ static RTS_RESULT run_cycles(void *arg)
     RTS_RESULT result = running_state();
 
     SchedNoteEvents();
+    serve_bus();
     while (result == ERR_OK && done < cycles) {
         if (!run_next(end_ns))
             return ERR_TIMEOUT;

@@ -159,14 +159,22 @@ const char *SimFlashViolation(void);
 
 /* ---- inputs and outputs ---- */
 
+/* Where a channel is: `bits` of a parameter, from bit `bit` on. */
+typedef struct {
+    RTS_UI32 parameter;
+    RTS_UI32 bit;
+    RTS_UI32 bits;
+    bool is_output; /* as the channel of the program is: a parameter may have both */
+} SIM_IO_PLACE;
+
 /*
- * The devices of the loaded application are simulated (IoDrvSim.h), whatever drivers their description names; each is
- * known by the name of its connector. Write sets `bits` of a parameter, from bit `bit` on, to what stands in `data` from
- * bit 0 on: what an input measures from now on. Read gives what outputs have now. ERR_NO_OBJECT: no such connector or
- * parameter; ERR_OUT_OF_LIMITS: the parameter is not as long.
+ * The devices of the loaded application are simulated: those of Modbus at the other end of their line, all others by
+ * IoDrvSim.h, whatever drivers their description names. Each is known by the name of its connector. Write sets a place
+ * to what stands in `data` from bit 0 on: what an input measures from now on. Read gives what a device has now.
+ * ERR_NO_OBJECT: no such connector or parameter; ERR_OUT_OF_LIMITS: the parameter is not as long.
  */
-RTS_RESULT SimIoWrite(const char *connector, RTS_UI32 parameter, RTS_UI32 bit, RTS_UI32 bits, const RTS_UI8 *data);
-RTS_RESULT SimIoRead(const char *connector, RTS_UI32 parameter, RTS_UI32 bit, RTS_UI32 bits, RTS_UI8 *data);
+RTS_RESULT SimIoWrite(const char *connector, const SIM_IO_PLACE *place, const RTS_UI8 *data);
+RTS_RESULT SimIoRead(const char *connector, const SIM_IO_PLACE *place, RTS_UI8 *data);
 
 /* Sets a fault, IO_SIM_* of IoDrvSim.h, until it is set to 0 or another application is loaded. ERR_NO_OBJECT. */
 RTS_RESULT SimIoFault(const char *connector, RTS_UI32 fault, RTS_UI32 value);

@@ -1,5 +1,5 @@
 /*
- * SimCom.c - serial line 0: two queues of bytes. There are no lines of field buses.
+ * SimCom.c - serial line 0: two queues of bytes. All other lines are of field buses (SimBus).
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -71,37 +71,45 @@ RTS_RESULT SysComOpen(RTS_UI32 index)
     return ERR_OK;
 }
 
+static bool is_of_bus(RTS_UI32 index)
+{
+    return index != 0 && SimBus != NULL;
+}
+
 void SysComClose(RTS_UI32 index)
 {
-    RTS_UNUSED(index);
-    line.open = false;
+    if (is_of_bus(index))
+        SimBus->close(index);
+    else if (index == 0)
+        line.open = false;
 }
 
 RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
 {
+    if (is_of_bus(index))
+        return SimBus->read(index, data, size);
     return index == 0 && line.open ? get(&line.to_device, data, size) : 0;
 }
 
 RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
 {
+    if (is_of_bus(index))
+        return SimBus->write(index, data, size);
     return index == 0 && line.open ? put(&line.from_device, data, size) : 0;
 }
 
 RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)
 {
-    RTS_UNUSED(name);
-    RTS_UNUSED(settings);
-    RTS_UNUSED(index);
-    return ERR_NO_OBJECT;
+    return SimBus != NULL ? SimBus->open(name, settings, index) : (RTS_RESULT)ERR_NO_OBJECT;
 }
 
 void SysComDiscard(RTS_UI32 index)
 {
-    RTS_UNUSED(index);
+    if (is_of_bus(index))
+        SimBus->discard(index);
 }
 
 RTS_I64 SysComGetByteNs(RTS_UI32 index)
 {
-    RTS_UNUSED(index);
-    return 0;
+    return is_of_bus(index) ? SimBus->byte_ns(index) : 0;
 }

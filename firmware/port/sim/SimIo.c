@@ -23,23 +23,42 @@ static RTS_UI32 find(const char *name)
     return IO_CONFIG_NONE;
 }
 
-RTS_RESULT SimIoWrite(const char *connector, RTS_UI32 parameter, RTS_UI32 bit, RTS_UI32 bits, const RTS_UI8 *data)
+RTS_RESULT SimIoWrite(const char *connector, const SIM_IO_PLACE *place, const RTS_UI8 *data)
 {
     RTS_UI32 index = find(connector);
+    RTS_RESULT result = ERR_NOT_SUPPORTED;
 
-    return index != IO_CONFIG_NONE ? IoMgrWriteParameter(index, parameter, data, bits, bit) : (RTS_RESULT)ERR_NO_OBJECT;
+    if (index == IO_CONFIG_NONE)
+        return ERR_NO_OBJECT;
+    if (SimBus != NULL)
+        result = SimBus->set(IoMgrConfigGetConnector(index), place, data);
+    return result == ERR_NOT_SUPPORTED ? IoMgrWriteParameter(index, place->parameter, data, place->bits, place->bit)
+                                       : result;
 }
 
-RTS_RESULT SimIoRead(const char *connector, RTS_UI32 parameter, RTS_UI32 bit, RTS_UI32 bits, RTS_UI8 *data)
+RTS_RESULT SimIoRead(const char *connector, const SIM_IO_PLACE *place, RTS_UI8 *data)
 {
     RTS_UI32 index = find(connector);
+    RTS_RESULT result = ERR_NOT_SUPPORTED;
 
-    return index != IO_CONFIG_NONE ? IoMgrReadParameter(index, parameter, data, bits, bit) : (RTS_RESULT)ERR_NO_OBJECT;
+    if (index == IO_CONFIG_NONE)
+        return ERR_NO_OBJECT;
+    if (SimBus != NULL)
+        result = SimBus->get(IoMgrConfigGetConnector(index), place, data);
+    return result == ERR_NOT_SUPPORTED ? IoMgrReadParameter(index, place->parameter, data, place->bits, place->bit)
+                                       : result;
 }
 
 RTS_RESULT SimIoFault(const char *connector, RTS_UI32 fault, RTS_UI32 value)
 {
-    return SimIoWrite(connector, fault, 0, 8 * sizeof value, (const RTS_UI8 *)&value);
+    RTS_UI32 index = find(connector);
+    RTS_RESULT result = ERR_NOT_SUPPORTED;
+
+    if (index == IO_CONFIG_NONE)
+        return ERR_NO_OBJECT;
+    if (SimBus != NULL)
+        result = SimBus->fail(IoMgrConfigGetConnector(index), fault, value);
+    return result == ERR_NOT_SUPPORTED ? IoMgrWriteParameter(index, fault, &value, 8 * sizeof value, 0) : result;
 }
 
 RTS_RESULT SimIoGetState(const char *connector, IO_DEVICE_STATE *state)

@@ -1,26 +1,30 @@
 /*
- * SimModbus.c - what simulated Modbus devices reply to the requests of a program (ModbusCalls.h).
+ * SimModbus.c - the Modbus devices of the description, at the other end of simulated wires (SimWire.h).
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A device has the coils and registers that were written to it, by the program or by SimModbusSet, and refuses to read
- * others (MODBUS_ILLEGAL_ADDRESS). What the description reads and writes again and again is IoDrvSim's.
+ * IoDrvModbus asks them as it asks real ones. A device has the coils and registers that the description names, and those
+ * that were written to it, by the program or by SimModbusSet; it refuses to read others (MODBUS_ILLEGAL_ADDRESS). Of a
+ * server, which this device is, a test is the client: its memory is written and read at once.
  */
 #include <string.h>
 
 #include "../../src/io/ModbusCalls.h"
+#include "../../src/io/ModbusDriver.h"
 #include "AppState.h"
 #include "CmpEventMgr.h"
 #include "CmpIoMgrEmbedded.h"
+#include "IoDrvModbus.h"
 #include "IoDrvSim.h"
 #include "Sim.h"
-#include "SysAtomic.h"
+#include "SimWire.h"
 #include "SysTime.h"
 #include "sim_port.h"
 
-enum { VALUES = 4096 };
+enum { VALUES = 0x10000, FAULTS = 4 };
 
-#define REQUEST_NS ((RTS_I64)20000000) /* that one takes: some registers at 19200 baud */
+#define REPLY_NS ((RTS_I64)2000000) /* before a device replies, besides silence */
+#define NS_PER_MS ((RTS_I64)1000000)
 
 typedef struct {
     RTS_UI8 device; /* its number + 1; 0: the entry is free */
@@ -29,8 +33,15 @@ typedef struct {
     RTS_UI16 value;
 } SIM_VALUE;
 
-static MODBUS_SETUP setup;
+RTS_STATIC_ASSERT(MODBUS_MAX_DEVICES < UINT8_MAX, numbers_of_devices_fit);
+
 static SIM_VALUE values[VALUES];
+static RTS_UI32 faults[IO_MAX_CONNECTORS][FAULTS]; /* by id - IO_SIM_ABSENT */
+
+static MODBUS_SETUP *setup(void)
+{
+    return IoDrvModbusGetSetup();
+}
 
 /* ---- what devices hold ---- */
 
@@ -67,10 +78,15 @@ static bool get_value(RTS_UI32 device, RTS_UI8 table, RTS_UI32 address, RTS_UI16
     return true;
 }
 
+static RTS_UI32 number_of(const MODBUS_DEVICE *device)
+{
+    return (RTS_UI32)(device - setup()->devices);
+}
+
 RTS_RESULT SimModbusSet(const char *device, RTS_UI32 table, RTS_UI32 address, RTS_UI32 number)
 {
-    for (RTS_UI32 i = 0; i < setup.device_count; i++) {
-        if (strcmp(IoMgrConfigGetName(setup.noted[i].connector), device) != 0)
+    for (RTS_UI32 i = 0; i < setup()->device_count; i++) {
+        if (strcmp(IoMgrConfigGetName(setup()->noted[i].connector), device) != 0)
             continue;
         return set_value(i, (RTS_UI8)table, address, (RTS_UI16)number) ? ERR_OK : ERR_NOMEMORY;
     }
@@ -79,147 +95,370 @@ RTS_RESULT SimModbusSet(const char *device, RTS_UI32 table, RTS_UI32 address, RT
 
 /* ---- requests ---- */
 
-static bool is_one(const MODBUS_CALL *call)
+static RTS_UI16 masked(const MODBUS_REQUEST *request, RTS_UI32 device)
 {
-    return call->request.function->function == MODBUS_WRITE_COIL;
+    RTS_UI16 keep = ModbusGet16(request->data);
+    RTS_UI16 now = 0;
+
+    (void)get_value(device, request->function->table, request->write_address, &now);
+    return (RTS_UI16)((now & keep) | (ModbusGet16(request->data + 2) & ~keep));
 }
 
-static RTS_UI16 written(const MODBUS_CALL *call, RTS_UI32 i)
+static RTS_UI16 written(const MODBUS_REQUEST *request, RTS_UI32 device, RTS_UI32 i)
 {
-    if (is_one(call))
-        return ModbusGet16(call->data) != 0;
-    if (call->request.function->count_of_bits == 1)
-        return call->data[i / 8] >> i % 8 & 1;
-    return ModbusGet16(call->data + 2 * i);
+    if (request->function->function == MODBUS_WRITE_COIL)
+        return ModbusGet16(request->data) != 0;
+    if (request->function->function == MODBUS_MASK_WRITE_REGISTER)
+        return masked(request, device);
+    if (request->function->count_of_bits == 1)
+        return request->data[i / 8] >> i % 8 & 1;
+    return ModbusGet16(request->data + 2 * i);
 }
 
-static RTS_UI8 write_all(const MODBUS_CALL *call, RTS_UI32 device)
+static RTS_UI8 write_all(const MODBUS_REQUEST *request, RTS_UI32 device)
 {
-    const MODBUS_REQUEST *request = &call->request;
-
     for (RTS_UI32 i = 0; i < request->write_count; i++) {
-        if (!set_value(device, request->function->table, request->write_address + i, written(call, i)))
+        if (!set_value(device, request->function->table, request->write_address + i, written(request, device, i)))
             return MODBUS_DEVICE_FAILURE;
     }
     return 0;
 }
 
-static RTS_UI8 read_all(MODBUS_CALL *call, RTS_UI32 device)
+static RTS_UI8 read_all(const MODBUS_REQUEST *request, RTS_UI32 device, RTS_UI8 *data)
 {
-    const MODBUS_REQUEST *request = &call->request;
     RTS_UI16 number;
 
-    memset(call->data, 0, sizeof(call->data));
-    call->size = (RTS_UI8)ModbusDataSize(request->function, request->read_count);
+    memset(data, 0, ModbusDataSize(request->function, request->read_count));
     for (RTS_UI32 i = 0; i < request->read_count; i++) {
         if (!get_value(device, request->function->table, request->read_address + i, &number))
             return MODBUS_ILLEGAL_ADDRESS;
         if (request->function->count_of_bits == 1)
-            call->data[i / 8] |= (RTS_UI8)((number & 1) << i % 8);
+            data[i / 8] |= (RTS_UI8)((number & 1) << i % 8);
         else
-            ModbusPut16(call->data + 2 * i, number);
+            ModbusPut16(data + 2 * i, number);
     }
     return 0;
 }
 
-static bool is_absent(RTS_UI32 device)
+static RTS_UI32 refuse(RTS_UI8 *pdu, RTS_UI8 exception)
 {
-    RTS_UI32 absent = 0;
-
-    (void)IoMgrReadParameter(IoMgrConfigGetIndex(setup.noted[device].connector), IO_SIM_ABSENT, &absent, 32, 0);
-    return absent != 0;
+    pdu[0] |= MODBUS_EXCEPTION;
+    pdu[1] = exception;
+    return 2;
 }
 
-static void reply(MODBUS_CALL *call)
+/* What was written repeats the beginning of the request, or all of it. */
+static RTS_UI32 end_reply(const MODBUS_REQUEST *request, RTS_UI8 *pdu)
 {
-    RTS_UI32 device = (RTS_UI32)(call->device - setup.devices);
+    RTS_UI32 bytes = ModbusDataSize(request->function, request->read_count);
 
-    call->result = ERR_TIMEOUT;
-    if (!is_absent(device)) {
-        call->exception = call->request.write_count != 0 ? write_all(call, device) : read_all(call, device);
-        call->result = call->exception == 0 ? ERR_OK : ERR_FAILED;
+    if (request->read_count == 0)
+        return request->function->function == MODBUS_MASK_WRITE_REGISTER ? 7 : 5;
+    pdu[1] = (RTS_UI8)bytes;
+    return 2 + bytes;
+}
+
+/* The reply of one device, in place of the request. */
+static RTS_UI32 serve(RTS_UI32 device, RTS_UI8 *pdu, RTS_UI32 size)
+{
+    MODBUS_REQUEST request;
+    RTS_UI8 exception = ModbusReadRequest(pdu, size, &request);
+
+    if (exception == 0 && request.function->table == 0)
+        exception = MODBUS_ILLEGAL_FUNCTION;
+    if (exception == 0 && request.write_count != 0)
+        exception = write_all(&request, device);
+    if (exception == 0 && request.read_count != 0)
+        exception = read_all(&request, device, pdu + 2);
+    return exception != 0 ? refuse(pdu, exception) : end_reply(&request, pdu);
+}
+
+/* ---- faults ---- */
+
+static RTS_UI32 *fault_of(const IoConfigConnector *connector, RTS_UI32 id)
+{
+    return &faults[IoMgrConfigGetIndex(connector)][id - IO_SIM_ABSENT];
+}
+
+static const IoConfigConnector *connector_of(const MODBUS_DEVICE *device)
+{
+    return setup()->noted[number_of(device)].connector;
+}
+
+static const MODBUS_CLIENT_LINE *line_of(RTS_HANDLE handle)
+{
+    for (RTS_UI32 i = 0; i < setup()->client_count; i++) {
+        if (setup()->clients[i].client.link.handle == handle)
+            return &setup()->clients[i];
     }
-    SysAtomicStore(&call->state, MODBUS_CALL_ENDED);
+    return NULL;
 }
 
-static void reply_soon(void)
+static bool is_broadcast(const MODBUS_CLIENT_LINE *line, RTS_UI8 unit)
 {
-    SimWantPass(REQUEST_NS);
+    return unit == MODBUS_BROADCAST && line->client.link.type->broadcasts;
 }
 
-static void cycle(void)
+static const MODBUS_DEVICE *device_at(const MODBUS_CLIENT_LINE *line, RTS_UI8 unit)
 {
-    RTS_I64 now_ns = SysTimeGetNs();
+    for (RTS_UI32 i = 0; i < line->client.device_count; i++) {
+        if (line->client.devices[i].unit == unit)
+            return &line->client.devices[i];
+    }
+    return NULL;
+}
 
-    ModbusCallsPoll(AppGetState() == AS_RUN, now_ns);
-    for (RTS_UI32 i = 0; i < RTS_COUNT(setup.calls); i++) {
-        MODBUS_CALL *call = &setup.calls[i];
-        if (SysAtomicLoad(&call->state) != MODBUS_CALL_WAITS)
+static bool is_there(const MODBUS_DEVICE *device)
+{
+    return *fault_of(connector_of(device), IO_SIM_ABSENT) == 0;
+}
+
+/* Another device than the description says has none of its registers; it replies all the same. */
+static RTS_UI32 reply_of(const MODBUS_DEVICE *device, RTS_UI8 *pdu, RTS_UI32 size, bool *damaged)
+{
+    RTS_UI32 *bad = fault_of(connector_of(device), IO_SIM_ANSWERS);
+
+    *damaged = *bad != 0;
+    *bad -= *damaged;
+    return *fault_of(connector_of(device), IO_SIM_TYPE) != 0 ? refuse(pdu, MODBUS_ILLEGAL_ADDRESS)
+                                                             : serve(number_of(device), pdu, size);
+}
+
+static void serve_all(const MODBUS_CLIENT_LINE *line, const RTS_UI8 *pdu, RTS_UI32 size)
+{
+    RTS_UI8 copy[MODBUS_MAX_PDU];
+
+    for (RTS_UI32 i = 0; i < line->client.device_count; i++) {
+        if (!is_there(&line->client.devices[i]))
             continue;
-        if (now_ns - call->due_ns >= REQUEST_NS)
-            reply(call);
-        else
-            reply_soon();
+        memcpy(copy, pdu, size);
+        (void)serve(number_of(&line->client.devices[i]), copy, size);
     }
 }
 
-/* ---- devices ---- */
+/* ---- at the end of the wire ---- */
 
-/* Whether a connector is a Modbus device that is simulated. */
-static bool is_device(const IoConfigConnector *connector)
+bool SimModbusIsPlugged(RTS_HANDLE handle)
 {
-    RTS_UI32 fault;
+    const MODBUS_CLIENT_LINE *line = line_of(handle);
 
-    return connector->parent != IO_CONFIG_NONE && strcmp(IoMgrConfigGetDriverName(connector), "IoDrvModbus") == 0 &&
-           IoMgrReadParameter(IoMgrConfigGetIndex(connector), IO_SIM_ABSENT, &fault, 32, 0) == ERR_OK;
+    return line != NULL && *fault_of(line->noted.connector, IO_SIM_ABSENT) == 0;
 }
 
-static void give_back(const EVENT_PARAM *event)
+RTS_I64 SimModbusGetDelayNs(RTS_HANDLE handle, RTS_UI8 unit)
+{
+    const MODBUS_CLIENT_LINE *line = line_of(handle);
+    const MODBUS_DEVICE *device = line != NULL ? device_at(line, unit) : NULL;
+
+    if (line != NULL && is_broadcast(line, unit))
+        return 0;
+    if (device == NULL || !is_there(device))
+        return -1;
+    return REPLY_NS + *fault_of(connector_of(device), IO_SIM_LATE) * NS_PER_MS;
+}
+
+RTS_UI32 SimModbusReply(RTS_HANDLE handle, RTS_UI8 unit, RTS_UI8 *pdu, RTS_UI32 size, bool *damaged)
+{
+    const MODBUS_CLIENT_LINE *line = line_of(handle);
+    const MODBUS_DEVICE *device;
+
+    if (line == NULL || size > MODBUS_MAX_PDU)
+        return 0;
+    if (is_broadcast(line, unit)) {
+        serve_all(line, pdu, size);
+        return 0;
+    }
+    device = device_at(line, unit);
+    return device != NULL && is_there(device) ? reply_of(device, pdu, size, damaged) : 0;
+}
+
+/* ---- channels ---- */
+
+/* What a place is in: the memory of a server, or coils or registers of a device. */
+typedef struct {
+    RTS_UI8 *memory;
+    RTS_UI32 device;
+    RTS_UI8 table;
+    bool of_bits;
+    RTS_UI32 reverse;
+    RTS_UI32 address;
+    RTS_UI32 bits;
+} REGION;
+
+static bool find_of_device(const MODBUS_DEVICE *device, const SIM_IO_PLACE *place, REGION *region)
+{
+    RTS_UI32 index = place->parameter - MODBUS_PARAM_JOB;
+    const MODBUS_FUNCTION *function;
+    const MODBUS_JOB *job;
+
+    if (index >= device->job_count)
+        return false;
+    job = device->jobs[index].job;
+    function = ModbusFindFunction(job->function);
+    *region = (REGION){NULL,
+                       number_of(device),
+                       function->table,
+                       function->count_of_bits == 1,
+                       ModbusJobGetReverse(job, function),
+                       place->is_output ? job->write_address : job->read_address,
+                       (place->is_output ? job->write_count : job->read_count) * (RTS_UI32)function->count_of_bits};
+    return true;
+}
+
+/* ERR_NOT_SUPPORTED: the connector is none of Modbus, or the parameter is none of channels. */
+static RTS_RESULT find_region(const IoConfigConnector *connector, const SIM_IO_PLACE *place, REGION *region)
+{
+    const MODBUS_PLACE found = ModbusFindPlace(setup(), connector);
+
+    memset(region, 0, sizeof(*region));
+    if (found.device == NULL && found.server == NULL)
+        return ERR_NOT_SUPPORTED;
+    if (found.server != NULL)
+        region->memory = ModbusFindMemory(&found, place->parameter, place->is_output, &region->bits);
+    if (found.server != NULL ? region->memory == NULL : !find_of_device(found.device, place, region))
+        return ERR_NOT_SUPPORTED;
+    return place->bits <= region->bits && place->bit <= region->bits - place->bits ? ERR_OK : ERR_OUT_OF_LIMITS;
+}
+
+/* The coil or register of a bit, in the order of MODBUS_JOB_REVERSE_2 .. for registers, and its bit there. */
+static SIM_VALUE *value_of(const REGION *region, RTS_UI32 bit, RTS_UI32 *shift)
+{
+    RTS_UI32 byte = region->reverse != 0 ? bit / 8 ^ (region->reverse - 1) : bit / 8;
+
+    *shift = region->of_bits ? 0 : (byte % 2 == 0 ? 8 : 0) + bit % 8;
+    return find_value(region->device, region->table, region->address + (region->of_bits ? bit : byte / 2));
+}
+
+static bool get_bit(const REGION *region, RTS_UI32 bit)
+{
+    RTS_UI32 shift;
+
+    if (region->memory != NULL)
+        return (region->memory[bit / 8] >> bit % 8 & 1) != 0;
+    return (value_of(region, bit, &shift)->value >> shift & 1) != 0;
+}
+
+static void set_bit(const REGION *region, RTS_UI32 bit, bool on)
+{
+    RTS_UI32 shift;
+    SIM_VALUE *value;
+
+    if (region->memory != NULL) {
+        region->memory[bit / 8] = (RTS_UI8)((region->memory[bit / 8] & ~(1u << bit % 8)) | (unsigned)on << bit % 8);
+        return;
+    }
+    value = value_of(region, bit, &shift);
+    value->value = (RTS_UI16)((value->value & ~(1u << shift)) | (unsigned)on << shift);
+}
+
+static RTS_RESULT set_place(const IoConfigConnector *connector, const SIM_IO_PLACE *place, const RTS_UI8 *data)
+{
+    REGION region;
+    RTS_RESULT result = find_region(connector, place, &region);
+
+    for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++)
+        set_bit(&region, place->bit + i, (data[i / 8] >> i % 8 & 1) != 0);
+    if (result == ERR_OK && region.memory != NULL)
+        ModbusFindPlace(setup(), connector).server->server.written++;
+    return result;
+}
+
+static RTS_RESULT get_place(const IoConfigConnector *connector, const SIM_IO_PLACE *place, RTS_UI8 *data)
+{
+    REGION region;
+    RTS_RESULT result = find_region(connector, place, &region);
+
+    if (result == ERR_OK)
+        memset(data, 0, (place->bits + 7) / 8);
+    for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++)
+        data[i / 8] |= (RTS_UI8)(get_bit(&region, place->bit + i) << i % 8);
+    return result;
+}
+
+static bool is_line(const IoConfigConnector *connector)
+{
+    for (RTS_UI32 i = 0; i < setup()->client_count; i++) {
+        if (setup()->clients[i].noted.connector == connector)
+            return true;
+    }
+    return false;
+}
+
+/* A line can only be pulled, which is that it is absent. A server here has no client that could fail. */
+static RTS_RESULT set_fault(const IoConfigConnector *connector, RTS_UI32 fault, RTS_UI32 value)
+{
+    const MODBUS_PLACE place = ModbusFindPlace(setup(), connector);
+
+    if (place.server != NULL)
+        return ERR_NO_OBJECT;
+    if (place.device == NULL && !is_line(connector))
+        return ERR_NOT_SUPPORTED;
+    if (fault - IO_SIM_ABSENT >= FAULTS || (place.device == NULL && fault != IO_SIM_ABSENT))
+        return ERR_NO_OBJECT;
+    *fault_of(connector, fault) = value;
+    return ERR_OK;
+}
+
+static RTS_I64 due_ns(RTS_I64 now_ns)
+{
+    RTS_I64 due = SimWireGetDueNs(now_ns);
+
+    for (RTS_UI32 i = 0; i < setup()->client_count; i++) {
+        RTS_I64 of_client = ModbusClientGetDueNs(&setup()->clients[i].client, now_ns);
+        if (of_client < due)
+            due = of_client;
+    }
+    return due;
+}
+
+/* ---- configurations ---- */
+
+static void add_zeros(RTS_UI32 device, RTS_UI8 table, RTS_UI32 address, RTS_UI32 count)
+{
+    for (RTS_UI32 i = 0; i < count; i++)
+        (void)set_value(device, table, address + i, 0);
+}
+
+static void forget(const EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
-    if (setup.device_count != 0)
-        ModbusCallsBegin(NULL, NULL);
-    memset(&setup, 0, sizeof(setup));
     memset(values, 0, sizeof(values));
+    memset(faults, 0, sizeof(faults));
 }
 
-static void set_up(const EVENT_PARAM *event)
+static void make_devices(const EVENT_PARAM *event)
 {
-    const IoConfigConnector *connector;
-
     RTS_UNUSED(event);
-    for (RTS_UI32 i = 0; (connector = IoMgrConfigGetConnector(i)) != NULL && setup.device_count < MODBUS_MAX_DEVICES;
-         i++) {
-        if (!is_device(connector))
-            continue;
-        setup.devices[setup.device_count].unit = 1;
-        setup.noted[setup.device_count++].connector = connector;
+    for (RTS_UI32 i = 0; i < setup()->device_count; i++) {
+        const MODBUS_DEVICE *device = &setup()->devices[i];
+        for (RTS_UI32 k = 0; k < device->job_count; k++) {
+            const MODBUS_JOB *job = device->jobs[k].job;
+            RTS_UI8 table = ModbusFindFunction(job->function)->table;
+            add_zeros(i, table, job->read_address, job->read_count);
+            add_zeros(i, table, job->write_address, job->write_count);
+        }
     }
-    setup.client_count = 1;
-    setup.clients[0].client.devices = setup.devices;
-    setup.clients[0].client.device_count = setup.device_count;
-    if (setup.device_count != 0)
-        ModbusCallsBegin(&setup, reply_soon);
 }
 
 /* Elsewhere a pass comes before the next request of a tool; here virtual time may stand still. */
 static void cancel(const EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
-    if (setup.device_count != 0)
+    if (setup()->client_count != 0)
         ModbusCallsPoll(false, SysTimeGetNs());
 }
 
 RTS_RESULT SimModbus_Hook(CMP_HOOK hook)
 {
+    static const SIM_BUS bus = {SimWireOpen,      SimWireClose, SimWireRead, SimWireWrite, SimWireDiscard,
+                                SimWireGetByteNs, set_place,    get_place,   set_fault,    due_ns};
+
+    if (hook == CH_INIT)
+        SimBus = &bus;
     if (hook == CH_INIT2) {
-        (void)EventRegisterCallback(CMPID_CmpIoMgrEmbedded, EVT_PrepareUpdateConfiguration, give_back, NULL);
-        (void)EventRegisterCallback(CMPID_CmpIoMgrEmbedded, EVT_DoneUpdateConfiguration, set_up, NULL);
+        (void)EventRegisterCallback(CMPID_CmpIoMgrEmbedded, EVT_PrepareUpdateConfiguration, forget, NULL);
+        (void)EventRegisterCallback(CMPID_CmpIoMgrEmbedded, EVT_DoneUpdateConfiguration, make_devices, NULL);
         (void)EventRegisterCallback(CMPID_CmpAppEmbedded, EVT_StopDone, cancel, NULL);
     }
-    if (hook == CH_INIT3)
-        return ModbusCallsRegister();
-    if (hook == CH_COMM_CYCLE && setup.device_count != 0)
-        cycle();
     return ERR_OK;
 }

@@ -17,5 +17,10 @@
 #define HAS_CmpFileTransfer 1
 #define HAS_CmpMonitor2 1
 #define HAS_CmpBlkDrvSimpleCom 1
+#ifdef SIM_HAS_BUSES
+#define HAS_IoDrvModbus 1
 #define PORT_COMPONENTS(X) X(SysSim) X(SimModbus)
+#else
+#define PORT_COMPONENTS(X) X(SysSim)
+#endif
 #include "CmpList.h"

@@ -8,6 +8,9 @@
 
 #include "CmpItf.h"
 #include "CmpStd.h"
+#include "IoConfig.h"
+#include "Sim.h"
+#include "SysCom.h"
 
 /* Power goes off now: back to the Sim* function that runs the runtime. Returns when there is none. */
 void SimPowerCut(void);
@@ -30,8 +33,27 @@ RTS_RESULT SimEventRegisterAll(void);
 RTS_RESULT SimFunctionsRegister(void);
 
 RTS_RESULT SysSim_Hook(CMP_HOOK hook);
-/* The next pass of CH_COMM_CYCLE is in `in_ns` at the latest. From any context. */
-void SimWantPass(RTS_I64 in_ns);
+
+/* Simulated field buses: lines with devices on them. Without them (NULL) there are no such lines, and IoDrvSim has all
+ * devices. */
+typedef struct {
+    /* SysCom.h, of the lines from 1 on. */
+    RTS_RESULT (*open)(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *line);
+    void (*close)(RTS_UI32 line);
+    RTS_UI32 (*read)(RTS_UI32 line, RTS_UI8 *data, RTS_UI32 size);
+    RTS_UI32 (*write)(RTS_UI32 line, const RTS_UI8 *data, RTS_UI32 size);
+    void (*discard)(RTS_UI32 line);
+    RTS_I64 (*byte_ns)(RTS_UI32 line);
+    /* Sim.h, of a connector that is on a bus or is one: as SimIoWrite, SimIoRead and SimIoFault. ERR_NOT_SUPPORTED: it is
+     * neither. */
+    RTS_RESULT (*set)(const IoConfigConnector *connector, const SIM_IO_PLACE *place, const RTS_UI8 *data);
+    RTS_RESULT (*get)(const IoConfigConnector *connector, const SIM_IO_PLACE *place, RTS_UI8 *data);
+    RTS_RESULT (*fail)(const IoConfigConnector *connector, RTS_UI32 fault, RTS_UI32 value);
+    /* When main has something to do for a bus, INT64_MAX: never. */
+    RTS_I64 (*due_ns)(RTS_I64 now_ns);
+} SIM_BUS;
+
+extern const SIM_BUS *SimBus;
 RTS_RESULT SimModbus_Hook(CMP_HOOK hook);
 
 #endif

@@ -12,6 +12,7 @@
 #include "AppState.h"
 #include "CmpIoMgrEmbedded.h"
 #include "ModbusCalls.h"
+#include "ModbusDriver.h"
 #include "ModbusScan.h"
 #include "ModbusServerTcp.h"
 #include "ModbusSetup.h"
@@ -33,6 +34,11 @@ static const IoDrvInfo *get_info(void)
     static const IoDrvInfo info = {"IoDrvModbus", "Modbus", "Open PLC runtime", 0x00010000};
 
     return &info;
+}
+
+MODBUS_SETUP *IoDrvModbusGetSetup(void)
+{
+    return &setup;
 }
 
 /* ---- configuration ---- */

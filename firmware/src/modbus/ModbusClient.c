@@ -136,16 +136,10 @@ static void choose(MODBUS_CLIENT *client, RTS_I64 now_ns)
 
 /* ---- requests ---- */
 
-/* Bytes of a group that are in reverse order; 0: none are. */
-static RTS_UI32 reverse_of(const MODBUS_JOB_STATE *state, const MODBUS_FUNCTION *function)
-{
-    return function->count_of_bits == 1 ? 0 : state->job->flags >> MODBUS_JOB_REVERSE_SHIFT & 14;
-}
-
 /* From the order of the wire to that of memory, or back. */
 static void reorder(const MODBUS_JOB_STATE *state, const MODBUS_FUNCTION *function, RTS_UI8 *data, RTS_UI32 size)
 {
-    RTS_UI32 reverse = reverse_of(state, function);
+    RTS_UI32 reverse = ModbusJobGetReverse(state->job, function);
 
     for (RTS_UI32 i = 0; reverse != 0 && i < size; i++) {
         RTS_UI32 other = i ^ (reverse - 1);
@@ -368,7 +362,7 @@ static RTS_UI8 written_bits(const MODBUS_JOB *job, RTS_UI32 i, RTS_UI32 size)
 static bool is_verified(const MODBUS_CLIENT *client, RTS_UI8 *data)
 {
     const MODBUS_JOB_STATE *state = client->job;
-    RTS_UI32 reverse = reverse_of(state, client->request.function);
+    RTS_UI32 reverse = ModbusJobGetReverse(state->job, client->request.function);
     RTS_UI32 size = write_size(state);
     RTS_UI32 wrong = 0;
 
@@ -537,4 +531,32 @@ void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns)
         begin(client, now_ns);
     if (client->device != NULL)
         try_to_send(client, now_ns);
+}
+
+/* ---- when it is needed ---- */
+
+static RTS_I64 due_of_device(const MODBUS_DEVICE *device)
+{
+    RTS_I64 due = NEVER;
+
+    (void)find_due(device, &due);
+    return ModbusDeviceIsLost(device) && due < device->retry_ns ? device->retry_ns : due;
+}
+
+RTS_I64 ModbusClientGetDueNs(const MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    RTS_I64 due = NEVER;
+
+    if (client->device != NULL)
+        return client->sent ? client->since_ns + client->device->timeout_ms * NS_PER_MS : now_ns;
+    for (const MODBUS_CALL *call = client->calls; call < client->calls + client->call_count; call++) {
+        if (SysAtomicLoad(&call->state) == MODBUS_CALL_WAITS && call->client == client)
+            return now_ns;
+    }
+    for (RTS_UI32 i = 0; i < client->device_count; i++) {
+        RTS_I64 of_device = due_of_device(&client->devices[i]);
+        if (of_device < due)
+            due = of_device;
+    }
+    return due;
 }

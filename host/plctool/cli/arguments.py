@@ -129,6 +129,13 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         help="what the inputs and outputs are connected to: Python with 'def step(plc)', or a program (docs/io.md)",
     )
     run.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="DEVICE=FAULT",
+        help="of a simulated device, with value and time: Tank=late:150@T#5s (docs/io.md); may be repeated",
+    )
+    run.add_argument(
         "--trace", nargs="+", default=[], metavar="NAME", help="write the values after each cycle to a CSV file"
     )
     run.add_argument(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from plctool.cli import io_documents
 from plctool.cli.io_documents import Document
 from plctool.cli.overwriting import check_not_read, check_output
-from plctool.cli.plants import attached, files_of_plant
+from plctool.cli.plants import Fault, attached, files_of_plant, plan_faults
 from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
@@ -341,9 +341,10 @@ def run(
     gets: Sequence[str],
     plant: Path | None = None,
     trace: TraceFile | None = None,
+    faults: Sequence[Fault] = (),
 ) -> tuple[Document, Texts]:
     """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
-    values as users read them. `plant`: what the inputs and outputs are connected to.
+    values as users read them. `plant`: what the inputs and outputs are connected to; `faults`: what happens to that.
 
     Raises DeviceError when the program stops with an exception; what was traced until then is in its file.
     """
@@ -353,6 +354,7 @@ def run(
         table = plc.symbols()
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
+        plan_faults(plc, faults)
         with attached(plc, plant) if plant is not None else nullcontext():
             if trace:
                 _run_traced(plc, cycles, time_ms, trace)

@@ -17,6 +17,7 @@ from plctool.cli import documents, io_documents, output
 from plctool.cli.arguments import pairs, parser
 from plctool.cli.io_documents import Document
 from plctool.cli.links import all_serial_ports, find_link, link_of
+from plctool.cli.plants import parse_fault
 from plctool.errors import InternalError, PlcError, UsageError
 from plctool.files import path_error
 from plctool.link.transports import Link
@@ -98,8 +99,9 @@ def _symbols(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     trace = documents.TraceFile(args.trace, args.output) if args.trace else None
+    faults = [parse_fault(text) for text in args.fault]
     document, texts = documents.run(
-        _program_to_run(args), args.cycles, args.time, pairs(args.set), args.get, args.plant, trace
+        _program_to_run(args), args.cycles, args.time, pairs(args.set), args.get, args.plant, trace, faults
     )
     return _show(args, document, lambda d: output.run_text(d, texts))
 
