@@ -121,6 +121,33 @@ static void blocks_in_the_name_of_the_client_close_nothing(void)
     CHECK(ChannelIsOpen(ChannelGetClient(0)));
 }
 
+/* An echo request as a whole, with this CRC. */
+static void send_request(CLIENT *who, RTS_UI32 spoiled)
+{
+    RTS_UI32 size = echo_message(4);
+    RTS_UI8 block[BLK_MAX_SIZE] = {CHANNEL_PKG_DATA, FIRST};
+
+    BytesPut16(block + 2, who->channel);
+    BytesPut32(block + 4, who->sent + 1);
+    BytesPut32(block + 12, size);
+    BytesPut32(block + 16, CRC32Update(0, message, size) ^ spoiled);
+    memcpy(block + 20, message, size);
+    client_send_package(who, block, 20 + size);
+}
+
+static void wrong_crcs_in_the_name_of_the_client_close_nothing(void)
+{
+    start();
+    RTS_UI32 foreign = counters()->foreign;
+    for (RTS_UI32 i = 0; i < 100; i++) {
+        send_request(&client, 1u << i % 32);
+        pass(i);
+    }
+    CHECK_EQUAL(counters()->foreign, foreign + 100);
+    CHECK_EQUAL(counters()->failed, 0);
+    CHECK(is_served(&client));
+}
+
 static void a_channel_without_login_ends(void)
 {
     CLIENT idle;
@@ -191,6 +218,26 @@ static void those_who_hold_channels_without_login_give_way_after_a_while(void)
     CHECK(comes_in(&newcomer) && client_login(&newcomer));
 }
 
+static void those_who_open_again_and_again_give_way_after_a_while(void)
+{
+    CLIENT crowd[COMM_MAX_CLIENTS];
+    CLIENT newcomer;
+
+    fakes_start();
+    for (RTS_UI16 i = 0; i < RTS_COUNT(crowd); i++) {
+        client_init(&crowd[i], (RTS_UI16)(INTRUDER + i));
+        CHECK(client_open(&crowd[i]) && works(&crowd[i]));
+    }
+    client_init(&newcomer, ADDRESS);
+    for (RTS_UI32 ms = 0; ms < CHANNEL_SETTLE_MS; ms += 100) {
+        CHECK(!comes_in(&newcomer));
+        for (RTS_UI32 i = 0; i < RTS_COUNT(crowd); i++)
+            CHECK(client_open(&crowd[i]) && works(&crowd[i]));
+        pass(100);
+    }
+    CHECK(comes_in(&newcomer) && client_login(&newcomer) && client_login_app(&newcomer) && is_served(&newcomer));
+}
+
 /* With time that passes as it does, cycle by cycle. */
 static void those_who_logged_in_and_went_without_a_word_give_way_after_a_while(void)
 {
@@ -248,11 +295,13 @@ int main(void)
     RUN(a_close_request_in_vain_does_not_make_the_next_one_vain);
     RUN(right_after_the_start_nothing_has_been_guessed);
     RUN(blocks_in_the_name_of_the_client_close_nothing);
+    RUN(wrong_crcs_in_the_name_of_the_client_close_nothing);
     RUN(a_channel_without_login_ends);
     RUN(a_channel_with_login_stays);
     RUN(after_a_logout_there_is_time_for_another_login);
     RUN(a_storm_of_open_requests_does_not_end_a_login);
     RUN(those_who_hold_channels_without_login_give_way_after_a_while);
+    RUN(those_who_open_again_and_again_give_way_after_a_while);
     RUN(those_who_logged_in_and_went_without_a_word_give_way_after_a_while);
     RUN(there_are_no_services_but_those_of_the_documentation);
     RUN(every_service_survives_every_tag_of_every_size);

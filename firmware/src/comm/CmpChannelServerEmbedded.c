@@ -294,8 +294,10 @@ static bool is_repetition(const CHANNEL *channel, const ROUTER_PEER *peer, const
 static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPEN_REQUEST *request, RTS_UI32 now_ms)
 {
     CHANNEL *channel = &client->channel;
+    bool again = channel->id != 0 && RouterIsSamePeer(peer, &channel->peer);
+    RTS_UI32 since = COMM_ENDPOINTS && again ? channel->anonymous_since : now_ms;
 
-    if (channel->id != 0 && !RouterIsSamePeer(peer, &channel->peer))
+    if (channel->id != 0 && !again)
         send_close(&channel->peer, channel->id, ERR_CHS_CLOSED);
     forget_channel(client);
     memset(channel, 0, sizeof(*channel));
@@ -313,7 +315,7 @@ static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPE
     channel->wanted = request->packet;
 #endif
     if (COMM_ENDPOINTS)
-        channel->anonymous_since = now_ms;
+        channel->anonymous_since = since; /* a peer that opens again and again is not protected for ever */
     COMM_COUNT(counters.opened);
 }
 
@@ -529,22 +531,33 @@ static void handle_gap(CHANNEL *channel, RTS_UI32 ahead)
     }
 }
 
+/* On a network a message with a wrong CRC comes from one who knows or guesses the id. If it was one block, the client's
+ * own is taken in its place. */
+static void drop_message(CHANNEL *channel, bool is_one_block, RTS_UI32 now_ms)
+{
+    note_guess(now_ms);
+    if (is_one_block)
+        channel->rx.block--;
+}
+
 static void handle_data(COMM_CLIENT *client, const CHANNEL_DATA *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
     CHANNEL *channel = &client->channel;
     RTS_UI32 ahead = BytesGet32(data->block) - channel->rx.block; /* numbers wrap */
+    bool is_first = (data->head.flags & CHANNEL_FLAG_FIRST) != 0;
     RTS_RESULT result = ERR_OK;
 
     channel->fresh = false;
     handle_ack(&channel->tx, BytesGet32(data->acknowledged), false, now_ms);
     if (ahead == 1)
-        result = accept_block(client, (data->head.flags & CHANNEL_FLAG_FIRST) != 0, (const RTS_UI8 *)(data + 1),
-                              size - (RTS_UI32)sizeof(*data));
+        result = accept_block(client, is_first, (const RTS_UI8 *)(data + 1), size - (RTS_UI32)sizeof(*data));
     else if ((RTS_I32)ahead <= 0)
         handle_duplicate(channel, now_ms);
     else
         handle_gap(channel, ahead);
-    if (result != ERR_OK && !is_guessing(now_ms))
+    if (COMM_ENDPOINTS && result == ERR_CHS_CHECKSUM)
+        drop_message(channel, is_first, now_ms);
+    else if (result != ERR_OK && !is_guessing(now_ms))
         close_channel(client, result);
 }
 
