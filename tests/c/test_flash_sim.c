@@ -318,6 +318,31 @@ static void cells_survive_the_process_and_are_not_written_by_stores(void)
     CHECK_EQUAL(SimFlashData()[0], 1);
 }
 
+/* Also what a child process or a test has changed. */
+static void a_new_flash_of_the_same_size_is_erased_everywhere(void)
+{
+    static const RTS_UI32 places[] = {0, 60, 4092, 4096, 8191, 16 * 1024 - 64};
+    const SYS_FLASH *flash = blank(1, 0xFF);
+    pid_t child;
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(places); i++)
+        CHECK_EQUAL(flash->program(places[i], ones, i == 4 ? 2 : 1), ERR_OK);
+    child = fork();
+    if (child == 0)
+        _exit(flash->program(12000, ones, 64) == ERR_OK ? 0 : 1);
+    (void)waitpid(child, NULL, 0);
+    CHECK_EQUAL(flash->mapped[12000], 1);
+    for (int poked = 0; poked < 2; poked++) {
+        flash = blank(1, 0xFF);
+        for (RTS_UI32 i = 0; i < SimFlashSize(); i++)
+            CHECK_EQUAL(flash->mapped[i], 0xFF);
+        for (RTS_UI32 i = 0; i < SimFlashSize(); i += sizeof ones)
+            CHECK_EQUAL(flash->program(i, ones, sizeof ones), ERR_OK);
+        CHECK_EQUAL(SimFlashViolations(), 0);
+        memset(SimFlashData(), 0x5A, SimFlashSize());
+    }
+}
+
 int main(void)
 {
     RUN(only_possible_geometries_are_accepted);
@@ -336,6 +361,7 @@ int main(void)
     RUN(a_plan_for_the_next_start_counts_from_there);
     RUN(calls_can_fail_from_one_on);
     RUN(what_is_loaded_counts_as_programmed);
+    RUN(a_new_flash_of_the_same_size_is_erased_everywhere);
     RUN(cells_survive_the_process_and_are_not_written_by_stores);
     return test_result();
 }

@@ -19,7 +19,7 @@
 #include "rts_config.h"
 #include "sim_port.h"
 
-enum { CODE_SLOTS = 2 };
+enum { CODE_SLOTS = 2, PAGE = 4096 };
 
 typedef struct {
     RTS_UI8 *code;
@@ -31,6 +31,7 @@ typedef struct {
     int file;      /* memory with the cells, by which they are changed */
     RTS_UI8 *data; /* the same, for reading */
     RTS_UI8 *programmed;
+    RTS_UI8 *touched; /* pages that may not be as they were made */
     RTS_UI32 size;
 } CELLS;
 
@@ -80,10 +81,27 @@ static bool was_programmed(RTS_UI32 offset, RTS_UI32 size)
     return memchr(chip.cells.programmed + offset, 1, size) != NULL;
 }
 
+static RTS_UI32 pages_of(RTS_UI32 size)
+{
+    return (size + PAGE - 1) / PAGE;
+}
+
+static void touch(RTS_UI32 offset, RTS_UI32 size)
+{
+    memset(chip.cells.touched + offset / PAGE, 1, pages_of(offset % PAGE + size));
+}
+
+static void protect(int access)
+{
+    (void)mprotect(chip.cells.data, chip.cells.size, access);
+}
+
 /* Whether tests may store into the cells. */
 static void set_writable(bool writable)
 {
-    (void)mprotect(chip.cells.data, chip.cells.size, writable ? PROT_READ | PROT_WRITE : PROT_READ);
+    protect(writable ? PROT_READ | PROT_WRITE : PROT_READ);
+    if (writable)
+        touch(0, chip.cells.size);
 }
 
 static void set_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
@@ -152,10 +170,11 @@ static RTS_UI8 programmed_cell(RTS_UI8 old, RTS_UI8 value)
 static void program_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 unit = chip.flash.program_size;
-    RTS_UI8 part[64];
+    RTS_UI8 part[PAGE];
     RTS_UI32 done;
     RTS_UI32 count;
 
+    touch(offset, size);
     for (done = 0; done < size; done += count) {
         RTS_UI32 i;
         count = size - done < sizeof part ? size - done : (RTS_UI32)sizeof part;
@@ -168,9 +187,10 @@ static void program_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
 
 static void erase_cells(RTS_UI32 offset, RTS_UI32 size)
 {
-    RTS_UI8 part[64];
+    RTS_UI8 part[PAGE];
     RTS_UI32 done;
 
+    touch(offset, size);
     memset(part, chip.flash.erased, sizeof part);
     for (done = 0; done < size; done += (RTS_UI32)sizeof part)
         set_cells(offset + done, part, size - done < sizeof part ? size - done : (RTS_UI32)sizeof part);
@@ -275,6 +295,8 @@ static void free_cells(CELLS *cells)
         munmap(cells->data, cells->size);
     if (cells->programmed != NULL)
         munmap(cells->programmed, cells->size);
+    if (cells->touched != NULL)
+        munmap(cells->touched, pages_of(cells->size));
     if (cells->size != 0)
         close(cells->file);
     memset(cells, 0, sizeof *cells);
@@ -295,8 +317,9 @@ static bool allocate_cells(CELLS *cells, RTS_UI32 size)
         return false;
     cells->size = size;
     cells->programmed = map_shared(-1, size);
+    cells->touched = map_shared(-1, pages_of(size));
     cells->data = ftruncate(cells->file, (off_t)size) == 0 ? map_shared(cells->file, size) : NULL;
-    if (cells->data != NULL && cells->programmed != NULL)
+    if (cells->data != NULL && cells->programmed != NULL && cells->touched != NULL)
         return true;
     free_cells(cells);
     return false;
@@ -311,17 +334,35 @@ static void set_functions(void)
     chip.flash.sync = flash_sync;
 }
 
+/* Makes the cells as new: those that there are, where something happened to them, if only that is another one. */
+static bool renew_cells(RTS_UI32 size, RTS_UI8 erased)
+{
+    if (chip.cells.data == NULL || chip.cells.size != size || chip.flash.erased != erased) {
+        free_cells(&chip.cells);
+        if (!allocate_cells(&chip.cells, size))
+            return false;
+        memset(chip.cells.data, erased, size);
+        return true;
+    }
+    for (RTS_UI32 page = 0; page < pages_of(size); page++) {
+        RTS_UI32 left = size - page * PAGE;
+        if (chip.cells.touched[page])
+            erase_cells(page * PAGE, left < PAGE ? left : PAGE);
+        chip.cells.touched[page] = 0;
+    }
+    protect(PROT_READ | PROT_WRITE);
+    return true;
+}
+
 RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 program_size, RTS_UI8 erased)
 {
     if (!is_power_of_two(sector_size) || !is_power_of_two(program_size) || program_size > 16 || size == 0 ||
         size % sector_size != 0 || (erased != 0xFF && erased != 0))
         return ERR_PARAMETER;
-    free_cells(&chip.cells);
     free_cells(&chip.kept);
     free_cells(&chip.synced);
-    if (!allocate_cells(&chip.cells, size))
+    if (!renew_cells(size, erased))
         return ERR_NOMEMORY;
-    memset(chip.cells.data, erased, size);
     chip.flash.size = size;
     chip.flash.sector_size = sector_size;
     chip.flash.program_size = program_size;

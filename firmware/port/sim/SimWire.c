@@ -18,7 +18,7 @@ enum {
     WIRES = MODBUS_MAX_CLIENTS + MODBUS_MAX_SERVERS,
     FIRST_LINE = 1, /* 0 is that of tools */
     FIRST_SOCKET = 0x1000,
-    LISTENER = 0x2000, /* nobody ever connects to it */
+    LISTENER = 0x2000, /* no client connects to it */
     LEAST_FRAME = MODBUS_AT_PDU + 1,
 };
 
