@@ -33,13 +33,12 @@ _BARE_SOURCES = [
     FIRMWARE / "port/baremetal/blank/SysAtomic.c",  # nothing here can come in between
     *(HERE / "bare").glob("*.c"),
 ]
+_OF_PLCTOOL = ("SimBoards.c", "SimModbus.c", "SimWire.c")
 _LINUX_SOURCES = [
     *_PORTABLE,
     *(FIRMWARE / "src").glob("comm/*.c"),
-    *(source for source in (FIRMWARE / "src/io").glob("*.c") if "Modbus" not in source.name),  # as in the simulator
-    FIRMWARE / "src/io/ModbusCalls.c",
-    FIRMWARE / "src/modbus/ModbusPdu.c",
-    *(source for source in (FIRMWARE / "port/sim").glob("*.c") if source.name != "SimBoards.c"),  # it is of plctool
+    *(s for s in (FIRMWARE / "src/io").glob("*.c") if "Modbus" not in s.name),
+    *(s for s in (FIRMWARE / "port/sim").glob("*.c") if s.name not in _OF_PLCTOOL),
     *(FIRMWARE / "port/linux" / name for name in ("IecStack.c", "IecStackSwitch.S", "SysExcept.c", "SysMem.c")),
 ]
 # Picolibc keeps the clock to itself unless a flag says that there is one.
