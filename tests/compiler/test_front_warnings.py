@@ -13,6 +13,7 @@ from plctool.compiler import warnings
 from plctool.compiler.front import Source, check_sources
 from plctool.compiler.warnings import WARNINGS, warning_options
 from plctool.errors import UsageError
+from plctool.iec.dialect import find_dialect
 
 ROOT = Path(__file__).parents[2]
 COLOR = "TYPE Color : (Red, Green, Blue); END_TYPE\n"
@@ -193,6 +194,37 @@ def test_method_that_never_assigns_its_result_is_a_warning_but_not_fb_init() -> 
         "VAR_INPUT bInitRetains, bInCopyCode : BOOL; END_VAR\nEND_METHOD\nEND_FUNCTION_BLOCK\n"
     )
     assert warned(text + main("b : B;", "b();"), "result") == ["4:8: M never assigns its result; write M := ..."]
+
+
+# ---- conversions of constants ----------------------------------------------------------------------------------------
+
+
+def test_constants_that_every_system_converts_alike_are_no_warning() -> None:
+    variables = "b : BYTE; w : WORD; i : INT; s : SINT; r : REAL; t : STRING := 'x'; l : LREAL := 300.5;"
+    alike = [
+        "b := REAL_TO_BYTE(255.0);",
+        "w := REAL_TO_WORD(3.5);",
+        "i := REAL_TO_INT(-2.4);",
+        "i := REAL_TO_INT(2.5);",
+        "i := STRING_TO_INT(' -12 ');",
+        "s := STRING_TO_SINT('-128');",
+        "w := STRING_TO_WORD('16#ffff');",
+        "r := STRING_TO_REAL('-1.5E3');",
+        "r := STRING_TO_REAL('3');",
+        "i := STRING_TO_INT(t);",
+        "b := LREAL_TO_BYTE(l);",
+        "b := TO_BYTE('2#101');",
+    ]
+    assert warned(main(variables, "\n".join(alike)), "conversion") == []
+
+
+def test_a_dialect_that_keeps_the_low_bits_warns_of_none_that_are_cut() -> None:
+    text = main("b : BYTE; i : INT;", "b := REAL_TO_BYTE(300.5); i := REAL_TO_INT(1.0E9);")
+    counts = {}
+    for name in (None, "codesys"):
+        found = check_sources([Source("f.st", text)], dialect=find_dialect(name)).diagnostics
+        counts[name] = [d.code for d in found].count("conversion")
+    assert counts == {None: 2, "codesys": 1}
 
 
 # ---- names -----------------------------------------------------------------------------------------------------------

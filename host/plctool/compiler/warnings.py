@@ -21,6 +21,7 @@ WARNINGS = {
     "bounds": "an array goes to one of the same length with other bounds",
     "case": "a CASE about an enumeration has no ELSE and misses some of its values",
     "configuration": "a task has no time, no event or no program, or a program no task",
+    "conversion": "a constant text or REAL is no value of the type it is converted to, so systems disagree",
     "endless": "a loop never ends as it is written",
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration or is compared with one",
     "for-bound": "a FOR changes its end or step in its body, but both are computed once, at its start",

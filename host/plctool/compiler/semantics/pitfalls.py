@@ -8,8 +8,10 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import takewhile
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.diagnostics import Diagnostics
@@ -236,6 +238,45 @@ def _division(e: Expr) -> Binary | None:
     if e.op in (BinaryOp.ADD, BinaryOp.SUB):
         return _division(e.left) or _division(e.right)
     return e if e.op is BinaryOp.DIV else None
+
+
+# ---- constants that are converted to a type that has no such value ----
+
+_INTEGER_TEXT = re.compile(r"[ \t]*([+-]?)(?:(?P<base>2|8|16)#)?(?P<digits>[0-9A-Fa-f]*)(?P<rest>.*)", re.DOTALL)
+_REAL_TEXT = re.compile(r"[ \t]*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[ \t]*|[ \t]*[+-]?(?:inf\w*|nan)[ \t]*", re.I)
+
+
+def misread(text: str, target: Elementary) -> str:
+    """What to say when a constant text becomes a number; "" when it is one of this type. Reads as STRING_TO_INT and
+    STRING_TO_REAL of the library do."""
+    if target.kind is Kind.REAL:
+        return "" if _REAL_TEXT.fullmatch(text) else f"'{text}' is no number as a whole, so only its start is read"
+    match = _INTEGER_TEXT.fullmatch(text)
+    if match is None or target.kind not in NUMBERS:
+        return ""
+    base = int(match["base"] or 10)
+    digits = "".join(takewhile(lambda digit: int(digit, 16) < base, match["digits"]))
+    rest = match["digits"][len(digits) :] + match["rest"]
+    read = int(digits or "0", base) * (-1 if match[1] == "-" else 1)
+    value = constants.wrap(read, target)
+    if not digits:
+        return f"'{text}' is no number, so this is {value}; other systems may disagree"
+    if rest.strip(" \t"):
+        return f"reading '{text}' stops at '{rest}', so this is {value}; other systems give 0 or read on"
+    return "" if value == read else f"'{text}' does not fit {target}, so this is {value}"
+
+
+def not_a_value(real: float, result: Expr, target: Elementary) -> str:
+    """What to say when a constant REAL becomes an integer or bit string; "" when systems give the same.
+    Halves go to even here; to bit strings other systems round them away from zero."""
+    if not isinstance(result, Const) or not isinstance(result.value, int) or target.kind not in NUMBERS:
+        return ""
+    distance = abs(result.value - real)
+    if not distance <= 0.5:  # NaN is no value either
+        return f"{real} does not fit {target}, so this is {result.value}; other systems may give another value"
+    if distance == 0.5 and target.kind is Kind.BIT and abs(result.value) < abs(real):
+        return f"{real} becomes {result.value}, the even one; other systems round halves away from zero"
+    return ""
 
 
 def _is_of_time(e: Expr) -> bool:

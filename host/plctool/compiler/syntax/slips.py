@@ -76,7 +76,10 @@ class Refusal:
 
 _GRAPHIC = "this is a diagram; only Structured Text can be compiled"
 
-GENERIC = "blocks of any size are not supported; write one with VAR CONSTANT for each"
+GENERIC = (
+    "blocks of any size are not supported; write one with VAR CONSTANT for each size, "
+    "or take a POINTER TO and a count whose memory the caller declares"
+)
 
 REFUSED = {
     "VAR_GENERIC": Refusal(GENERIC, "END_VAR"),

@@ -20,7 +20,7 @@ from plctool.compiler.semantics.conversions import (
     is_untyped,
     settle,
 )
-from plctool.compiler.semantics.pitfalls import lost_fraction
+from plctool.compiler.semantics.pitfalls import lost_fraction, misread, not_a_value
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol, TypeSymbol
 from plctool.compiler.source import Source
@@ -163,7 +163,19 @@ def _by_types(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Ex
         if lost:
             c.warning(node.args[0].pos, "integer-division", lost)
     result = convert_explicitly(c, e, target)
-    return result or c.error(node.pos, "type", f"there is no conversion from {e.type} to {target}")
+    if result is None:
+        return c.error(node.pos, "type", f"there is no conversion from {e.type} to {target}")
+    to = elementary(target)
+    as_elsewhere = to is not None and to.kind is Kind.BIT and c.dialect.reals_wrap
+    if to is not None and not as_elsewhere and isinstance(e, Const) and isinstance(e.value, float):
+        _tell(c, node, not_a_value(e.value, result, to))
+    return result
+
+
+def _tell(c: Checker, node: ast.Call, message: str) -> None:
+    """Of a constant argument that systems convert in different ways."""
+    if message:
+        c.warning(node.args[0].pos, "conversion", message)
 
 
 def _text_conversion(c: Checker, e: Expr, target: Type, node: ast.Call) -> Expr:
@@ -183,6 +195,8 @@ def _text_conversion(c: Checker, e: Expr, target: Type, node: ast.Call) -> Expr:
         named = isinstance(e.type, EnumType) and e.type.named
         text = value_name(c, e, node.pos) if named else _text_of(c, convert(e, base), base, node)
         return call_by_name(c, "STRING_TO_WSTRING", [text], node.pos, None) if target.wide else text
+    if isinstance(e, Const) and isinstance(e.value, str):
+        _tell(c, node, misread(e.value, base))
     if isinstance(e.type, StringType) and e.type.wide:
         e = call_by_name(c, "WSTRING_TO_STRING", [e], node.pos, None)
     reader = "READ_INTEGER__" if base.kind in NUMBERS else f"STRING_TO_{base}"
