@@ -28,8 +28,8 @@ typedef struct {
 
 /* The cells, and which of them were programmed since they were erased; shared with child processes. */
 typedef struct {
-    int file;      /* memory with the cells, by which they are changed */
-    RTS_UI8 *data; /* the same, for reading */
+    RTS_UI8 *data;   /* for reading */
+    RTS_UI8 *change; /* the same memory at another address, by which cells are changed */
     RTS_UI8 *programmed;
     RTS_UI8 *touched; /* pages that may not be as they were made */
     RTS_UI32 size;
@@ -104,12 +104,6 @@ static void set_writable(bool writable)
         touch(0, chip.cells.size);
 }
 
-static void set_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
-{
-    if (pwrite(chip.cells.file, data, size, (off_t)offset) != (ssize_t)size)
-        violate("the simulator's memory failed", offset);
-}
-
 /* ---- cuts ---- */
 
 /* Counts an operation on `size` bytes; returns how many of them happen. *after: what follows, SIM_CUT_* or
@@ -170,30 +164,19 @@ static RTS_UI8 programmed_cell(RTS_UI8 old, RTS_UI8 value)
 static void program_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 unit = chip.flash.program_size;
-    RTS_UI8 part[PAGE];
-    RTS_UI32 done;
-    RTS_UI32 count;
+    RTS_UI8 *cells = chip.cells.change + offset;
+    RTS_UI32 i;
 
     touch(offset, size);
-    for (done = 0; done < size; done += count) {
-        RTS_UI32 i;
-        count = size - done < sizeof part ? size - done : (RTS_UI32)sizeof part;
-        for (i = 0; i < count; i++)
-            part[i] = programmed_cell(chip.cells.data[offset + done + i], data[done + i]);
-        set_cells(offset + done, part, count);
-    }
+    for (i = 0; i < size; i++)
+        cells[i] = programmed_cell(cells[i], data[i]);
     memset(chip.cells.programmed + offset, 1, (size + unit - 1) / unit * unit);
 }
 
 static void erase_cells(RTS_UI32 offset, RTS_UI32 size)
 {
-    RTS_UI8 part[PAGE];
-    RTS_UI32 done;
-
     touch(offset, size);
-    memset(part, chip.flash.erased, sizeof part);
-    for (done = 0; done < size; done += (RTS_UI32)sizeof part)
-        set_cells(offset + done, part, size - done < sizeof part ? size - done : (RTS_UI32)sizeof part);
+    memset(chip.cells.change + offset, chip.flash.erased, size);
     memset(chip.cells.programmed + offset, 0, size);
 }
 
@@ -297,8 +280,8 @@ static void free_cells(CELLS *cells)
         munmap(cells->programmed, cells->size);
     if (cells->touched != NULL)
         munmap(cells->touched, pages_of(cells->size));
-    if (cells->size != 0)
-        close(cells->file);
+    if (cells->change != NULL)
+        munmap(cells->change, cells->size);
     memset(cells, 0, sizeof *cells);
 }
 
@@ -312,14 +295,19 @@ static RTS_UI8 *map_shared(int file, RTS_UI32 size)
 
 static bool allocate_cells(CELLS *cells, RTS_UI32 size)
 {
-    cells->file = memfd_create("flash", MFD_CLOEXEC);
-    if (cells->file < 0)
+    int file = memfd_create("flash", MFD_CLOEXEC);
+
+    if (file < 0)
         return false;
     cells->size = size;
     cells->programmed = map_shared(-1, size);
     cells->touched = map_shared(-1, pages_of(size));
-    cells->data = ftruncate(cells->file, (off_t)size) == 0 ? map_shared(cells->file, size) : NULL;
-    if (cells->data != NULL && cells->programmed != NULL && cells->touched != NULL)
+    if (ftruncate(file, (off_t)size) == 0) {
+        cells->data = map_shared(file, size);
+        cells->change = map_shared(file, size);
+    }
+    close(file);
+    if (cells->data != NULL && cells->programmed != NULL && cells->change != NULL && cells->touched != NULL)
         return true;
     free_cells(cells);
     return false;
