@@ -92,6 +92,29 @@ def test_few_missing_names_are_shown_where_they_are(tmp_path: Path) -> None:
     assert texts[0].endswith("main.st:2:1: error: unknown function ADSLOGSTR\nADSLOGSTR(1);\n^")
 
 
+def test_a_few_names_of_one_library_are_one_line_after_everything_else(tmp_path: Path) -> None:
+    """Variables that nothing else uses are not mentioned before it, but remain in the document."""
+    declared = "a : AXIS_REF; p : MC_Power; q : MC_Stop; x : Wxyz; u : INT;"
+    (tmp_path / "main.st").write_text(f"PROGRAM Main\nVAR {declared} END_VAR\np();\nq();\nEND_PROGRAM\n")
+    document, texts = check(Settings(program_files([tmp_path]), ALL_WARNINGS))
+    assert [text.splitlines()[0].partition("error: ")[2] for text in texts[:-3]] == ["unknown type Wxyz"]
+    assert texts[-3:] == [
+        "The program uses 3 names that nothing declares, in 3 places:",
+        f"  Tc2_MC2 or SM3_Basic (motion): AXIS_REF (1), MC_Power (1), MC_Stop (1); first at {tmp_path}/main.st:2",
+        "Give the sources of these libraries with the program, or declare the names.",
+    ]
+    assert "unused" in {d["code"] for d in document["diagnostics"]}
+
+
+def test_unused_variables_are_told_when_no_table_follows(tmp_path: Path) -> None:
+    (tmp_path / "main.st").write_text(
+        "PROGRAM Main\nVAR a : AXIS_REF; p : MC_Power; u : INT; END_VAR\np();\nEND_PROGRAM\n"
+    )
+    _, texts = check(Settings(program_files([tmp_path]), ALL_WARNINGS))
+    assert any("u is never used" in text for text in texts)
+    assert sum("unknown type" in text for text in texts) == 2
+
+
 @pytest.mark.parametrize(
     ("name", "library"),
     [

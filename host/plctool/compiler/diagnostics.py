@@ -5,11 +5,12 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from plctool.compiler.missing_names import Use, table
+from plctool.compiler.missing_names import Use, library_of, table
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Pos
 from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
@@ -21,6 +22,7 @@ Severity = Literal["error", "warning"]
 
 MAX_ERRORS = 20  # what follows is seldom news
 MAX_MISSING = 10  # places of unknown names that are shown each; of more there is a table
+MAX_OF_LIBRARY = 2  # places of names of one known library that are shown each; of more there is one line
 MAX_MESSAGE = 300  # characters; names may be of any length
 _UNCOUNTED = frozenset(("language",))  # errors that hide no others
 MAX_LINE = 160  # characters of a source line that are shown with a finding
@@ -153,13 +155,23 @@ def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
 
 def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> list[str]:
     """All findings as people read them, and whether there may be more. Many missing names become one table."""
-    missing = [d for d in diagnostics if d.missing]
-    listed = len(missing) > MAX_MISSING
-    texts = [render(d, () if d.code in _UNCOUNTED else sources) for d in diagnostics if not (listed and d.missing)]
-    texts += missing_names_text(missing) if listed else []
+    listed = _listed([d for d in diagnostics if d.missing])
+    hidden = {id(d) for d in listed}
+    if listed:  # what is never used may be used with what is missing, and would push the table out of sight
+        hidden |= {id(d) for d in diagnostics if d.severity == "warning" and d.code == "unused"}
+    texts = [render(d, () if d.code in _UNCOUNTED else sources) for d in diagnostics if id(d) not in hidden]
+    texts += missing_names_text(listed) if listed else []
     if sum(d.severity == "error" and d.code not in _UNCOUNTED and not d.missing for d in diagnostics) >= MAX_ERRORS:
         texts.append(f"There may be more than these {MAX_ERRORS} errors; correct some and check again.")
     return texts
+
+
+def _listed(missing: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """Those that become a table: all when they are many, else those of a library that has several of them."""
+    if len(missing) > MAX_MISSING:
+        return list(missing)
+    counts = Counter(library_of(d.missing) for d in missing)
+    return [d for d in missing if (library := library_of(d.missing)) and counts[library] > MAX_OF_LIBRARY]
 
 
 def missing_names_text(missing: Sequence[Diagnostic]) -> list[str]:
