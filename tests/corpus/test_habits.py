@@ -35,3 +35,10 @@ def test_what_shows_a_habit_is_there(shown: str) -> None:
 def test_a_program_is_refused_where_it_should_be_and_nowhere_else(program: str) -> None:
     found = checked(program)
     assert (found.status, bool(found.errors)) == ((2, True) if is_refused(program) else (0, False)), found.errors
+
+
+@pytest.mark.parametrize("program", [p for p in PROGRAMS if p.endswith(".st")])
+def test_a_program_says_what_must_come_out(program: str) -> None:
+    """That it compiles is not enough: it has values, an exception or an error, or asserts them itself."""
+    text = (TESTS / program).read_text("utf-8")
+    assert re.search(r"^\(\* expect(-error|-exception)?: |\bASSERT_\w+\(", text, re.MULTILINE)
