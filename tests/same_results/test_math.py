@@ -88,11 +88,18 @@ def recording() -> Recording:
     return result
 
 
-def error_ulp(value: float, exact: Any, type_name: str) -> float:
-    """How far a value is from the exact one, in units of the last place of the exact one."""
+@cache
+def exact_values(name: str, type_name: str) -> list[tuple[Any, Any]]:
+    """What is exact for each of the arguments, and its unit of the last place; the same for all targets."""
+    function = FUNCTIONS[name][0]
+    exact = [function(*map(mpmath.mpf, row)) for row in arguments(name, type_name)]
+    return [(value, last_place(value, type_name)) for value in exact]
+
+
+def last_place(exact: Any, type_name: str) -> Any:
+    """The unit of the last place of an exact value."""
     _, bits, smallest = FORMATS[type_name]
-    exponent = max(int(mpmath.floor(mpmath.log(abs(exact), 2))) - bits + 1, smallest)
-    return float(abs(mpmath.mpf(value) - exact) / mpmath.ldexp(1, exponent))
+    return mpmath.ldexp(1, max(int(mpmath.floor(mpmath.log(abs(exact), 2))) - bits + 1, smallest))
 
 
 def results(state: State, name: str, type_name: str) -> tuple[float, ...]:
@@ -102,9 +109,9 @@ def results(state: State, name: str, type_name: str) -> tuple[float, ...]:
 
 
 def worst_error(state: State, name: str, type_name: str) -> float:
-    exact = FUNCTIONS[name][0]
-    pairs = zip(results(state, name, type_name), arguments(name, type_name), strict=True)
-    return max(error_ulp(value, exact(*map(mpmath.mpf, row)), type_name) for value, row in pairs)
+    """How far a result is from the exact one at most, in units of the last place of the exact one."""
+    pairs = zip(results(state, name, type_name), exact_values(name, type_name), strict=True)
+    return max(float(abs(mpmath.mpf(value) - exact) / unit) for value, (exact, unit) in pairs)
 
 
 @pytest.mark.parametrize("target", [REFERENCE, *RUNNERS])
