@@ -10,7 +10,7 @@ from plctool.compiler.front import CheckResult, Source, check_sources
 from plctool.compiler.semantics.conversions import SIGNED
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import Binary, BinaryOp, Call, Const, Pou, Statement, TypedProgram, Variable
-from plctool.iec.types import BOOL, Elementary, Kind, StringType, Type, base_of, is_scalar
+from plctool.iec.types import BOOL, ArrayType, Elementary, Kind, StringType, Type, base_of, is_scalar
 
 COMPARISONS = {BinaryOp.EQ, BinaryOp.NE, BinaryOp.LT, BinaryOp.LE, BinaryOp.GT, BinaryOp.GE}
 
@@ -131,6 +131,10 @@ def _verify_assignment(target: Type, value: Type) -> None:
         assert isinstance(value, StringType)
     elif is_scalar(target):
         assert base_of(target) == base_of(value), (target, value)
+    elif isinstance(target, ArrayType) and isinstance(value, ArrayType):
+        lengths = [[last - first for first, last in t.bounds] for t in (target, value)]
+        assert lengths[0] == lengths[1], (target, value)
+        _verify_assignment(target.element, value.element)
     else:
         assert target == value or str(target) == str(value), (target, value)
 

@@ -108,7 +108,7 @@ def _nothing() -> Part:
 
 @dataclass
 class Job:
-    """A read or write of a device, or both at a time."""
+    """A read or write of a device, or both at a time. `took_us`: on the line, with the device's reply."""
 
     function: Function
     interval_us: int
@@ -117,6 +117,7 @@ class Job:
     pos: Pos
     read: Part = field(default_factory=_nothing)
     write: Part = field(default_factory=_nothing)
+    took_us: float = 0.0
 
     @property
     def channels(self) -> list[Channel]:
@@ -137,6 +138,16 @@ class ModbusLine(Connector):
 
     char_us: float | None = None
     silence_us: float = 0.0
+    devices: list[ModbusDevice] = field(default_factory=list)
+
+    def note_ages(self) -> None:
+        """A job that is due waits for each of the others once at most: the one that has been due longest comes next.
+        What changes when the device has just begun to reply is in the next reply."""
+        jobs = [job for device in self.devices for job in device.jobs]
+        round_us = int(sum(job.took_us for job in jobs))
+        for job in jobs:
+            for channel in job.channels:
+                channel.age_us = round_us + max(job.interval_us, int(job.took_us))
 
     def transaction_us(self, request: int, reply: int) -> float:
         """How long PDUs of these sizes take with all that is around them; 0 on a network."""
@@ -163,6 +174,9 @@ class ModbusDevice(Connector):
                 continue
             self._add(number, job, flags)
             self._note_time(job, mistakes)
+        line = self.parent
+        if isinstance(line, ModbusLine) and self in line.devices[-1:]:
+            line.note_ages()
 
     def _bits(self, job: Job, mistakes: Mistakes) -> int | None:
         for part, _ in job.parts:
@@ -249,15 +263,15 @@ class ModbusDevice(Connector):
         assert isinstance(line, ModbusLine)
         function = job.function
         written = _data_size(function, job.write.count) if function.most_written > 1 else 0
-        took = line.transaction_us(function.request + written, function.reply + _data_size(function, job.read.count))
+        job.took_us = line.transaction_us(
+            function.request + written, function.reply + _data_size(function, job.read.count)
+        )
         if job.verify:
-            took += line.transaction_us(5, 2 + _data_size(function, job.write.count))
-        for channel in job.channels:
-            channel.age_us = job.interval_us + int(took)
+            job.took_us += line.transaction_us(5, 2 + _data_size(function, job.write.count))
         if line.char_us is None or job.interval_us == 0:
             return
         before = line.load or 0.0
-        line.load = before + took / job.interval_us
+        line.load = before + job.took_us / job.interval_us
         if before <= 1.0 < line.load:
             message = f"the line {line.name} is too slow for all that is asked on it: ask less often, or raise its baud"
             mistakes.warning(job.pos, message)
@@ -309,6 +323,7 @@ def _read_devices(table: Table, line: ModbusLine) -> list[Connector]:
 def _read_device(table: Table, line: ModbusLine) -> Connector:
     serial = line.char_us is not None
     device = read_connector(ModbusDevice, table, DRIVER, parent=line)
+    line.devices.append(device)
     unit = table.number("unit", 0, MAX_UNIT if serial else 255, None if serial else 255, required=serial)
     timeout_us = table.duration_us("timeout", 1000, _MAX_TIMEOUT_US, 1_000_000)
     device.order = table.choice("order", ORDERS, ORDERS["ABCD"]) or ORDERS["ABCD"]
