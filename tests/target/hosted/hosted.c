@@ -108,8 +108,8 @@ int clock_gettime(clockid_t clock, struct timespec *now)
 /* ---- memory that has a file ---- */
 
 static struct {
-    void *memory; /* NULL: free */
-    size_t size;
+    void *memory;      /* NULL: free */
+    unsigned mappings; /* that keep it, closed as it may be */
 } files[4];
 
 int memfd_create(const char *name, unsigned flags)
@@ -126,32 +126,29 @@ int memfd_create(const char *name, unsigned flags)
 int ftruncate(int file, off_t size)
 {
     files[file].memory = memalign(16, (size_t)size);
-    files[file].size = (size_t)size;
+    files[file].mappings = 0;
     return files[file].memory != NULL ? 0 : -1;
-}
-
-ssize_t pwrite(int file, const void *data, size_t size, off_t offset)
-{
-    if (size > files[file].size || (size_t)offset > files[file].size - size)
-        return -1;
-    memcpy((char *)files[file].memory + offset, data, size);
-    return (ssize_t)size;
 }
 
 int close(int file)
 {
-    free(files[file].memory);
-    files[file].memory = NULL;
+    RTS_UNUSED(file);
     return 0;
 }
 
-static bool has_file(const void *memory)
+/* Whether memory is that of a file, which goes with the last mapping. */
+static bool unmap_file(const void *memory)
 {
-    bool found = false;
-
-    for (size_t i = 0; i < RTS_COUNT(files); i++)
-        found = found || files[i].memory == memory;
-    return found;
+    for (size_t i = 0; i < RTS_COUNT(files); i++) {
+        if (files[i].memory != memory)
+            continue;
+        if (--files[i].mappings == 0) {
+            free(files[i].memory);
+            files[i].memory = NULL;
+        }
+        return true;
+    }
+    return false;
 }
 
 void *mmap(void *where, size_t size, int protection, int flags, int file, long offset)
@@ -164,6 +161,8 @@ void *mmap(void *where, size_t size, int protection, int flags, int file, long o
     RTS_UNUSED(offset);
     if (memory == NULL)
         return MAP_FAILED;
+    if (file >= 0)
+        files[file].mappings++;
     return memset(memory, 0, size);
 }
 
@@ -178,7 +177,7 @@ int mprotect(void *memory, size_t size, int protection)
 int munmap(void *memory, size_t size)
 {
     RTS_UNUSED(size);
-    if (!has_file(memory))
+    if (!unmap_file(memory))
         free(memory);
     return 0;
 }
