@@ -21,6 +21,7 @@ VAR
     d : ARRAY[0..3] OF LINT;
     setpoint : INT;
     alarm : BOOL;
+    all, seen : INT;
 END_VAR
 END_PROGRAM
 """
@@ -45,6 +46,20 @@ function = 3
 address = 40005
 every = "T#50ms"
 var = "Main.around"
+[[modbus.rs485.device.read]]
+function = 3
+address = 40010
+every = "T#50ms"
+var = "Main.seen"
+[[modbus.rs485.device]]
+name = "All"
+unit = 0
+timeout = "T#20ms"
+[[modbus.rs485.device.write]]
+function = 6
+address = 40010
+every = "T#1s"
+var = "Main.all"
 [modbus.server.rs485]
 port = "/dev/ttyS2"
 [modbus.server.rs485.holding]
@@ -116,6 +131,12 @@ def test_orders_are_those_of_the_manual(plc: Simulator, i: int, registers: tuple
         plc.set_modbus(f"Order{i}", 30001 + offset, register)
     plc.run_for(100)
     assert plc.read(f"Main.r[{i}]") == pytest.approx(1.234)
+
+
+def test_what_is_written_to_all_devices_arrives_at_each(plc: Simulator) -> None:
+    plc.write({"Main.all": 4711})
+    plc.run_for(2000)
+    assert plc.read("Main.seen") == 4711
 
 
 def test_a_test_is_the_client_of_a_server(plc: Simulator) -> None:
