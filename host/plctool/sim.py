@@ -242,7 +242,7 @@ class Simulator(Controller):
 
     def set_input(self, name: str, value: Any) -> None:
         """What a device measures from now on; `name`: of the channel (`Bench.button`) or its variable (`Main.start`).
-        The program sees it from its next cycle on."""
+        The program sees it from its next cycle on; what a Modbus device measures, when it has been asked."""
         self.io.set_input(name, value)
 
     def output(self, name: str) -> Any:
