@@ -202,16 +202,22 @@ static void a_storm_of_open_requests_does_not_end_a_login(void)
     CHECK(client_login(&newcomer) && client_login_app(&newcomer) && is_served(&newcomer));
 }
 
+/* All channels are of peers that have not logged in. */
+static void take_all_channels(CLIENT *crowd)
+{
+    fakes_start();
+    for (RTS_UI16 i = 0; i < COMM_MAX_CLIENTS; i++) {
+        client_init(&crowd[i], (RTS_UI16)(INTRUDER + i));
+        CHECK(client_open(&crowd[i]) && works(&crowd[i]));
+    }
+}
+
 static void those_who_hold_channels_without_login_give_way_after_a_while(void)
 {
     CLIENT crowd[COMM_MAX_CLIENTS];
     CLIENT newcomer;
 
-    fakes_start();
-    for (RTS_UI16 i = 0; i < RTS_COUNT(crowd); i++) {
-        client_init(&crowd[i], (RTS_UI16)(INTRUDER + i));
-        CHECK(client_open(&crowd[i]) && works(&crowd[i]));
-    }
+    take_all_channels(crowd);
     client_init(&newcomer, ADDRESS);
     CHECK(!comes_in(&newcomer));
     pass(CHANNEL_SETTLE_MS);
@@ -223,11 +229,7 @@ static void those_who_open_again_and_again_give_way_after_a_while(void)
     CLIENT crowd[COMM_MAX_CLIENTS];
     CLIENT newcomer;
 
-    fakes_start();
-    for (RTS_UI16 i = 0; i < RTS_COUNT(crowd); i++) {
-        client_init(&crowd[i], (RTS_UI16)(INTRUDER + i));
-        CHECK(client_open(&crowd[i]) && works(&crowd[i]));
-    }
+    take_all_channels(crowd);
     client_init(&newcomer, ADDRESS);
     for (RTS_UI32 ms = 0; ms < CHANNEL_SETTLE_MS; ms += 100) {
         CHECK(!comes_in(&newcomer));
