@@ -274,7 +274,7 @@ class Simulator(Controller):
         self._plants.append(_Plant(step, every, self.now_ns + every))
 
     def at(self, after_ms: float, step: Callable[[Simulator], None]) -> None:
-        """`step(plc)` is called once, when so much virtual time has passed."""
+        """`step(plc)` is called once, when so much virtual time has passed; never, if there is a `restart` before."""
         self._plants.append(_Plant(step, 2 * MAX_NS, self.now_ns + round(after_ms * 1e6)))
 
     def _step_plants(self) -> None:

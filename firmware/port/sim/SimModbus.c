@@ -21,7 +21,8 @@
 #include "SysTime.h"
 #include "sim_port.h"
 
-enum { VALUES = 0x10000, FAULTS = 4 };
+enum { VALUES = 0x20000, FAULTS = 4 }; /* twice as many as the areas of a program have bits */
+RTS_STATIC_ASSERT(2 * 8 * (APP_INPUT_SIZE + APP_OUTPUT_SIZE) <= VALUES, a_description_does_not_fill_the_table);
 
 #define REPLY_NS ((RTS_I64)2000000) /* before a device replies, besides silence */
 #define NS_PER_MS ((RTS_I64)1000000)
@@ -36,6 +37,7 @@ typedef struct {
 RTS_STATIC_ASSERT(MODBUS_MAX_DEVICES < UINT8_MAX, numbers_of_devices_fit);
 
 static SIM_VALUE values[VALUES];
+static bool has_values;                            /* any entry is used */
 static RTS_UI32 faults[IO_MAX_CONNECTORS][FAULTS]; /* by id - IO_SIM_ABSENT */
 
 static MODBUS_SETUP *setup(void)
@@ -65,6 +67,7 @@ static bool set_value(RTS_UI32 device, RTS_UI8 table, RTS_UI32 address, RTS_UI16
     if (value == NULL)
         return false;
     *value = (SIM_VALUE){(RTS_UI8)(device + 1), table, (RTS_UI16)address, number};
+    has_values = true;
     return true;
 }
 
@@ -320,35 +323,41 @@ static RTS_RESULT find_region(const IoConfigConnector *connector, const SIM_IO_P
     return place->bits <= region->bits && place->bit <= region->bits - place->bits ? ERR_OK : ERR_OUT_OF_LIMITS;
 }
 
-/* The coil or register of a bit, in the order of MODBUS_JOB_REVERSE_2 .. for registers, and its bit there. */
-static SIM_VALUE *value_of(const REGION *region, RTS_UI32 bit, RTS_UI32 *shift)
+/* The address of the coil or register of a bit, in the order of MODBUS_JOB_REVERSE_2 .. for registers, and the bit
+ * there. */
+static RTS_UI32 address_of(const REGION *region, RTS_UI32 bit, RTS_UI32 *shift)
 {
     RTS_UI32 byte = region->reverse != 0 ? bit / 8 ^ (region->reverse - 1) : bit / 8;
 
     *shift = region->of_bits ? 0 : (byte % 2 == 0 ? 8 : 0) + bit % 8;
-    return find_value(region->device, region->table, region->address + (region->of_bits ? bit : byte / 2));
+    return region->address + (region->of_bits ? bit : byte / 2);
 }
 
 static bool get_bit(const REGION *region, RTS_UI32 bit)
 {
+    RTS_UI16 value = 0;
     RTS_UI32 shift;
+    RTS_UI32 address = address_of(region, bit, &shift);
 
     if (region->memory != NULL)
         return (region->memory[bit / 8] >> bit % 8 & 1) != 0;
-    return (value_of(region, bit, &shift)->value >> shift & 1) != 0;
+    (void)get_value(region->device, region->table, address, &value);
+    return (value >> shift & 1) != 0;
 }
 
-static void set_bit(const REGION *region, RTS_UI32 bit, bool on)
+static bool set_bit(const REGION *region, RTS_UI32 bit, bool on)
 {
+    RTS_UI16 value = 0;
     RTS_UI32 shift;
-    SIM_VALUE *value;
+    RTS_UI32 address = address_of(region, bit, &shift);
 
     if (region->memory != NULL) {
         region->memory[bit / 8] = (RTS_UI8)((region->memory[bit / 8] & ~(1u << bit % 8)) | (unsigned)on << bit % 8);
-        return;
+        return true;
     }
-    value = value_of(region, bit, &shift);
-    value->value = (RTS_UI16)((value->value & ~(1u << shift)) | (unsigned)on << shift);
+    (void)get_value(region->device, region->table, address, &value);
+    value = (RTS_UI16)((value & ~(1u << shift)) | (unsigned)on << shift);
+    return set_value(region->device, region->table, address, value);
 }
 
 static RTS_RESULT set_place(const IoConfigConnector *connector, const SIM_IO_PLACE *place, const RTS_UI8 *data)
@@ -356,8 +365,10 @@ static RTS_RESULT set_place(const IoConfigConnector *connector, const SIM_IO_PLA
     REGION region;
     RTS_RESULT result = find_region(connector, place, &region);
 
-    for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++)
-        set_bit(&region, place->bit + i, (data[i / 8] >> i % 8 & 1) != 0);
+    for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++) {
+        if (!set_bit(&region, place->bit + i, (data[i / 8] >> i % 8 & 1) != 0))
+            result = ERR_NOMEMORY;
+    }
     if (result == ERR_OK && region.memory != NULL)
         ModbusFindPlace(setup(), connector).server->server.written++;
     return result;
@@ -422,7 +433,9 @@ static void add_zeros(RTS_UI32 device, RTS_UI8 table, RTS_UI32 address, RTS_UI32
 static void forget(const EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
-    memset(values, 0, sizeof(values));
+    if (has_values)
+        memset(values, 0, sizeof(values));
+    has_values = false;
     memset(faults, 0, sizeof(faults));
 }
 
