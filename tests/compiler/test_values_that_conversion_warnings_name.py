@@ -1,5 +1,5 @@
-"""The value that the warning 'conversion' names is the one that the program has; where there is none, texts are read
-as a whole."""
+"""The value that the warning 'conversion' names is the one that the program has; where there is none, strings are
+read as a whole."""
 
 from __future__ import annotations
 
