@@ -8,8 +8,9 @@
  */
 #include "BareMetal.h"
 
-/* Where the controller starts; lowest in flash. */
-__attribute__((naked, section(".vectors"), used)) static void start(void)
+/* Where the controller starts; lowest in flash, and the entry of the file. */
+void start(void);
+__attribute__((naked, section(".vectors"), used)) void start(void)
 {
     __asm__ volatile("la sp, stack_top\n\ttail ResetHandler");
 }
