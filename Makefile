@@ -6,7 +6,7 @@
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
-# make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each
+# make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each (ARGS="--only tcp,lines --seed 7")
 #
 # Everything is installed into .venv and built in build*/; Debian packages that are missing are installed when you are root.
 
@@ -21,7 +21,7 @@ CORTEX_M := $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v q
 RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command -v qemu-system-riscv32),build-rv32imac))
 BUILDS := build build-sanitized $(CORTEX_M) $(RISC_V)
 
-.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz habits all clean
+.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz run-fuzz habits all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -93,12 +93,18 @@ habits: build/build.ninja
 	@ninja --quiet -C build under_attack
 	@PYTHONPATH=host:build/host $(BIN)/python tests/corpus/habits.py
 
-FUZZED := build build-sanitized
+# By its own driver; and by libFuzzer, where clang and atheris are there.
+FUZZED = build build-sanitized $(if $(shell command -v clang),build-libfuzzer)
 FUZZ_SECONDS ?= 60
 
-fuzz: $(FUZZED:%=%/build.ninja)
-	set -e; for build in $(FUZZED); do $(MESON) compile -C $$build; done
-	$(BIN)/python tests/fuzz/run.py --seconds $(FUZZ_SECONDS) $(FUZZED)
+fuzz: $(VENV)/dev
+	./bootstrap.sh --fuzz
+	$(BIN)/pip install --quiet atheris || true
+	$(MAKE) --no-print-directory run-fuzz
+
+run-fuzz: $(FUZZED:%=%/build.ninja)
+	set -e; ninja --quiet -C build under_attack; for build in $(FUZZED); do ninja --quiet -C $$build fuzz; done
+	PYTHONPATH=host:build/host $(BIN)/python tests/fuzz/run.py --seconds $(FUZZ_SECONDS) $(ARGS) $(FUZZED)
 
 build/build.ninja: $(VENV)/dev
 	$(MESON) setup build
@@ -106,6 +112,10 @@ build/build.ninja: $(VENV)/dev
 # Lines are all that a report shows, and compile faster than all of what a debugger knows.
 build-sanitized/build.ninja: $(VENV)/dev
 	$(MESON) setup build-sanitized -Dhost=false -Doptimization=1 -Ddebug=false -Dc_args=-g1 -Db_sanitize=address,undefined -Db_lundef=false
+
+# Another compiler may warn of what is right.
+build-libfuzzer/build.ninja: $(VENV)/dev
+	CC=clang $(MESON) setup build-libfuzzer -Dhost=false -Dlibfuzzer=true -Dwerror=false -Doptimization=1 -Ddebug=false -Dc_args=-g1 -Db_sanitize=address,undefined -Db_lundef=false
 
 build-cm%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini

@@ -2,9 +2,10 @@
 # bootstrap.sh VENV     makes a virtual environment, with what it needs from Debian: a C compiler, Python's headers and venv
 # bootstrap.sh --tests  installs what some tests need: cross compilers and QEMU, for Cortex-M, RISC-V and AArch64, and
 #                       programs of others that speak Modbus, and QEMU for a Linux kernel with hardware that is simulated
+# bootstrap.sh --fuzz   installs clang, with which libFuzzer runs the fuzz targets
 #
-# Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the second that
-# some tests will be left out.
+# Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the others what
+# will be left out.
 set -eu
 python=${PYTHON:-python3}
 
@@ -27,6 +28,11 @@ if [ "$1" = --tests ]; then
     command -v mbpoll >/dev/null || set -- "$@" mbpoll
     ls /usr/lib/*/libmodbus.so.5 >/dev/null 2>&1 || set -- "$@" libmodbus5
     [ $# = 0 ] || install "$@" || echo "Some tests are left out; for them: sudo apt-get install $*" >&2
+    exit 0
+fi
+
+if [ "$1" = --fuzz ]; then
+    command -v clang >/dev/null || install clang || echo "libFuzzer is left out; for it: sudo apt-get install clang" >&2
     exit 0
 fi
 

@@ -7,107 +7,11 @@
  */
 #include <string.h>
 
-#include "CmpBytes.h"
-#include "CmpPackets.h"
-#include "CmpSrvNumbers.h"
-#include "SysSocket.h"
 #include "comm_fakes.h"
 #include "fuzz.h"
-#include "rts_config.h"
+#include "fuzz_sockets.h"
 
-enum { FUZZED = 2, CONNECTIONS = 3, STREAM = 1 << 16, PASSED_MS = 700, PIECE_MAX = 0x7F };
-
-/* ---- sockets ---- */
-
-typedef struct {
-    bool closed; /* by the device */
-    const uint8_t *in;
-    uint32_t in_size;
-    uint32_t room; /* what the device may send at a time */
-    uint8_t out[STREAM];
-    uint32_t out_size;
-} CONNECTION;
-
-static CONNECTION connections[CONNECTIONS];
-static uint32_t dialled;
-static uint32_t accepted;
-
-RTS_HANDLE SysSockOpen(SYSSOCK_PURPOSE purpose)
-{
-    return purpose == SYSSOCK_TCP ? CONNECTIONS : (RTS_HANDLE)RTS_INVALID_HANDLE;
-}
-
-RTS_RESULT SysSockGetOwn(RTS_HANDLE socket, SOCKADDRESS *own, RTS_UI32 *prefix)
-{
-    RTS_UNUSED(socket);
-    *own = (SOCKADDRESS){0x7F000001, TCP_PORT};
-    *prefix = 8;
-    return ERR_OK;
-}
-
-RTS_HANDLE SysSockAccept(RTS_HANDLE listener, SOCKADDRESS *peer)
-{
-    FUZZ_CHECK(listener == CONNECTIONS);
-    if (accepted == dialled)
-        return (RTS_HANDLE)RTS_INVALID_HANDLE;
-    *peer = (SOCKADDRESS){0x7F000001, (RTS_UI16)(50000 + accepted)};
-    return accepted++;
-}
-
-RTS_RESULT SysSockRecv(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *received)
-{
-    CONNECTION *connection = &connections[socket];
-
-    FUZZ_CHECK(socket < CONNECTIONS && !connection->closed && size != 0);
-    *received = size < connection->in_size ? size : connection->in_size;
-    if (*received == 0)
-        return ERR_OK;
-    memcpy(data, connection->in, *received);
-    connection->in += *received;
-    connection->in_size -= *received;
-    return ERR_OK;
-}
-
-RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *taken)
-{
-    CONNECTION *connection = &connections[socket];
-
-    FUZZ_CHECK(socket < CONNECTIONS && !connection->closed && size != 0);
-    *taken = size < connection->room ? size : connection->room;
-    if (*taken > STREAM - connection->out_size)
-        *taken = STREAM - connection->out_size;
-    memcpy(connection->out + connection->out_size, data, *taken);
-    connection->out_size += *taken;
-    return ERR_OK;
-}
-
-RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received)
-{
-    RTS_UNUSED(socket);
-    RTS_UNUSED(data);
-    RTS_UNUSED(size);
-    RTS_UNUSED(from);
-    RTS_UNUSED(received);
-    return ERR_NOTHING_TO_DO;
-}
-
-RTS_RESULT SysSockSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to)
-{
-    RTS_UNUSED(socket);
-    RTS_UNUSED(data);
-    RTS_UNUSED(size);
-    RTS_UNUSED(to);
-    return ERR_OK;
-}
-
-void SysSockClose(RTS_HANDLE socket)
-{
-    FUZZ_CHECK(socket <= CONNECTIONS);
-    if (socket < CONNECTIONS) {
-        FUZZ_CHECK(!connections[socket].closed);
-        connections[socket].closed = true;
-    }
-}
+enum { FUZZED = SOCKETS_TCP - 1, PASSED_MS = 700, PIECE_MAX = 0x7F };
 
 /* ---- inputs ---- */
 
@@ -120,19 +24,11 @@ static const uint8_t open_channel[] = {0xC5, 0x6B, 0x40, 0x40, 0x00, 0x33, 0,   
                                        0xC3, 0x00, 0x01, 0x01, 0x08, 0x92, 0x77, 0xAC, 0x81, 0xD4,
                                        0x21, 0x83, 0x00, 0x40, 0x1F, 0x00, 0x05, 0x00, 0x00, 0x00};
 
-static size_t frame(const uint8_t *packet, size_t size, uint8_t *out)
-{
-    BytesPut32(out, (RTS_UI32)TCP_MAGIC);
-    BytesPut32(out + 4, (RTS_UI32)(sizeof(TCP_HEADER) + size));
-    memcpy(out + sizeof(TCP_HEADER), packet, size);
-    return sizeof(TCP_HEADER) + size;
-}
-
 /* A frame in pieces of `piece` bytes. */
 static size_t put(uint8_t *data, size_t at, const uint8_t *packet, size_t size, size_t piece, uint8_t connection)
 {
     uint8_t bytes[128];
-    size_t total = frame(packet, size, bytes);
+    size_t total = sockets_frame(packet, (uint32_t)size, bytes);
 
     for (size_t i = 0; i < total; i += piece) {
         size_t part = total - i < piece ? total - i : piece;
@@ -167,42 +63,13 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
 
 /* ---- the target ---- */
 
-static uint32_t check_output(const CONNECTION *connection)
-{
-    uint32_t frames = 0;
-    uint32_t at = 0;
-
-    while (connection->out_size - at >= sizeof(TCP_HEADER)) {
-        uint32_t size = BytesGet32(connection->out + at + 4);
-        FUZZ_CHECK(BytesGet32(connection->out + at) == (RTS_UI32)TCP_MAGIC);
-        FUZZ_CHECK(size >= sizeof(TCP_HEADER) + 8 && size <= sizeof(TCP_HEADER) + BLK_MAX_SIZE);
-        if (size > connection->out_size - at)
-            break; /* the rest waits for room, or the end came before */
-        at += size;
-        frames++;
-    }
-    return frames;
-}
-
-static void give(CONNECTION *connection, const uint8_t *data, uint32_t size)
-{
-    if (connection->closed)
-        return;
-    connection->in = data;
-    connection->in_size = size;
-    fakes_cycle(0);
-    FUZZ_CHECK(connection->closed || connection->in_size == 0);
-}
-
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     uint8_t good[64];
 
-    memset(connections, 0, sizeof(connections));
-    accepted = 0;
-    dialled = FUZZED;
-    for (int i = 0; i < CONNECTIONS; i++)
-        connections[i].room = i == 0 ? 7 : STREAM;
+    sockets_start(false);
+    sockets.dialled = FUZZED;
+    sockets.tcp[0].room = 7;
     fakes_start();
     fakes_cycle(0);
     for (size_t i = 0; i < size;) {
@@ -210,20 +77,20 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         uint32_t length = head & PIECE_MAX;
         if (length > size - i)
             length = (uint32_t)(size - i);
-        give(&connections[head >> 7], data + i, length);
+        sockets_give(&sockets.tcp[head >> 7], data + i, length);
         fakes_cycle(length == 0 ? PASSED_MS : 0);
         i += length;
     }
     for (int i = 0; i < FUZZED; i++)
-        (void)check_output(&connections[i]);
-    dialled = CONNECTIONS;
+        (void)sockets_count_frames(&sockets.tcp[i]);
+    sockets.dialled = SOCKETS_TCP;
     fakes_cycle(0);
-    give(&connections[FUZZED], good, (uint32_t)frame(question, sizeof(question), good));
+    sockets_give(&sockets.tcp[FUZZED], good, sockets_frame(question, sizeof(question), good));
     fakes_cycle(0);
-    FUZZ_CHECK(check_output(&connections[FUZZED]) >= 1);
+    FUZZ_CHECK(sockets_count_frames(&sockets.tcp[FUZZED]) >= 1);
     fakes_hook(CH_EXIT_COMM);
     fakes_hook(CH_EXIT3);
-    for (int i = 0; i < CONNECTIONS; i++)
-        FUZZ_CHECK(connections[i].closed);
+    for (int i = 0; i < SOCKETS_TCP; i++)
+        FUZZ_CHECK(sockets.tcp[i].closed);
     return 0;
 }

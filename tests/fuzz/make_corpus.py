@@ -1,14 +1,22 @@
-"""Puts what the compiler makes into corpora: images into that of the loader, I/O configurations into that of the I/O
-manager, with which tests/c/test_io_mutation.c begins, too."""
+"""Puts what compiler and tool make into corpora: images into that of the loader, I/O configurations into that of the
+I/O manager, with which tests/c/test_io_mutation.c begins, too, and what plctool says to a controller into that of the
+lines."""
 
 from __future__ import annotations
 
 import platform
+import struct
 import tempfile
+from collections.abc import Callable, Generator, Iterable
+from itertools import chain, zip_longest
 from pathlib import Path
 
 from plctool.compiler import compile_sources
+from plctool.device import Plc
 from plctool.image.file import parse_image
+from plctool.link.connection import PATIENCE, Connection
+from plctool.link.sim import SimTransport
+from plctool.sim import Simulator
 
 CORPUS = Path(__file__).parent / "corpus"
 
@@ -173,6 +181,141 @@ DESCRIBED = {
 }
 
 
+# ---- conversations: fuzz_lines.c says what a step is ----
+
+SERIAL, UDP, OTHER_UDP, TCP, OTHER_TCP = range(5)
+MESSAGE, PACKAGE, PACKET, BYTES, WAIT, VANISH, OPEN, CLOSE = range(8)
+FAKE_IMAGE_CRC = 0x1C2D3E4F  # of comm_fakes.h
+L7_SIZE = 20  # bytes of the header that plctool sends
+
+Conversation = list[bytes]  # messages of layer 7
+
+
+def step(peer: int, what: int, data: bytes = b"", length: int | None = None) -> bytes:
+    return struct.pack("<BH", peer | what << 3, len(data) if length is None else length) + data
+
+
+class Recorder(Connection):
+    """Keeps what is sent, with places for what another controller will grant."""
+
+    def __init__(self, crc: int) -> None:
+        super().__init__(SimTransport())
+        self.messages: Conversation = []
+        self.plc: Plc | None = None
+        self._crc = crc.to_bytes(4, "little")
+
+    def stream(
+        self, messages: Iterable[bytes], patience: float = PATIENCE, check: Callable[[], None] = lambda: None
+    ) -> Generator[bytes, None, None]:
+        return super().stream(map(self._keep, messages), patience, check)
+
+    def _keep(self, message: bytes) -> bytes:
+        head, session, content = message[:8], message[8:12], message[L7_SIZE:]
+        if int.from_bytes(session, "little") != 0x11:
+            session = b"ssss"
+        assert self.plc
+        if number := self.plc._session.application_session:
+            content = content.replace(number.to_bytes(4, "little"), b"SSSS")
+        content = content.replace(self._crc, FAKE_IMAGE_CRC.to_bytes(4, "little"))
+        self.messages.append(head + session + b"\xff" * 4 + message[16:L7_SIZE] + content)
+        return message
+
+
+def looks(plc: Plc) -> None:
+    plc.identity()
+    plc.info()
+    plc.raw_status()
+    plc.tasks()
+    plc.log()
+
+
+def watches(plc: Plc) -> None:
+    for _ in range(3):
+        plc.read_all(["Main.n", "Main.kept", "Main.points[2].y", "Main.name"])
+    plc.write({"Main.n": 5, "Main.name": "new", "Main.on": True})
+
+
+def controls(plc: Plc) -> None:
+    plc.stop()
+    plc.cycle()
+    plc.reset("cold")
+    plc.start()
+
+
+def types_commands(plc: Plc) -> None:
+    for command in ("?", "rtsinfo", "applist", "tasklist", "getprgstat"):
+        plc.shell(command)
+
+
+def sets_a_password(plc: Plc) -> None:
+    plc.set_password("long enough")
+    plc.set_password(None)
+
+
+PROGRAM = """
+TYPE Point : STRUCT x, y : REAL; END_STRUCT END_TYPE
+PROGRAM Main VAR n : DINT; on : BOOL; name : STRING(20); points : ARRAY[1..3] OF Point; END_VAR
+VAR RETAIN kept : DINT; END_VAR n := n + 1; kept := kept + 1; END_PROGRAM"""
+
+
+def record(image: Path, action: Callable[[Plc], object]) -> Conversation:
+    """What plctool says to a controller that has the program, from the login on."""
+    with Simulator.from_file(image) as simulator:
+        recorder = Recorder(simulator.symbols().image_crc)
+        recorder.plc = Plc(recorder, image.with_suffix(".sym"))
+        action(recorder.plc)
+        recorder.close()
+    return recorder.messages
+
+
+def spoken(peer: int, conversation: Conversation) -> list[bytes]:
+    return [step(peer, OPEN), *(step(peer, MESSAGE, message) for message in conversation), step(peer, CLOSE)]
+
+
+def at_once(*speakers: list[bytes]) -> bytes:
+    """One step of each in turn."""
+    return b"".join(chain.from_iterable(zip_longest(*speakers, fillvalue=b"")))
+
+
+def conversations(folder: Path) -> dict[str, bytes]:
+    images = [folder / "before.cdl", folder / "after.cdl"]
+    for number, image in enumerate(images):
+        source = image.with_suffix(".st")
+        source.write_text(PROGRAM.replace("n + 1", f"n + {number + 1}"))
+        compile_sources([source], target=f"{platform.machine()}-linux").write(image)
+    actions = (looks, watches, controls, types_commands, sets_a_password)
+    said = {action.__name__: record(images[0], action) for action in actions}
+    said["flashes"] = record(images[0], lambda plc: plc.flash(images[1]))
+    watch, flash, look, control = (said[name] for name in ("watches", "flashes", "looks", "controls"))
+    cut = len(flash) // 2
+    alone = {
+        f"{name}_{line}": at_once(spoken(peer, messages))
+        for name, messages in said.items()
+        for line, peer in (("serial", SERIAL), ("udp", UDP), ("tcp", TCP))
+    }
+    together = {
+        "flash_beside_watching": at_once(spoken(SERIAL, flash), spoken(TCP, watch)),
+        "four_at_once": at_once(
+            spoken(SERIAL, watch), spoken(UDP, look), spoken(OTHER_UDP, control), spoken(TCP, watch)
+        ),
+        "five_for_four_places": at_once(*(spoken(peer, look) for peer in range(5))),
+        "vanishes_in_a_download": b"".join(
+            [*spoken(TCP, flash)[:cut], step(TCP, VANISH), *spoken(OTHER_TCP, flash)[:cut], *spoken(SERIAL, watch)]
+        ),
+        "late": b"".join(
+            [*spoken(UDP, watch)[:-2], step(UDP, WAIT, length=600), *spoken(OTHER_UDP, look), *spoken(UDP, watch)]
+        ),
+        "noise_between_frames": b"".join(
+            step(SERIAL, BYTES, b"\x00#<#_noise") + step(TCP, PACKET, b"\xc5\x0b\x40\x03") + part
+            for part in spoken(SERIAL, look)
+        ),
+    }
+    return {**alone, **together}
+
+
+# ---- images and configurations ----
+
+
 def compile_image(folder: Path, name: str, text: str) -> bytes:
     source = folder / f"{name}.st"
     source.write_text(text)
@@ -204,6 +347,8 @@ def main() -> None:
             put("loader", name, compile_image(folder, name, text))
         for name, (text, description) in DESCRIBED.items():
             put("io", name, configuration(folder, name, text, description))
+        for name, data in conversations(folder).items():
+            put("lines", name, data)
 
 
 if __name__ == "__main__":

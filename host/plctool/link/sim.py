@@ -36,7 +36,7 @@ class SimTransport:
 
     def receive(self, timeout: float) -> bytes | None:
         buffer = ffi.new("RTS_UI8[]", self.max_packet)
-        left = round(timeout * 1e9)
+        left = math.ceil(timeout * 1e9)  # never 0 for some time left: the caller would wait for ever
         while not (size := lib.SimLinkReceive(buffer, self.max_packet)):
             if left < 0:
                 return None

@@ -1,0 +1,271 @@
+"""What plctool reads, as fuzz targets: each takes any bytes and raises nothing but errors with plctool's own words."""
+
+from __future__ import annotations
+
+import struct
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from plctool.compiler import check_with_tests, compile_sources, load_io
+from plctool.compiler.source_files import load
+from plctool.core import lib
+from plctool.debug.symbols import SymbolTable
+from plctool.device import Plc
+from plctool.errors import DeviceError, LinkError, UsageError
+from plctool.gateway.frames import Decoder, Frame, FrameError, Kind, Reply, Request, encode
+from plctool.image.board import find_board
+from plctool.image.file import describe_image, parse_image
+from plctool.image.production import describe_production, production_pieces, write_production
+from plctool.link import bintag, file_services, io_services, l7, router, services, simplecom
+from plctool.link.connection import PATIENCE, Connection
+from plctool.link.session import Session
+from plctool.link.sim import SimTransport
+from plctool.sim import Simulator
+
+ROOT = Path(__file__).parents[2]
+FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-"))
+PROGRAM = "PROGRAM Main VAR n : INT; in1 AT %IX0.0 : BOOL; name : STRING; END_VAR n := n + 1; END_PROGRAM\n"
+
+
+def in_file(name: str, data: bytes) -> Path:
+    path = FOLDER / name
+    path.write_bytes(data)
+    return path
+
+
+# ---- what a device says ----
+
+READERS: tuple[Callable[[Session], object], ...] = (
+    services.read_identity,
+    services.read_stack,
+    services.read_status,
+    services.read_tasks,
+    services.read_application_info,
+    services.read_log,
+    services.loaded_crc,
+    file_services.list_files,
+    io_services.list_devices,
+    lambda session: services.run_shell(session, "?"),
+    lambda session: file_services.read_file(session, "log"),
+    lambda session: services.set_password(session, "long enough"),
+    lambda session: services.prepare_download(session, bytes(100)),
+    lambda session: list(io_services.scan(session, 1)),
+    lambda session: session.application(),
+)
+MAX_REPLIES = 30
+
+
+class Replies(Connection):
+    """Replies from a list; when it is empty the channel is lost."""
+
+    def __init__(self, contents: Iterable[bytes]) -> None:
+        super().__init__(SimTransport())
+        self._contents = iter(contents)
+
+    is_open = True
+    buffer_size = best_size = 2048
+    is_slow = False
+
+    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
+        asked = l7.decode(message)
+        content = next(self._contents, None)
+        if content is None:
+            raise LinkError("The device is gone.", "timeout")
+        return l7.encode(l7.Message(asked.group | lib.L7_REPLY, asked.service, asked.session, content))
+
+    def stream(self, messages: Iterable[bytes], *rest: object) -> Iterator[bytes]:  # type: ignore[override]
+        return map(self.exchange, messages)
+
+
+class Recorded(Connection):
+    """A connection to the simulator that keeps the contents of replies."""
+
+    def __init__(self) -> None:
+        super().__init__(SimTransport())
+        self.contents: list[bytes] = []
+
+    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
+        reply = super().exchange(message, patience)
+        self.contents.append(l7.decode(reply).content)
+        return reply
+
+
+def pieces(data: bytes) -> list[bytes]:
+    """Byte strings, each after its length (16 bits)."""
+    found = []
+    while len(data) > 2 and len(found) < MAX_REPLIES:
+        (size,) = struct.unpack_from("<H", data)
+        found.append(data[2 : 2 + size])
+        data = data[2 + size :]
+    return found
+
+
+def joined(found: Iterable[bytes]) -> bytes:
+    return b"".join(struct.pack("<H", len(piece)) + piece for piece in found)
+
+
+def replies(data: bytes) -> None:
+    if data:
+        with suppress(DeviceError, LinkError):
+            READERS[data[0] % len(READERS)](Session(Replies(pieces(data[1:]))))
+
+
+def recorded_replies() -> Iterator[bytes]:
+    result = compile_sources([in_file("recorded.st", PROGRAM.encode())])
+    for number, reader in enumerate(READERS):
+        with Simulator(result.image, result.symbols):
+            recorded = Recorded()
+            with suppress(DeviceError, LinkError, UsageError):
+                reader(Session(recorded))
+        yield bytes([number]) + joined(recorded.contents)
+
+
+class Packets(SimTransport):
+    """Packets from a list; time passes when there are none."""
+
+    name = "packets"
+
+    def __init__(self, packets: Iterable[bytes]) -> None:
+        self._packets = iter(packets)
+        self._now = 0.0
+
+    def now(self) -> float:
+        return self._now
+
+    def send(self, *packets: bytes) -> None:
+        self._now += 0.001 * len(packets)
+
+    def receive(self, timeout: float) -> bytes | None:
+        packet = next(self._packets, None)
+        self._now += 0.001 if packet is not None else max(timeout, 0.001)
+        return packet
+
+
+def packets(data: bytes) -> None:
+    """Frames of a serial line, of which each is a packet to the tool."""
+    found = simplecom.Decoder().feed(data) + pieces(data)
+    for packet in found:
+        router.decode(packet)
+    with suppress(DeviceError, LinkError):
+        Plc(Connection(Packets(found))).identity()
+    with suppress(LinkError):
+        Connection(Packets(found)).scan()
+
+
+class Heard(SimTransport):
+    """Keeps the packets that the simulator sends."""
+
+    def __init__(self) -> None:
+        self.packets: list[bytes] = []
+
+    def receive(self, timeout: float) -> bytes | None:
+        packet = super().receive(timeout)
+        self.packets += [packet] if packet else []
+        return packet
+
+
+def heard_packets() -> Iterator[bytes]:
+    with Simulator.from_sources(in_file("heard.st", PROGRAM.encode())):
+        for action in (lambda link: Plc(link).identity(), Connection.scan):
+            heard = Heard()
+            action(Connection(heard))
+            yield joined(heard.packets)
+            yield b"".join(map(simplecom.encode, heard.packets))
+
+
+# ---- files ----
+
+
+def image(data: bytes) -> None:
+    with suppress(UsageError):
+        parse_image(data)
+        describe_image(data)
+
+
+def symbols(data: bytes) -> None:
+    with suppress(UsageError, UnicodeDecodeError):
+        SymbolTable.from_json(data.decode(), "a.sym")
+
+
+def symbol_files() -> Iterator[bytes]:
+    yield compile_sources([in_file("named.st", PROGRAM.encode())]).symbols.to_json().encode()
+
+
+def production(data: bytes) -> None:
+    with suppress(UsageError):
+        describe_production(in_file("a.hex", data), data)
+
+
+def production_files() -> Iterator[bytes]:
+    source, path = in_file("burnt.st", PROGRAM.encode()), FOLDER / "burnt.hex"
+    board = find_board("mps2-an385/standard")
+    write_production(path, production_pieces(compile_sources([source], target="cortex-m3").image, board, None), board)
+    yield path.read_bytes()
+
+
+SUFFIXES = (".st", ".xml", ".EXP", ".TcPOU", ".TcTTO", ".TcGVL", ".TcDUT", ".plcproj", ".tsproj", ".IO")
+
+
+def sources(data: bytes) -> None:
+    """The first byte is the kind of file."""
+    if data:
+        with suppress(UsageError):
+            check_with_tests(load([in_file("a" + SUFFIXES[data[0] % len(SUFFIXES)], data[1:])]))
+
+
+def source_files() -> Iterator[bytes]:
+    for number, suffix in enumerate(SUFFIXES):
+        for folder in (ROOT / "examples", ROOT / "tests/corpus", ROOT / "tests/st"):
+            for path in sorted(folder.rglob(f"*{suffix}"))[:40]:
+                yield bytes([number]) + path.read_bytes()
+
+
+def description(data: bytes) -> None:
+    program = in_file("main.st", PROGRAM.encode())
+    in_file("main.io.toml", data)
+    with suppress(UsageError):
+        check_with_tests(load([program]), load=lambda: load_io([program]))
+
+
+def gateway(data: bytes) -> None:
+    with suppress(FrameError):
+        for frame in Decoder().feed(data):
+            for kind in (Request, Reply):
+                with suppress(FrameError):
+                    kind.decode(frame.payload)
+
+
+def gateway_frames() -> Iterator[bytes]:
+    frames = [Frame(kind, 7, message) for kind in Kind for message in (b"", bytes(16), Reply(3, b"reply").encode())]
+    yield b"".join(map(encode, frames))
+
+
+def tags(data: bytes) -> None:
+    with suppress(LinkError):
+        bintag.decode(data)
+
+
+def files(*patterns: str) -> Callable[[], Iterator[bytes]]:
+    return lambda: (path.read_bytes() for pattern in patterns for path in sorted(ROOT.glob(pattern)) if path.is_file())
+
+
+@dataclass(frozen=True)
+class Target:
+    run: Callable[[bytes], None]
+    first: Callable[[], Iterator[bytes]]  # inputs to begin with
+
+
+TARGETS = {
+    "replies": Target(replies, recorded_replies),
+    "packets": Target(packets, heard_packets),
+    "tags": Target(tags, recorded_replies),
+    "gateway": Target(gateway, gateway_frames),
+    "image": Target(image, files("tests/fuzz/corpus/loader/*")),
+    "symbols": Target(symbols, symbol_files),
+    "production": Target(production, production_files),
+    "sources": Target(sources, source_files),
+    "description": Target(description, files("examples/**/*.io.toml", "host/plctool/templates/**/*.toml")),
+}
