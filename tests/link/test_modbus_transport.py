@@ -10,6 +10,7 @@ import time
 import tty
 from collections.abc import Iterator
 from contextlib import suppress
+from itertools import groupby
 
 import pytest
 
@@ -167,7 +168,7 @@ def test_numbers_go_round_and_leave_the_beginning_out(device: Device, transport:
     for i in range(300):
         transport.send(i.to_bytes(2))
         assert transport.receive(PATIENCE) == i.to_bytes(2)
-    numbers = [request[2] for request in device.requests]
+    numbers = [number for number, _ in groupby(request[2] for request in device.requests)]  # one repeated keeps its own
     assert numbers[0] == 0
     assert numbers[1:] == [i % 255 + 1 for i in range(len(numbers) - 1)]
 
