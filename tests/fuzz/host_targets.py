@@ -26,7 +26,8 @@ from plctool.link.sim import SimTransport
 from plctool.sim import Simulator
 
 ROOT = Path(__file__).parents[2]
-FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-"))
+_temporary = tempfile.TemporaryDirectory(prefix="fuzz-")  # as long as this process
+FOLDER = Path(_temporary.name)
 PROGRAM = "PROGRAM Main VAR n : INT; in1 AT %IX0.0 : BOOL; name : STRING; END_VAR n := n + 1; END_PROGRAM\n"
 
 
