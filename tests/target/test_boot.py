@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
-from environment import IS_RISCV, MACHINE, eventually
+from environment import CONFIG, IS_RISCV, MACHINE, eventually, firmware
 from programs import program
 from qemu import FACTORY_OFFSET
 
@@ -20,7 +21,15 @@ from plctool.link.services import AppState
 
 MAIN_WATCHDOG_MS = 20_000  # see main.c
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}  # of processes that find what this one does
+ELF_ENTRY = 24  # where an ELF file of 32 bits says its entry, and after it where its program headers are
 IS_MPS2 = MACHINE.startswith("mps2")
+
+
+def test_the_entry_of_the_file_is_where_the_processor_starts():
+    elf = firmware(CONFIG).read_bytes()
+    entry, headers = struct.unpack_from("<II", elf, ELF_ENTRY)
+    offset, address = struct.unpack_from("<II", elf, headers + 4)  # of the first segment: vectors
+    assert entry == (address if IS_RISCV else struct.unpack_from("<I", elf, offset + 4)[0])
 
 
 @pytest.mark.parametrize("config", ["minimal", "standard", "full"])
