@@ -93,12 +93,14 @@ habits: build/build.ninja
 	@ninja --quiet -C build under_attack
 	@PYTHONPATH=host:build/host $(BIN)/python tests/corpus/habits.py
 
-# By its own driver; and by libFuzzer, where clang and atheris are there.
-FUZZED = build build-sanitized $(if $(shell command -v clang),build-libfuzzer)
+# By its own driver; and by libFuzzer, where clang has it.
+LIBFUZZER = $(shell echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' | \
+	clang -fsanitize=fuzzer -x c - -o /dev/null 2>/dev/null && echo build-libfuzzer)
+FUZZED = build build-sanitized $(LIBFUZZER)
 FUZZ_SECONDS ?= 60
 
 fuzz: $(VENV)/dev
-	./bootstrap.sh --fuzz
+	$(if $(LIBFUZZER),,./bootstrap.sh --fuzz)
 	$(BIN)/pip install --quiet atheris || true
 	$(MAKE) --no-print-directory run-fuzz
 

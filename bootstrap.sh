@@ -32,7 +32,8 @@ if [ "$1" = --tests ]; then
 fi
 
 if [ "$1" = --fuzz ]; then
-    command -v clang >/dev/null || install clang || echo "libFuzzer is left out; for it: sudo apt-get install clang" >&2
+    install clang libclang-rt-dev llvm ||
+        echo "libFuzzer is left out; for it: sudo apt-get install clang libclang-rt-dev llvm" >&2
     exit 0
 fi
 

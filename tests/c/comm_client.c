@@ -243,32 +243,37 @@ RTS_UI32 reply_error(const REPLY *reply)
     return value;
 }
 
+bool client_learn(CLIENT *client, const BTAG_READER *tags)
+{
+    BTAG_READER inner;
+    BTAG option;
+
+    if (BTagFindContainer(tags, TAG_DEV_LOGIN_REPLY, &inner) == ERR_OK)
+        return BTagFindUnsigned(&inner, TAG_DEV_SESSION_ID, &client->session) == ERR_OK;
+    if (BTagFindContainer(tags, TAG_APP_DESCRIPTOR, &inner) != ERR_OK ||
+        BTagFind(&inner, TAG_APP_OPTION, sizeof(APP_LOGIN_REPLY), sizeof(APP_LOGIN_REPLY), &option) != ERR_OK)
+        return false;
+    client->app_session = BytesGet32(option.data + 2);
+    return BytesGet16(option.data) == ERR_OK;
+}
+
 bool client_login(CLIENT *client)
 {
     /* As third-party clients send it: type XOR as u16, user two zero bytes. */
     static const RTS_UI8 content[] = {0x22, 0x02, 0x01, 0x00, 0x81, 0x01, 0x04, 0x10, 0x02, 0x00, 0x00};
-    BTAG_READER login;
     REPLY reply;
 
-    if (!client_request(client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply) ||
-        BTagFindContainer(&reply.tags, TAG_DEV_LOGIN_REPLY, &login) != ERR_OK)
-        return false;
-    return BTagFindUnsigned(&login, TAG_DEV_SESSION_ID, &client->session) == ERR_OK;
+    return client_request(client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply) &&
+           client_learn(client, &reply.tags);
 }
 
 bool client_login_app(CLIENT *client)
 {
     static const RTS_UI8 content[] = {0x01, 0x0B, 'A', 'p', 'p', 'l', 'i', 'c', 'a', 't', 'i', 'o', 'n'};
-    BTAG_READER descriptor;
-    BTAG option;
     REPLY reply;
 
-    if (!client_request(client, SG_APPLICATION, SRV_APP_LOGIN, content, sizeof(content), &reply) ||
-        BTagFindContainer(&reply.tags, TAG_APP_DESCRIPTOR, &descriptor) != ERR_OK ||
-        BTagFind(&descriptor, TAG_APP_OPTION, sizeof(APP_LOGIN_REPLY), sizeof(APP_LOGIN_REPLY), &option) != ERR_OK)
-        return false;
-    client->app_session = BytesGet32(option.data + 2);
-    return BytesGet16(option.data) == ERR_OK;
+    return client_request(client, SG_APPLICATION, SRV_APP_LOGIN, content, sizeof(content), &reply) &&
+           client_learn(client, &reply.tags);
 }
 
 bool client_connect(CLIENT *client)

@@ -98,6 +98,9 @@ RTS_UI32 reply_number(const REPLY *reply, RTS_UI32 id);
 /* TAG_ERROR; ERR_OK when there is none. */
 RTS_UI32 reply_error(const REPLY *reply);
 
+/* Takes the sessions out of a reply to a login, to the device or the application; false when there are none. */
+bool client_learn(CLIENT *client, const BTAG_READER *tags);
+
 /* Opens, logs in, logs in to the application. */
 bool client_login(CLIENT *client);
 bool client_login_app(CLIENT *client);

@@ -39,6 +39,7 @@ enum {
     PEERS,
 
     HEAD = 3,
+    L7_SIZE = 20, /* of the header in a recording */
     WAIT_MS = 10,
     BEFORE = 4, /* packages for an owner before */
     MAX_GRANTED = 64,
@@ -96,7 +97,7 @@ static uint32_t take_datagram(const PEER *peer, uint8_t *packet)
     for (uint32_t i = 0; i < sockets.out_count; i++) {
         DATAGRAM *datagram = &sockets.out[i];
         uint32_t size = datagram->size;
-        if (size == 0 || datagram->peer.port != FIRST_PORT + (peer - peers))
+        if (size == 0 || datagram->peer.ip != SOCKETS_OWN_IP || datagram->peer.port != FIRST_PORT + (peer - peers))
             continue;
         memcpy(packet, datagram->data, size);
         datagram->size = 0; /* taken */
@@ -206,34 +207,19 @@ static void complete(const CLIENT *client, uint8_t *message, uint32_t size)
     if (memcmp(message + 8, "ssss", 4) == 0)
         BytesPut32(message + 8, client->session);
     if (BytesGet32(message + 12) == 0xFFFFFFFF)
-        BytesPut32(message + 12, size - 20);
-    for (uint32_t i = 20; i + 4 <= size; i++)
+        BytesPut32(message + 12, size - L7_SIZE);
+    for (uint32_t i = L7_SIZE; i + 4 <= size; i++)
         if (memcmp(message + i, "SSSS", 4) == 0)
             BytesPut32(message + i, client->app_session);
-}
-
-/* What a reply tells the client: its sessions. */
-static void learn(CLIENT *client, const uint8_t *message, uint32_t size)
-{
-    BTAG_READER tags, inner;
-    BTAG option;
-
-    if (size < 20 || BytesGet32(message + 12) != size - 20)
-        return;
-    BTagReaderInit(&tags, message + 20, size - 20);
-    if (BTagFindContainer(&tags, TAG_DEV_LOGIN_REPLY, &inner) == ERR_OK)
-        (void)BTagFindUnsigned(&inner, TAG_DEV_SESSION_ID, &client->session);
-    else if (BTagFindContainer(&tags, TAG_APP_DESCRIPTOR, &inner) == ERR_OK &&
-             BTagFind(&inner, TAG_APP_OPTION, sizeof(APP_LOGIN_REPLY), sizeof(APP_LOGIN_REPLY), &option) == ERR_OK)
-        client->app_session = BytesGet32(option.data + 2);
 }
 
 static void send_message(PEER *peer, uint8_t *message, uint32_t size)
 {
     static uint8_t reply[NETSERVER_MESSAGE_SIZE];
-    uint32_t taken;
+    BTAG_READER tags;
+    uint32_t taken, header;
 
-    if (size < 20)
+    if (size < L7_SIZE)
         return;
     if (peer->client.channel == 0)
         client_send_open(&peer->client, 7, NETSERVER_MESSAGE_SIZE);
@@ -241,7 +227,12 @@ static void send_message(PEER *peer, uint8_t *message, uint32_t size)
     complete(&peer->client, message, size);
     client_send_message(&peer->client, message, size);
     taken = client_take_message(&peer->client, reply);
-    learn(&peer->client, reply, taken);
+    if (taken == 0)
+        return;
+    header = 4u + BytesGet16(reply + 2); /* as in the request */
+    FUZZ_CHECK(taken >= header && BytesGet32(reply + 12) == taken - header);
+    BTagReaderInit(&tags, reply + header, taken - header);
+    (void)client_learn(&peer->client, &tags);
 }
 
 /* Channel, version and CRC are right. */

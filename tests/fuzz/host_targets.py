@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import random
 import struct
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 
 from plctool.compiler import check_with_tests, compile_sources, load_io
 from plctool.compiler.source_files import load
@@ -32,7 +35,9 @@ PROGRAM = "PROGRAM Main VAR n : INT; in1 AT %IX0.0 : BOOL; name : STRING; END_VA
 
 
 def in_file(name: str, data: bytes) -> Path:
-    path = FOLDER / name
+    """In a folder with others that have this name before the first dot: a program has what lies beside it."""
+    path = FOLDER / name.partition(".")[0] / name
+    path.parent.mkdir(exist_ok=True)
     path.write_bytes(data)
     return path
 
@@ -56,7 +61,7 @@ READERS: tuple[Callable[[Session], object], ...] = (
     lambda session: list(io_services.scan(session, 1)),
     lambda session: session.application(),
 )
-MAX_REPLIES = 30
+MAX_REPLIES = 30  # or packets
 
 
 class Replies(Connection):
@@ -88,16 +93,16 @@ class Recorded(Connection):
         super().__init__(SimTransport())
         self.contents: list[bytes] = []
 
-    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
-        reply = super().exchange(message, patience)
-        self.contents.append(l7.decode(reply).content)
-        return reply
+    def stream(self, *args: Any, **options: Any) -> Generator[bytes, None, None]:
+        for reply in super().stream(*args, **options):
+            self.contents.append(l7.decode(reply).content)
+            yield reply
 
 
 def pieces(data: bytes) -> list[bytes]:
     """Byte strings, each after its length (16 bits)."""
     found = []
-    while len(data) > 2 and len(found) < MAX_REPLIES:
+    while len(data) >= 2 and len(found) < MAX_REPLIES:
         (size,) = struct.unpack_from("<H", data)
         found.append(data[2 : 2 + size])
         data = data[2 + size :]
@@ -145,15 +150,26 @@ class Packets(SimTransport):
         return packet
 
 
+def ask(link: Connection) -> object:
+    """With the same request ids each time: recorded replies are for those."""
+    with patch("secrets.randbits", random.Random(1).getrandbits):
+        return Plc(link).identity()
+
+
+def scan(link: Connection) -> object:
+    with patch("secrets.randbits", random.Random(1).getrandbits):
+        return link.scan()
+
+
 def packets(data: bytes) -> None:
-    """Frames of a serial line, of which each is a packet to the tool."""
-    found = simplecom.Decoder().feed(data) + pieces(data)
-    for packet in found:
-        router.decode(packet)
-    with suppress(DeviceError, LinkError):
-        Plc(Connection(Packets(found))).identity()
-    with suppress(LinkError):
-        Connection(Packets(found)).scan()
+    """Packets to the tool: in frames of a serial line, or each after its length."""
+    for found in (simplecom.Decoder().feed(data), pieces(data)):
+        for packet in found:
+            router.decode(packet)
+        with suppress(DeviceError, LinkError):
+            ask(Connection(Packets(found)))
+        with suppress(LinkError):
+            scan(Connection(Packets(found)))
 
 
 class Heard(SimTransport):
@@ -170,7 +186,7 @@ class Heard(SimTransport):
 
 def heard_packets() -> Iterator[bytes]:
     with Simulator.from_sources(in_file("heard.st", PROGRAM.encode())):
-        for action in (lambda link: Plc(link).identity(), Connection.scan):
+        for action in (ask, scan):
             heard = Heard()
             action(Connection(heard))
             yield joined(heard.packets)
@@ -201,7 +217,7 @@ def production(data: bytes) -> None:
 
 
 def production_files() -> Iterator[bytes]:
-    source, path = in_file("burnt.st", PROGRAM.encode()), FOLDER / "burnt.hex"
+    source, path = in_file("burnt.st", PROGRAM.encode()), FOLDER / "burnt/burnt.hex"
     board = find_board("mps2-an385/standard")
     write_production(path, production_pieces(compile_sources([source], target="cortex-m3").image, board, None), board)
     yield path.read_bytes()

@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -25,18 +26,20 @@ TAIL = 4000  # characters of what a finding says
 
 
 @dataclass(frozen=True)
-class Target:
+class Target(ABC):
     """`found`: where inputs stay that reached something."""
 
     name: str
     corpus: Path
     found: Path
 
+    @abstractmethod
     def command(self, seconds: int, seed: int) -> list[str | Path]:
-        raise NotImplementedError
+        """What runs it."""
 
+    @abstractmethod
     def summary(self, output: str) -> str:
-        return output.strip()
+        """What is to be said of the command's output."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,9 @@ class Driven(Target):
     def command(self, seconds: int, seed: int) -> list[str | Path]:
         limits = ["-t", str(seconds), "-s", str(seed)]
         return [self.program, *limits, "-c", self.corpus, "-c", self.found, "-k", self.found, "-f", self.corpus]
+
+    def summary(self, output: str) -> str:
+        return output.strip()
 
     def keep(self) -> None:
         """The corpus becomes the smallest inputs that reach all that is reached, and its findings."""
@@ -64,11 +70,15 @@ class Driven(Target):
 
 @dataclass(frozen=True)
 class ByLibFuzzer(Target):
-    """`start`: the program and what it has before libFuzzer's own arguments."""
+    """`start`: the program and what it has before libFuzzer's own arguments. `first`: what writes its first inputs to
+    the folder that follows; nothing for a program that does so itself."""
 
     start: tuple[str | Path, ...]
+    first: tuple[str | Path, ...] = ()
 
     def command(self, seconds: int, seed: int) -> list[str | Path]:
+        if self.first:
+            subprocess.run([*self.first, self.found], check=True, stdout=subprocess.DEVNULL)
         limits = [f"-max_total_time={seconds}", f"-seed={seed % 2**32}", f"-max_len={LONGEST}", "-timeout=60"]
         return [*self.start, *limits, f"-artifact_prefix={self.corpus}/", self.found, self.corpus]
 
@@ -78,23 +88,17 @@ class ByLibFuzzer(Target):
 
 
 def c_targets(build: Path) -> Iterator[Target]:
-    """Those of a build folder. First inputs that libFuzzer cannot ask for are those of the folder `build` beside it."""
+    """Those of a build folder. libFuzzer cannot ask for first inputs: the program in the folder `build` has them."""
     folder = build / "tests/fuzz"
     for program in sorted(path for path in folder.glob("fuzz_*") if path.is_file() and os.access(path, os.X_OK)):
         name = program.name.removeprefix("fuzz_")
         corpus = CORPUS / name.removeprefix("minimal_")  # the same for the sizes of the smallest firmware
         found = folder / f"{program.name}.inputs"
-        if not is_for_libfuzzer(build):
+        if build.name.endswith("libfuzzer"):
+            first = (build.parent / "build/tests/fuzz" / program.name, "-n", "0", "-k")
+            yield ByLibFuzzer(f"{name} by libFuzzer", corpus, found, (program,), first)
+        else:
             yield Driven(name, corpus, found, program)
-            continue
-        found.mkdir(exist_ok=True)
-        first = [build.parent / "build/tests/fuzz" / program.name, "-n", "0", "-k", found]
-        subprocess.run(first, check=True, stdout=subprocess.DEVNULL)
-        yield ByLibFuzzer(f"{name} by libFuzzer", corpus, found, (program,))
-
-
-def is_for_libfuzzer(build: Path) -> bool:
-    return build.name.endswith("libfuzzer")
 
 
 def host_targets(build: Path) -> Iterator[Target]:

@@ -7,7 +7,11 @@ import random
 from pathlib import Path
 
 import pytest
-from host_targets import TARGETS
+from host_targets import READERS, TARGETS, Packets, Replies, ask, heard_packets, pieces, recorded_replies
+
+from plctool.link.connection import Connection
+from plctool.link.services import Identity
+from plctool.link.session import Session
 
 CORPUS = Path(__file__).parent / "corpus"
 CHANGES = 20  # of each first input
@@ -33,3 +37,13 @@ def test_first_inputs_and_changed_ones(name: str) -> None:
 def test_findings(name: str) -> None:
     for path in sorted((CORPUS / f"host_{name}").glob("*")):
         TARGETS[name].run(path.read_bytes())
+
+
+def test_packets_that_were_heard_make_a_whole_conversation() -> None:
+    assert isinstance(ask(Connection(Packets(pieces(next(heard_packets()))))), Identity)
+
+
+@pytest.mark.parametrize("number", range(7))
+def test_replies_that_were_recorded_are_read_to_their_end(number: int) -> None:
+    data = list(recorded_replies())[number]
+    READERS[number](Session(Replies(pieces(data[1:]))))
