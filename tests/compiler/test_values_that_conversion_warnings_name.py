@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 
 from front_support import check
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler.build import build_program
@@ -18,7 +18,7 @@ TYPES = ("SINT", "USINT", "INT", "UINT", "DINT", "UDINT", "LINT", "ULINT", "BYTE
 NUMBERS = st.integers(-(2**65), 2**65).map(str)
 PIECES = st.lists(
     st.sampled_from(
-        ["+", "-", "0", "7", "12", "128", "300", "16#", "2#", "8#", "F", "9", "e3", ".", "5", " ", "x", "_"]
+        ["+", "-", "0", "7", "12", "128", "300", "16#", "016#", "2#", "8#", "F", "9", "e3", ".", "5", " ", "x", "_"]
     ),
     max_size=5,
 ).map("".join)
@@ -30,6 +30,7 @@ REAL_CALLS = st.tuples(REALS.map(lambda text: f"LREAL#{text}"), st.just("LREAL")
 
 
 @settings(max_examples=40)
+@example([(("'016#'", "STRING"), "SINT"), (("'016#7F'", "STRING"), "INT"), (("'-002#101'", "STRING"), "INT")])
 @given(st.lists(st.tuples(st.one_of(TEXT_CALLS, REAL_CALLS), st.sampled_from(TYPES)), min_size=10, max_size=30))
 def test_named_values_are_right(calls: list[tuple[tuple[str, str], str]]) -> None:
     lines = [f"v{i} := {source}_TO_{target}({argument});" for i, ((argument, source), target) in enumerate(calls)]
@@ -51,5 +52,5 @@ def test_named_values_are_right(calls: list[tuple[tuple[str, str], str]]) -> Non
 
 def _whole(text: str) -> int | None:
     """The number that a text is, as IEC literals are written."""
-    found = re.fullmatch(r"[ \t]*([+-]?)(?:(2|8|16)#)?([0-9A-Fa-f]+)[ \t]*", text)
+    found = re.fullmatch(r"[ \t]*([+-]?)(?:(0*(?:2|8|16))#)?([0-9A-Fa-f]+)[ \t]*", text)
     return int(found[1] + found[3], int(found[2] or 10)) if found else None

@@ -242,7 +242,7 @@ def _division(e: Expr) -> Binary | None:
 
 # ---- constants that are converted to a type that has no such value ----
 
-_INTEGER_TEXT = re.compile(r"[ \t]*([+-]?)(?:(?P<base>2|8|16)#)?(?P<digits>[0-9A-Fa-f]*)(?P<rest>.*)", re.DOTALL)
+_INTEGER_TEXT = re.compile(r"[ \t]*([+-]?)(?:(?P<base>0*(?:2|8|16))#)?(?P<digits>[0-9A-Fa-f]*)(?P<rest>.*)", re.DOTALL)
 _REAL_TEXT = re.compile(r"[ \t]*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[ \t]*|[ \t]*[+-]?(?:inf\w*|nan)[ \t]*", re.I)
 
 
