@@ -10,6 +10,7 @@ POWER_CUTS=few a fifth of the selection.
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -84,6 +85,14 @@ class Replacement:
                 yield Cut(n, offset in slot)
 
 
+def plugin_version(qemu: str) -> int:
+    """Of its interface for plugins."""
+    said = subprocess.run([qemu, "--version"], check=True, capture_output=True, text=True).stdout
+    found = re.search(r"version (\d+)", said)
+    assert found, said
+    return 2 if int(found[1]) >= 9 else 1
+
+
 @pytest.fixture(scope="module")
 def replacement(tmp_path_factory: pytest.TempPathFactory) -> Replacement:
     """Recorded on a board whose time does not depend on the host."""
@@ -92,9 +101,10 @@ def replacement(tmp_path_factory: pytest.TempPathFactory) -> Replacement:
         pytest.skip("needs a C compiler for QEMU's plugin")
     folder = tmp_path_factory.mktemp("replacement")
     plugin, record = folder / "stores.so", folder / "stores"
-    subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", plugin, HERE / "stores.c"], check=True)
-    old, new = (compile_text(text, TARGET, folder) for text in (COUNTER, TWO_TASKS))
     board = Board(MACHINE, firmware("standard"), folder)
+    version = f"-DVERSION={plugin_version(board.qemu.program)}"
+    subprocess.run([compiler, "-O2", "-shared", "-fPIC", version, "-o", plugin, HERE / "stores.c"], check=True)
+    old, new = (compile_text(text, TARGET, folder) for text in (COUNTER, TWO_TASKS))
 
     board.power_on("exact")
     with Plc(Connection(board.line())) as plc:

@@ -14,7 +14,7 @@ static int check_failures;
 
 static inline void check_print_number(int64_t value)
 {
-    static char text[24]; /* not on the stack, see semihost.h */
+    char text[24];
     char *end = text + sizeof(text) - 1;
     uint64_t rest = value < 0 ? (uint64_t)-value : (uint64_t)value;
     *end = '\0';

@@ -7,10 +7,14 @@
 #include "BareMetal.h"
 #include "SysFlash.h"
 
+#ifndef BOARD_CODE_ALIGN
+#define BOARD_CODE_ALIGN 16
+#endif
+
 enum { SLOT_COUNT = 2 };
 
 RTS_STATIC_ASSERT(APP_MAX_CODE_SIZE > 0, the_port_says_how_much_ram_code_has);
-static RTS_UI8 code_ram[SLOT_COUNT][APP_MAX_CODE_SIZE] __attribute__((aligned(16)));
+static RTS_UI8 code_ram[SLOT_COUNT][APP_MAX_CODE_SIZE] __attribute__((aligned(BOARD_CODE_ALIGN)));
 RTS_STATIC_ASSERT(APP_MAX_CODE_SIZE % APP_CODE_ALIGN == 0, each_slot_is_aligned);
 
 const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)

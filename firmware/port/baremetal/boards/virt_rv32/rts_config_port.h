@@ -22,4 +22,7 @@
 #define APP_MAX_CODE_SIZE 8192
 #endif
 
+/* A page of QEMU: where rights change inside one, QEMU 10 translates each instruction every time. */
+#define BOARD_CODE_ALIGN 4096
+
 #endif
