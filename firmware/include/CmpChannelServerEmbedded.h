@@ -32,6 +32,9 @@ void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32
 #if COMM_ENDPOINTS
 /* Whether a client that has logged in is reached over this driver. */
 bool ChannelNeeds(const BLK_DRV *driver);
+
+/* The channel of this peer, if it has one, may be given to another peer until it is heard again. */
+void ChannelUnreachable(const BLK_DRV *driver, RTS_UI64 endpoint);
 #endif
 
 const CHANNEL_COUNTERS *ChannelGetCounters(void);

@@ -89,6 +89,7 @@ typedef struct {
     ROUTER_HANDLER handler;
 #if COMM_ENDPOINTS
     bool (*needs)(const BLK_DRV *driver); /* whether a client of it is logged in over this driver; NULL: never */
+    void (*unreachable)(const BLK_DRV *driver, RTS_UI64 endpoint); /* see RouterUnreachable; NULL: nothing to do */
 #endif
 } ROUTER_SERVICE;
 extern const ROUTER_SERVICE RouterServices[];
@@ -100,6 +101,10 @@ void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
 #if COMM_ENDPOINTS
 /* The same for a driver with several peers: the packet comes from this one. */
 void RouterHandleDataFrom(const BLK_DRV *driver, RTS_UI64 endpoint, const RTS_UI8 *data, RTS_UI32 size);
+
+/* What was sent to this peer has not been taken: the program there may have ended. That is a hint only; a peer that sends
+ * something is there. */
+void RouterUnreachable(const BLK_DRV *driver, RTS_UI64 endpoint);
 
 /* Whether a service has a client on this driver that would lose its login with it. */
 bool RouterNeeds(const BLK_DRV *driver);

@@ -55,6 +55,9 @@ typedef struct {
 #if BLK_LONG_PACKETS
     RTS_UI16 wanted; /* longest packet the client would send, in place of BLK_MAX_SIZE; 0: it does not ask */
 #endif
+#if COMM_ENDPOINTS
+    bool unreachable; /* has not taken what was sent, and has not been heard since */
+#endif
     bool missing_due;    /* the acknowledgement asks for a repetition */
     RTS_UI32 request_id; /* of the open request */
     RTS_UI32 limit;      /* largest message, both directions */

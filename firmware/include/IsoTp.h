@@ -23,6 +23,7 @@ enum {
     ISOTP_MAX_PACKET = 4095, /* bytes */
     ISOTP_FLOW_SIZE = 3,     /* of a flow control frame */
     ISOTP_TIMEOUT_MS = 1000, /* N_Bs and N_Cr: for flow control and for the next consecutive frame */
+    ISOTP_UNHEARD_MS = 300,  /* a receiver that is there says something within this time */
     ISOTP_MAX_WAITS = 10,    /* flow control frames in a row that say wait */
 };
 
@@ -110,6 +111,9 @@ void IsoTpSent(ISOTP_TX *tx, RTS_UI32 now_ms);
 
 /* Takes a flow control frame. */
 ISOTP_TX_RESULT IsoTpTakeFlow(ISOTP_TX *tx, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms);
+
+/* Whether flow control is awaited for longer than a receiver that is there takes; ISOTP_UNHEARD_MS. */
+bool IsoTpIsUnheard(const ISOTP_TX *tx, RTS_UI32 now_ms);
 
 /* Ends a packet whose flow control does not come, or whose next frame cannot be sent; true when it did. */
 bool IsoTpSendExpired(ISOTP_TX *tx, RTS_UI32 now_ms);

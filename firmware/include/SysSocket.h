@@ -67,6 +67,10 @@ RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCK
 /* Sends a datagram. ERR_NOBUFFER if there is no room now. ERR_OK does not mean that it arrives. */
 RTS_RESULT SysSockSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to);
 
+/* Where a datagram was sent to of which the network says that no socket there takes it (ICMP: port unreachable). ERR_OK;
+ * ERR_NOTHING_TO_DO if there is none, or the system does not tell. */
+RTS_RESULT SysSockRecvRefused(RTS_HANDLE socket, SOCKADDRESS *to);
+
 /* Closes a connection at once: what was taken, and has not arrived, is not sent any more. Only a field bus needs it. */
 void SysSockReset(RTS_HANDLE socket);
 

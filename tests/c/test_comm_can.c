@@ -162,6 +162,29 @@ static void a_tool_that_stops_in_the_middle_blocks_no_other(void)
     can_end();
 }
 
+/* On classic CAN a packet needs flow control, which a tool that has ended does not send. */
+static void tools_that_have_vanished_give_way_in_less_than_a_second(void)
+{
+    CLIENT client;
+    CLIENT gone;
+    RTS_UI32 waited = 0;
+
+    can_start(500 * KBIT, 0);
+    for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS; i++) {
+        CAN_TOOL *tool = can_tool((RTS_UI8)(130 + i));
+        CHECK(can_connect(&gone, tool));
+        tool->mute = true;
+    }
+    can_client(&client, can_tool(200));
+    while (!client_open(&client) && waited < 1000) {
+        can_pass(100);
+        waited += 100;
+    }
+    CHECK(waited < 1000);
+    CHECK(client_login(&client) && echo(&client));
+    can_end();
+}
+
 /* ---- scans ---- */
 
 static void scan(CAN_TOOL *tool, RTS_UI8 target, RTS_UI8 window, RTS_UI32 request_id)
@@ -374,6 +397,7 @@ int main(void)
     RUN(packets_of_several_tools_arrive_at_the_same_time);
     RUN(more_packets_than_there_is_room_for_are_sent_again);
     RUN(a_tool_that_stops_in_the_middle_blocks_no_other);
+    RUN(tools_that_have_vanished_give_way_in_less_than_a_second);
     RUN(a_scan_of_all_or_of_one_is_answered);
     RUN(the_answer_comes_at_a_random_moment_of_the_window);
     RUN(scans_of_two_tools_are_both_answered);

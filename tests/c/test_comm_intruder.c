@@ -9,7 +9,7 @@
 RTS_STATIC_ASSERT(COMM_ENDPOINTS, built_for_a_network);
 RTS_STATIC_ASSERT(COMM_MAX_CLIENTS == 4, built_for_four_clients);
 
-enum { ADDRESS = 0x0102, INTRUDER = 0x0666 };
+enum { ADDRESS = 0x0102, INTRUDER = 0x0666, STORM = 3 };
 
 static REPLY answer;
 
@@ -259,6 +259,60 @@ static void those_who_logged_in_and_went_without_a_word_give_way_after_a_while(v
     CHECK(comes_in(&newcomer) && client_login(&newcomer));
 }
 
+/* All channels that `client` leaves. */
+static void fill(CLIENT others[COMM_MAX_CLIENTS - 1])
+{
+    for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS - 1; i++) {
+        client_init(&others[i], (RTS_UI16)(INTRUDER + i));
+        CHECK(client_open(&others[i]) && client_login(&others[i]));
+    }
+}
+
+static void those_who_cannot_be_reached_give_way_at_once_unless_they_are_heard_again(void)
+{
+    CLIENT others[COMM_MAX_CLIENTS - 1];
+    CLIENT newcomer;
+
+    start();
+    fill(others);
+    client_init(&newcomer, INTRUDER - 1);
+    CHECK(!comes_in(&newcomer));
+    RouterUnreachable(ChannelGetClient(0)->channel.peer.driver, 0); /* to this driver all have one endpoint */
+    CHECK(is_served(&client));
+    for (RTS_UI32 i = 1; i < RTS_COUNT(others); i++)
+        CHECK(is_served(&others[i]));
+    CHECK(comes_in(&newcomer) && client_login(&newcomer));
+    CHECK(!is_served(&others[0]));
+    CHECK(is_served(&client) && is_served(&newcomer));
+    client_init(&newcomer, INTRUDER - 2);
+    CHECK(!comes_in(&newcomer));
+}
+
+static RTS_UI32 packages_in(RTS_UI32 ms)
+{
+    RTS_UI32 count = 0;
+
+    fakes_cycle(ms);
+    while (SimLinkReceive(package, sizeof(package)) != 0)
+        count++;
+    return count;
+}
+
+static void those_who_are_silent_are_sent_something_when_another_one_finds_no_channel(void)
+{
+    CLIENT others[COMM_MAX_CLIENTS - 1];
+    CLIENT newcomer;
+
+    start();
+    fill(others);
+    client_init(&newcomer, INTRUDER - 1);
+    pass(CHANNEL_PROBE_MS);
+    for (RTS_UI32 i = 0; i < STORM; i++)
+        client_send_open(&newcomer, i, NETSERVER_MESSAGE_SIZE);
+    CHECK_EQUAL(packages_in(0), STORM + COMM_MAX_CLIENTS); /* the refusals, and one to each client */
+    CHECK_EQUAL(packages_in(CHANNEL_PROBE_MS), 0);
+}
+
 /* Reads memory, files and traces in other runtimes: groups 0x0F, 8 and their neighbours. */
 static void there_are_no_services_but_those_of_the_documentation(void)
 {
@@ -305,6 +359,8 @@ int main(void)
     RUN(those_who_hold_channels_without_login_give_way_after_a_while);
     RUN(those_who_open_again_and_again_give_way_after_a_while);
     RUN(those_who_logged_in_and_went_without_a_word_give_way_after_a_while);
+    RUN(those_who_cannot_be_reached_give_way_at_once_unless_they_are_heard_again);
+    RUN(those_who_are_silent_are_sent_something_when_another_one_finds_no_channel);
     RUN(there_are_no_services_but_those_of_the_documentation);
     RUN(every_service_survives_every_tag_of_every_size);
     return test_result();

@@ -201,6 +201,39 @@ static void a_channel_belongs_to_where_it_was_opened_from(void)
     net_end();
 }
 
+/* Their sockets are closed without a word. */
+static void clients_that_have_vanished_give_way_in_less_than_a_second(void)
+{
+    int files[COMM_MAX_CLIENTS + 1];
+    CLIENT_LINK links[COMM_MAX_CLIENTS + 1];
+    CLIENT clients[COMM_MAX_CLIENTS + 1];
+    REPLY reply;
+
+    net_start("", "@");
+    for (RTS_UI32 i = 0; i <= COMM_MAX_CLIENTS; i++) {
+        files[i] = net_udp(0);
+        links[i] = (CLIENT_LINK){send_packet, receive_packet, &files[i]};
+        client_init(&clients[i], 0x0102);
+        clients[i].link = &links[i];
+    }
+    CLIENT *last = &clients[COMM_MAX_CLIENTS];
+    for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS; i++)
+        CHECK(client_open(&clients[i]) && client_login(&clients[i]));
+    for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS - 1; i++)
+        close(files[i]);
+    CHECK(!client_open(last));
+    fakes_cycle(CHANNEL_PROBE_MS);
+    CHECK(!client_open(last)); /* this one makes them show themselves */
+    net_settle();
+    CHECK(client_open(last) && client_login(last));
+    while (net_datagram(files[COMM_MAX_CLIENTS - 1], packet, sizeof(packet)) != 0) {
+    }
+    CHECK(client_request(&clients[COMM_MAX_CLIENTS - 1], SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &reply));
+    close(files[COMM_MAX_CLIENTS - 1]);
+    close(files[COMM_MAX_CLIENTS]);
+    net_end();
+}
+
 static void what_is_no_packet_is_dropped(void)
 {
     RTS_UI8 data[1000] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x10, 0x00, 0x01, 0x02, 0xC2, 0x00, 0x04};
@@ -299,6 +332,7 @@ int main(void)
     RUN(what_is_sent_to_us_is_for_us_and_what_is_sent_to_all_need_not_be);
     RUN(it_reflects_nothing);
     RUN(a_channel_belongs_to_where_it_was_opened_from);
+    RUN(clients_that_have_vanished_give_way_in_less_than_a_second);
     RUN(what_is_no_packet_is_dropped);
     RUN(a_flood_is_worked_off_in_pieces);
     RUN(the_first_free_port_is_taken_or_the_one_asked_for);

@@ -245,6 +245,21 @@ static void without_flow_control_a_packet_is_given_up_after_a_second(void)
     CHECK(pair.failed && took >= ISOTP_TIMEOUT_MS && took <= ISOTP_TIMEOUT_MS + 2);
 }
 
+static void a_receiver_that_says_nothing_is_noticed_before(void)
+{
+    RTS_UI8 frame[ISOTP_MAX_FRAME];
+
+    start_pair(100, CLASSIC, 0, 0);
+    CHECK(!IsoTpIsUnheard(&pair.tx, ISOTP_UNHEARD_MS)); /* the first frame waits for the bus */
+    (void)IsoTpNext(&pair.tx, frame, 0);
+    IsoTpSent(&pair.tx, 0);
+    CHECK(!IsoTpIsUnheard(&pair.tx, ISOTP_UNHEARD_MS - 1) && IsoTpIsUnheard(&pair.tx, ISOTP_UNHEARD_MS));
+    CHECK_EQUAL(IsoTpTakeFlow(&pair.tx, (const RTS_UI8 *)"\x31\0\0", 3, ISOTP_UNHEARD_MS), ISOTP_TX_NOTHING);
+    CHECK(!IsoTpIsUnheard(&pair.tx, 2 * ISOTP_UNHEARD_MS - 1));
+    CHECK_EQUAL(IsoTpTakeFlow(&pair.tx, (const RTS_UI8 *)"\x30\0\0", 3, ISOTP_UNHEARD_MS), ISOTP_TX_NOTHING);
+    CHECK(!IsoTpIsUnheard(&pair.tx, 4 * ISOTP_UNHEARD_MS));
+}
+
 static void a_clock_that_was_read_earlier_ends_nothing(void)
 {
     start_pair(100, CLASSIC, 0, 0);
@@ -391,6 +406,7 @@ int main(void)
     RUN(a_packet_longer_than_the_buffer_is_refused_at_once);
     RUN(a_receiver_that_says_wait_is_waited_for_but_not_for_ever);
     RUN(without_flow_control_a_packet_is_given_up_after_a_second);
+    RUN(a_receiver_that_says_nothing_is_noticed_before);
     RUN(a_clock_that_was_read_earlier_ends_nothing);
     RUN(what_is_out_of_place_changes_nothing);
     RUN(a_new_packet_takes_the_place_of_one_that_did_not_end);

@@ -1,5 +1,6 @@
 /*
- * test_linux_socket.c - SysSocket: what a closed connection still sends, and one that is reset does not; networks.
+ * test_linux_socket.c - SysSocket: what a closed connection still sends, and one that is reset does not; datagrams that
+ * find no socket; networks.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -124,10 +125,58 @@ static void the_networks_are_those_that_tools_reach_it_by(void)
     PortSockClose();
 }
 
+/* ---- datagrams that find no socket ---- */
+
+static int bound(RTS_UI16 *port)
+{
+    struct sockaddr_in own = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t size = sizeof(own);
+    int file = socket(AF_INET, SOCK_DGRAM, 0);
+
+    CHECK_EQUAL(bind(file, (struct sockaddr *)&own, size), 0);
+    CHECK_EQUAL(getsockname(file, (struct sockaddr *)&own, &size), 0);
+    *port = ntohs(own.sin_port);
+    return file;
+}
+
+static void a_datagram_that_is_refused_is_told_and_costs_no_other_one(void)
+{
+    enum { CLOSED = 3 };
+    PORT_REASON reason;
+    RTS_UI16 port;
+    SOCKADDRESS to[CLOSED], refused;
+    RTS_UI8 data[4] = {0};
+
+    CHECK(PortUdpOpen("127.0.0.5", &reason));
+    RTS_HANDLE socket = SysSockOpen(SYSSOCK_UDP);
+    CHECK_EQUAL(SysSockRecvRefused(socket, &refused), ERR_NOTHING_TO_DO);
+    for (int i = 0; i < CLOSED; i++) {
+        int file = bound(&port);
+        to[i] = (SOCKADDRESS){INADDR_LOOPBACK, port};
+        close(file);
+    }
+    int file = bound(&port);
+    for (int i = 0; i < CLOSED; i++) {
+        CHECK_EQUAL(SysSockSendTo(socket, data, sizeof(data), &to[i]), ERR_OK);
+        CHECK_EQUAL(SysSockSendTo(socket, data, sizeof(data), &(SOCKADDRESS){INADDR_LOOPBACK, port}), ERR_OK);
+        CHECK_EQUAL(recv(file, data, sizeof(data), MSG_DONTWAIT), sizeof(data));
+    }
+    for (int i = 0; i < CLOSED; i++) {
+        CHECK_EQUAL(SysSockRecvRefused(socket, &refused), ERR_OK);
+        CHECK(refused.ip == to[i].ip && refused.port == to[i].port);
+    }
+    CHECK_EQUAL(SysSockRecvRefused(socket, &refused), ERR_NOTHING_TO_DO);
+    (void)PortWait(0);   /* after what earlier tests did */
+    CHECK(!PortWait(0)); /* nothing is left that would wake it */
+    close(file);
+    PortSockClose();
+}
+
 int main(void)
 {
     RUN(a_closed_connection_sends_what_was_taken);
     RUN(one_that_is_reset_sends_nothing_more);
+    RUN(a_datagram_that_is_refused_is_told_and_costs_no_other_one);
     RUN(the_networks_are_those_that_tools_reach_it_by);
     return test_result();
 }

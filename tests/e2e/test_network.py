@@ -129,9 +129,12 @@ def test_all_lines_serve_at_once(plcrt: Plcrt, counter: Path) -> None:
                     assert reader.read("Main.name") == f"n{number}"
 
 
-def test_clients_that_were_killed_leave_their_places_at_once(plcrt: Plcrt) -> None:
-    """All the clients there may be, over TCP; when they die, the next one need not wait for any time-out."""
-    connect = f"import plctool, sys; p = plctool.connect('tcp:{plcrt.tcp}')"
+@pytest.mark.parametrize("kind", ["tcp", "udp"])
+def test_clients_that_were_killed_leave_their_places_to_the_next_one(plcrt: Plcrt, kind: str) -> None:
+    """All the clients there may be. On TCP the device has read their end before it accepts the next one; on UDP the network
+    says so when it sends them something, before plctool's patience ends."""
+    link = link_of(plcrt, kind)
+    connect = f"import plctool, sys; p = plctool.connect({link!r})"
     script = f"{connect}; p.identity(); print(flush=True); sys.stdin.read()"
     command = [sys.executable, "-c", script]
     tools = [
@@ -141,13 +144,13 @@ def test_clients_that_were_killed_leave_their_places_at_once(plcrt: Plcrt) -> No
     for each in tools:
         assert each.stdout
         assert each.stdout.readline() == b"\n"
-    with pytest.raises(LinkError, match="busy"), plctool.connect(f"tcp:{plcrt.tcp}") as plc:
+    with pytest.raises(LinkError, match="busy"), plctool.connect(link) as plc:
         plc.identity()
     for each in tools:
         each.kill()
     for each in tools:
         each.communicate()
-    with plctool.connect(f"tcp:{plcrt.tcp}") as plc:  # the device has read their end before it accepts this one
+    with plctool.connect(link) as plc:
         assert plc.identity().device_name == "plcrt"
 
 

@@ -255,6 +255,8 @@ static void vanish(PEER *peer)
 {
     if (peer >= &peers[LINE_TCP])
         connection_of(peer)->ended = true;
+    else if (peer >= &peers[LINE_UDP])
+        sockets.refused = (SOCKADDRESS){SOCKETS_OWN_IP, (RTS_UI16)(FIRST_PORT + (peer - peers))};
     begin(peer);
 }
 

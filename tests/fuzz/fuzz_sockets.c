@@ -145,6 +145,16 @@ RTS_RESULT SysSockSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, 
     return ERR_OK;
 }
 
+RTS_RESULT SysSockRecvRefused(RTS_HANDLE socket, SOCKADDRESS *to)
+{
+    FUZZ_CHECK(socket == UDP);
+    if (sockets.refused.port == 0)
+        return ERR_NOTHING_TO_DO;
+    *to = sockets.refused;
+    sockets.refused.port = 0;
+    return ERR_OK;
+}
+
 void SysSockClose(RTS_HANDLE socket)
 {
     FUZZ_CHECK(socket <= UDP);

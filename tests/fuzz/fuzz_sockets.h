@@ -38,6 +38,7 @@ typedef struct {
     const uint8_t *datagram; /* that waits for the device; NULL: none */
     uint32_t datagram_size;
     SOCKADDRESS datagram_peer;
+    SOCKADDRESS refused; /* where the network says that no socket is; port 0: it says nothing */
     DATAGRAM out[SOCKETS_DATAGRAMS];
     uint32_t out_count; /* what does not fit is lost */
 } SOCKETS;

@@ -385,6 +385,20 @@ def test_a_busy_device_is_a_link_error() -> None:
     assert caught.value.exit_code == 3
 
 
+def test_a_device_that_is_busy_for_less_than_a_second_is_asked_again() -> None:
+    device = FakeDevice(reverse)
+    device.free_channels = False
+    line = FakeLine(device)
+
+    def become_free() -> None:
+        device.free_channels = True
+
+    line.after(0.9, become_free)
+    connection = connect(line)
+    assert connection.exchange(b"ab") == b"ba"
+    assert 0.9 < line.now() < 1.3
+
+
 def test_packages_of_strangers_and_nonsense_are_ignored() -> None:
     device = FakeDevice(reverse)
     line = FakeLine(device)

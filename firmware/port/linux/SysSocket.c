@@ -16,6 +16,7 @@
 #include <arpa/inet.h>
 #include <errno.h>
 #include <ifaddrs.h>
+#include <linux/errqueue.h>
 #include <net/if.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -237,6 +238,14 @@ static bool open_broadcast(SOCKADDRESS own, const char *text, PORT_REASON *reaso
     return keep(SYSSOCK_UDP_BROADCAST, bind_socket(SOCK_DGRAM, own, true), "--udp", text, reason);
 }
 
+/* Without it the kernel keeps to itself what networks say of datagrams; clients that vanish are then noticed later. */
+static bool tell_refusals(void)
+{
+    int on = 1;
+    (void)setsockopt(sockets.source[SYSSOCK_UDP].file, IPPROTO_IP, IP_RECVERR, &on, sizeof(on));
+    return true;
+}
+
 bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *indexed)
 {
     *place = (SOCKADDRESS){INADDR_LOOPBACK, 0};
@@ -252,7 +261,7 @@ bool PortUdpOpen(const char *text, PORT_REASON *reason)
         PortReason(reason, "--udp %s is no address", text);
         return false;
     }
-    return keep(SYSSOCK_UDP, bind_udp(place, indexed), "--udp", text, reason) &&
+    return keep(SYSSOCK_UDP, bind_udp(place, indexed), "--udp", text, reason) && tell_refusals() &&
            open_broadcast(own_address(sockets.source[SYSSOCK_UDP].file), text, reason);
 }
 
@@ -473,7 +482,7 @@ RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RT
     return ERR_OK;
 }
 
-/* An error here is of a datagram sent earlier (its port is closed): nothing to do. */
+/* An error here is of a datagram sent earlier: SysSockRecvRefused. */
 RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received)
 {
     struct sockaddr_in sender = {.sin_family = AF_INET};
@@ -488,11 +497,53 @@ RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCK
     return ERR_OK;
 }
 
+static bool send_to(int file, const RTS_UI8 *data, RTS_UI32 size, struct sockaddr_in receiver)
+{
+    return sendto(file, data, size, MSG_NOSIGNAL, (struct sockaddr *)&receiver, sizeof(receiver)) >= 0;
+}
+
+/* The error of a datagram sent earlier is reported once, in place of sending this one. */
 RTS_RESULT SysSockSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to)
 {
     struct sockaddr_in receiver = make_address(to->ip, to->port);
-    bool sent = sendto(file_of(socket), data, size, MSG_NOSIGNAL, (struct sockaddr *)&receiver, sizeof(receiver)) >= 0;
+    int file = file_of(socket);
+    bool sent = send_to(file, data, size, receiver) || (!is_later() && send_to(file, data, size, receiver));
     return sent || !is_later() ? ERR_OK : ERR_NOBUFFER;
+}
+
+/* The error that a message of a socket's error queue is about. */
+static int queued_error(struct msghdr *message)
+{
+    for (struct cmsghdr *part = CMSG_FIRSTHDR(message); part != NULL; part = CMSG_NXTHDR(message, part)) {
+        if (part->cmsg_level == IPPROTO_IP && part->cmsg_type == IP_RECVERR) {
+            struct sock_extended_err error;
+            memcpy(&error, CMSG_DATA(part), sizeof(error));
+            return (int)error.ee_errno;
+        }
+    }
+    return 0;
+}
+
+RTS_RESULT SysSockRecvRefused(RTS_HANDLE socket, SOCKADDRESS *to)
+{
+    enum { CONTROL_SIZE = 256 };
+    union {
+        struct cmsghdr aligned;
+        char bytes[CONTROL_SIZE];
+    } control;
+    struct sockaddr_in receiver;
+    struct msghdr message;
+    do {
+        message = (struct msghdr){.msg_name = &receiver,
+                                  .msg_namelen = sizeof(receiver),
+                                  .msg_control = &control,
+                                  .msg_controllen = sizeof(control)};
+        if (recvmsg(file_of(socket), &message, MSG_ERRQUEUE) < 0) {
+            return ERR_NOTHING_TO_DO;
+        }
+    } while (queued_error(&message) != ECONNREFUSED);
+    *to = read_address(&receiver);
+    return ERR_OK;
 }
 
 void SysSockReset(RTS_HANDLE socket)

@@ -346,8 +346,12 @@ static void expire(RTS_UI32 now_ms)
             send_flow(session);
     }
     FOR_EACH_TX(session)
-    if (IsoTpSendExpired(&session->tx, now_ms))
-        COMM_COUNT(counters.unsent);
+    {
+        if (IsoTpIsUnheard(&session->tx, now_ms))
+            RouterUnreachable(&can.driver, session->tool);
+        if (IsoTpSendExpired(&session->tx, now_ms))
+            COMM_COUNT(counters.unsent);
+    }
 }
 
 static void forget_packets(void)

@@ -117,6 +117,16 @@ static void receive(const LISTENER *listener)
     }
 }
 
+static void receive_refusals(void)
+{
+    SOCKADDRESS to;
+
+    if (udp.own.socket == NO_SOCKET)
+        return;
+    for (RTS_UI32 i = 0; i < READ_MAX && SysSockRecvRefused(udp.own.socket, &to) == ERR_OK; i++)
+        RouterUnreachable(&udp.own.driver, endpoint_of(&to));
+}
+
 /* ---- life ---- */
 
 static void open_listener(LISTENER *listener, SYSSOCK_PURPOSE purpose)
@@ -150,6 +160,7 @@ static void open_all(void)
 
 static void cycle(void)
 {
+    receive_refusals();
     receive(&udp.own);
     receive(&udp.broadcast);
 }

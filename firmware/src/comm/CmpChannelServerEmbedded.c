@@ -243,10 +243,21 @@ static bool is_reliable(const ROUTER_PEER *peer)
 #endif
 }
 
+/* Nothing says that its peer is there. */
+static bool is_lost(const CHANNEL *channel)
+{
+#if COMM_ENDPOINTS
+    return channel->peer.driver->gone || channel->unreachable;
+#else
+    RTS_UNUSED(channel);
+    return false;
+#endif
+}
+
 /* The channel is in use by a logged-in client. */
 static bool is_taken(const COMM_CLIENT *client, RTS_UI32 now_ms)
 {
-    return client->channel.id != 0 && SrvIsLoggedIn(client) && !is_gone(&client->channel.peer) &&
+    return client->channel.id != 0 && SrvIsLoggedIn(client) && !is_lost(&client->channel) &&
            now_ms - client->channel.last_received < CHANNEL_IDLE_MS;
 }
 
@@ -255,8 +266,8 @@ static bool is_settling(const COMM_CLIENT *client, RTS_UI32 now_ms)
 {
     const CHANNEL *channel = &client->channel;
 
-    return COMM_ENDPOINTS && channel->id != 0 && !SrvIsLoggedIn(client) && !channel->fresh &&
-           !is_gone(&channel->peer) && now_ms - channel->anonymous_since < CHANNEL_SETTLE_MS;
+    return COMM_ENDPOINTS && channel->id != 0 && !SrvIsLoggedIn(client) && !channel->fresh && !is_lost(channel) &&
+           now_ms - channel->anonymous_since < CHANNEL_SETTLE_MS;
 }
 
 /* Whether `a` is the better one to give to a new peer: it is free, or was never used, or has been silent longer. */
@@ -282,6 +293,16 @@ static COMM_CLIENT *claim_client(const ROUTER_PEER *peer, RTS_UI32 now_ms)
             found = client;
     }
     return found;
+}
+
+/* Makes those that have been silent for a while show whether they are still there (ChannelUnreachable). */
+static void probe_silent(RTS_UI32 now_ms)
+{
+    FOR_EACH_CLIENT (client) {
+        CHANNEL *channel = &client->channel;
+        if (now_ms - channel->last_received >= CHANNEL_PROBE_MS && now_ms - channel->last_sent >= CHANNEL_PROBE_MS)
+            channel->last_sent = now_ms - CHANNEL_KEEPALIVE_MS;
+    }
 }
 
 /* The client asks again because our response was lost. */
@@ -331,6 +352,8 @@ static void handle_open(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 s
     if (client == NULL) {
         COMM_COUNT(counters.refused);
         send_open_refusal(peer, request.request_id);
+        if (COMM_ENDPOINTS)
+            probe_silent(now_ms);
         return;
     }
     if (!is_repetition(&client->channel, peer, &request))
@@ -587,6 +610,14 @@ static bool is_to_server(const CHANNEL_HEADER *head)
     return (head->flags & CHANNEL_FLAG_TO_SERVER) != 0 || (SRV_OTHER_CLIENTS && head->type == CHANNEL_PKG_KEEPALIVE);
 }
 
+static void note_received(CHANNEL *channel, RTS_UI32 now_ms)
+{
+    channel->last_received = now_ms;
+#if COMM_ENDPOINTS
+    channel->unreachable = false;
+#endif
+}
+
 static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
     const CHANNEL_HEADER *head = (const CHANNEL_HEADER *)data;
@@ -601,7 +632,7 @@ static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data,
         complain(peer, BytesGet16(head->id), now_ms);
         return;
     }
-    client->channel.last_received = now_ms;
+    note_received(&client->channel, now_ms);
     if (head->type == CHANNEL_PKG_DATA && size >= sizeof(CHANNEL_DATA))
         handle_data(client, (const CHANNEL_DATA *)data, size, now_ms);
     else if (head->type == CHANNEL_PKG_ACK && size >= sizeof(*ack))
@@ -710,6 +741,13 @@ bool ChannelNeeds(const BLK_DRV *driver)
         if (client->channel.id != 0 && client->channel.peer.driver == driver && SrvIsLoggedIn(client))
             return true;
     return false;
+}
+
+void ChannelUnreachable(const BLK_DRV *driver, RTS_UI64 endpoint)
+{
+    FOR_EACH_CLIENT (client)
+        if (client->channel.peer.driver == driver && client->channel.peer.endpoint == endpoint)
+            client->channel.unreachable = true;
 }
 #endif
 

@@ -159,6 +159,13 @@ void RouterHandleDataFrom(const BLK_DRV *driver, RTS_UI64 endpoint, const RTS_UI
     handle(driver, endpoint, data, size);
 }
 
+void RouterUnreachable(const BLK_DRV *driver, RTS_UI64 endpoint)
+{
+    for (RTS_UI32 i = 0; i < RouterServiceCount; i++)
+        if (RouterServices[i].unreachable != NULL)
+            RouterServices[i].unreachable(driver, endpoint);
+}
+
 bool RouterNeeds(const BLK_DRV *driver)
 {
     for (RTS_UI32 i = 0; i < RouterServiceCount; i++)

@@ -282,6 +282,11 @@ ISOTP_TX_RESULT IsoTpTakeFlow(ISOTP_TX *tx, const RTS_UI8 *data, RTS_UI32 size, 
     }
 }
 
+bool IsoTpIsUnheard(const ISOTP_TX *tx, RTS_UI32 now_ms)
+{
+    return tx->state == ISOTP_TX_WAIT && has_passed(tx->since_ms, now_ms, ISOTP_UNHEARD_MS);
+}
+
 bool IsoTpSendExpired(ISOTP_TX *tx, RTS_UI32 now_ms)
 {
     return IsoTpIsSending(tx) && has_passed(tx->since_ms, now_ms, ISOTP_TIMEOUT_MS + (RTS_UI32)tx->separation_ms) &&

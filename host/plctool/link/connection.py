@@ -17,6 +17,8 @@ from plctool.link.transport import BlockTransport
 
 PATIENCE = 8.0  # default time of silence after which a channel counts as lost [s]
 _OPEN_PATIENCE = 5.0
+_BUSY_PATIENCE = 1.5  # in less a device notices that a tool has vanished which held a channel [s]
+_BUSY_PAUSE = 0.25  # between two requests for a channel [s]
 _AT_ONCE = 16  # packages sent before the next look at the input
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
 SCAN_SECONDS = 1.5
@@ -152,6 +154,13 @@ class Connection:
             header,
         )
         words = (len(self._peer) + len(self.transport.local_address)) // 2
+        end = self.transport.now() + _BUSY_PATIENCE
+        while (channel := self._open_channel(line, words, last=self.transport.now() >= end)) is None:
+            self.wait(_BUSY_PAUSE)
+        self._channel = channel
+
+    def _open_channel(self, line: Line, words: int, *, last: bool) -> Channel | None:
+        """None if all channels of the device are in use and this is not the last time that it is asked."""
         channel = Channel(line, words, secrets.randbits(32))
         channel.open(self.transport.now())
         try:
@@ -159,7 +168,11 @@ class Connection:
         except ChannelLost:
             self._peer = None  # there may be another device by now
             raise
-        self._channel = channel
+        except LinkError as error:
+            if last or error.code != "busy":
+                raise
+            return None
+        return channel
 
     def _find(self, choice: Choice | None) -> names.Node:
         """The device that is meant. Raises LinkError when it does not reply, or there are several."""
