@@ -131,8 +131,8 @@ def test_all_lines_serve_at_once(plcrt: Plcrt, counter: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["tcp", "udp"])
 def test_clients_that_were_killed_leave_their_places_to_the_next_one(plcrt: Plcrt, kind: str) -> None:
-    """All the clients there may be. On TCP the device has read their end before it accepts the next one; on UDP the network
-    says so when it sends them something, before plctool's patience ends."""
+    """All the clients there may be. On TCP the device has read their end before it accepts the next one; on UDP the
+    network says so when it sends them something, before plctool's patience ends."""
     link = link_of(plcrt, kind)
     connect = f"import plctool, sys; p = plctool.connect({link!r})"
     script = f"{connect}; p.identity(); print(flush=True); sys.stdin.read()"
