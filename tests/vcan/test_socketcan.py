@@ -6,24 +6,21 @@ import os
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import can
 import pytest
+from nodes import NODES
 
 import plctool
-from plctool.compiler import compile_sources
 from plctool.device import connect_several
 from plctool.errors import PlcError
 from plctool.link.transports import parse_link
 from plctool.testing.plcrt import Plcrt
 
-NODES = {1: "press", 2: "mixer", 3: "oven"}
 PATIENCE = 60.0  # [s]
-FD = "bitrate=500000/2000000"
 
 pytestmark = pytest.mark.skipif(not Path("/sys/class/net/vcan0").exists(), reason="there is no vcan0: make test-vcan")
 
@@ -34,32 +31,6 @@ def eventually(question: Callable[[], Any]) -> Any:
         assert time.monotonic() < end
         time.sleep(0.05)
     return answer
-
-
-@pytest.fixture(scope="module")
-def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("program")
-    source = folder / "counter.st"
-    source.write_text(
-        "PROGRAM Main VAR count : DINT; t : ARRAY[0..1999] OF DINT := [2000(3)]; END_VAR "
-        "count := count + 1; END_PROGRAM"
-    )
-    compile_sources([source]).write(folder / "counter.cdl")
-    return folder / "counter.cdl"
-
-
-@pytest.fixture(scope="module", params=["classic", "fd"])
-def bus(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A bus with three controllers; the link to it, to which options can be added."""
-    folder = tmp_path_factory.mktemp("can")
-    fd = request.param == "fd"
-    interface = "vcan1" if fd else "vcan0"
-    more = ("--bitrate", "500000/2000000") if fd else ()
-    with ExitStack() as stack:
-        for number, name in NODES.items():
-            options = ("--can", interface, "--node", str(number), "--name", name, *more)
-            stack.enter_context(Plcrt(folder / f"{name}.flash", *options))
-        yield f"can:socketcan:{interface}?{FD + '&' if fd else ''}node="
 
 
 def test_all_are_found(bus: str) -> None:
