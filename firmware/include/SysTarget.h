@@ -30,6 +30,10 @@ const SYS_TARGET *SysTargetGet(void);
 /* 32 unpredictable bits for channel and session ids. From main. */
 RTS_UI32 SysTargetRandom(void);
 
+/* Whether they come from a generator of the hardware or the system. False: a start that is the same to the cycle gives the
+ * same ones, which the log says of a device on a network or bus, or with a password. From main. */
+bool SysTargetHasGenerator(void);
+
 /* The stack of main. From main, on request: may take a while. */
 SYS_STACK SysTargetGetStack(void);
 

@@ -72,6 +72,11 @@ RTS_UI32 SysTargetRandom(void)
     return fakes.random ^ fakes.random >> 16;
 }
 
+bool SysTargetHasGenerator(void)
+{
+    return !fakes.no_generator;
+}
+
 RTS_UI32 SysLockEnter(void)
 {
     fakes.locks++;

@@ -13,6 +13,17 @@ enum { ADDRESS = 0x0102, INTRUDER = 0x0666, STORM = 3 };
 
 static REPLY answer;
 
+static void a_device_whose_ids_might_be_guessed_says_so(void)
+{
+    fakes_start();
+    RTS_UI32 logged = fakes.log_added;
+    fakes_run_init_hooks();
+    CHECK_EQUAL(fakes.log_added, logged);
+    fakes.no_generator = true;
+    fakes_run_init_hooks();
+    CHECK_EQUAL(fakes.log_added, logged + 1);
+}
+
 static bool is_served(CLIENT *who)
 {
     return client_request(who, SG_APPLICATION, SRV_APP_READ_APPLICATION_LIST, NULL, 0, &answer) &&
@@ -345,6 +356,7 @@ static void every_service_survives_every_tag_of_every_size(void)
 
 int main(void)
 {
+    RUN(a_device_whose_ids_might_be_guessed_says_so);
     RUN(guessing_all_ids_from_elsewhere_closes_nothing);
     RUN(guessing_all_ids_in_the_name_of_the_client_closes_nothing);
     RUN(a_close_request_works_again_when_the_guessing_has_ended);

@@ -99,14 +99,13 @@ class Udp(Link):
 class Serial(Link):
     """`#<` packet CRC `#>`, in which `#` is `#_`."""
 
-    def __init__(self, place: str, high_byte_first: bool = False) -> None:
+    def __init__(self, place: str) -> None:
         self._file = os.open(place, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self._file, termios.TCSANOW)
-        self._order = ">H" if high_byte_first else "<H"
         self._bytes = b""
 
     def send(self, packet: bytes) -> None:
-        data = packet + struct.pack(self._order, crc16(packet))
+        data = packet + struct.pack("<H", crc16(packet))
         os.write(self._file, b"#<" + data.replace(b"#", b"#_") + b"#>")
 
     def receive(self) -> bytes:

@@ -74,6 +74,11 @@ RTS_UI32 SysTargetRandom(void)
     return value;
 }
 
+bool SysTargetHasGenerator(void)
+{
+    return true;
+}
+
 /* FNV-1a: the machine id itself is not to be shown to the network. */
 static RTS_UI64 hash(const char *text)
 {

@@ -44,6 +44,11 @@ RTS_UI32 SysTargetRandom(void)
     return state;
 }
 
+bool SysTargetHasGenerator(void)
+{
+    return true;
+}
+
 void SimSetTarget(RTS_UI32 type, RTS_UI32 id, RTS_UI32 version)
 {
     target.type = type;

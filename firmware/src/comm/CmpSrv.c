@@ -9,6 +9,7 @@
 
 #include "AppPassword.h"
 #include "CmpBytes.h"
+#include "CmpLog.h"
 #include "CmpPackets.h"
 #include "SysTarget.h"
 #include "rts_config.h"
@@ -201,5 +202,7 @@ RTS_RESULT CmpSrv_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT)
         CMP_CLEAR(srv);
+    else if (hook == CH_INIT3 && (COMM_ENDPOINTS || COMM_PASSWORD) && !SysTargetHasGenerator())
+        LogAdd(CMPID_CmpSrv, LOG_WARNING, ERR_OK, "No random generator: ids and challenges might be guessed");
     return ERR_OK;
 }

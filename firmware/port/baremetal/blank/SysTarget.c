@@ -37,3 +37,9 @@ RTS_UI32 SysTargetRandom(void)
     last = last * 1664525u + 1013904223u;
     return last;
 }
+
+/* Write here: true with a random generator. */
+bool SysTargetHasGenerator(void)
+{
+    return false;
+}
