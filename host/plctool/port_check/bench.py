@@ -144,11 +144,12 @@ class Bench:
             time.sleep(0.02)
         return time.monotonic() - begin
 
-    def wait_until_it_runs(self, cycles: int = 3) -> None:
-        """Waits for so many cycles; without monitoring, for the state that the controller reports."""
+    def wait_until_it_runs(self, cycles: int = 3, *, fails: bool = False) -> None:
+        """Waits for so many cycles; without monitoring, for the state that the controller reports. `fails`: it runs
+        for a moment, and may have failed when the controller is asked."""
         if self.has_monitoring:
             self.wait(lambda: bool(self.plc.read(_CYCLES) >= cycles), "The program does not run: no cycles")
-        elif (state := self.plc.status().state) is not AppState.RUN:
+        elif (state := self.plc.status().state) is not AppState.RUN and not (fails and state is AppState.EXCEPTION):
             raise CheckFailed(f"The program does not run: its state is {state}.")
 
     def cycles(self) -> int:

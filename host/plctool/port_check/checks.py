@@ -271,7 +271,7 @@ class Checks:
             raise CheckFailed(f"Reported as {found}; expected {' or '.join(sorted(expected))}.", **figures)
         self._plc.reset("warm")
         self._plc.start()
-        self._bench.wait_until_it_runs()
+        self._bench.wait_until_it_runs(fails=True)
         place = ", ".join(filter(None, (found.task, found.pou)))
         return f"{found.name} in {place} after {seconds:.2f} s; runs again", figures
 
