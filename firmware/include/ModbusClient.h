@@ -114,7 +114,9 @@ static inline RTS_UI32 ModbusJobGetReverse(const MODBUS_JOB *job, const MODBUS_F
 
 /* Whether the device replies. */
 bool ModbusDeviceIsLost(const MODBUS_DEVICE *device);
-/* Whether it replies, and all its jobs were good. */
+/* Whether it is one device; not all of a line, which do not reply (MODBUS_BROADCAST). */
+bool ModbusDeviceIsOne(const MODBUS_CLIENT *client, const MODBUS_DEVICE *device);
+/* Whether it replies, and all its jobs were good; of all devices at once, whether it was sent what there was. */
 bool ModbusDeviceIsGood(const MODBUS_DEVICE *device);
 
 #endif

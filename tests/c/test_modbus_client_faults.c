@@ -246,8 +246,30 @@ static void a_broadcast_waits_for_no_reply(void)
     run_ms(1000);
     CHECK_EQUAL(remotes[0].data[8], 3);
     CHECK_EQUAL(remotes[2].data[8], 3);
-    CHECK(ModbusDeviceIsGood(&devices[1]));
+    CHECK(ModbusDeviceIsGood(&devices[0]) && ModbusDeviceIsGood(&devices[1]));
     CHECK_EQUAL(devices[0].counters.timeouts, 0);
+}
+
+/* They are asked again at once when one of them replies, as if there were no broadcasts. */
+static void a_broadcast_says_nothing_of_devices_that_are_lost(void)
+{
+    begin(3);
+    devices[0].unit = MODBUS_BROADCAST;
+    add(0, write_job(0, 20));
+    add(1, read_job(20));
+    add(2, read_job(20));
+    states[0][0].has_out = true;
+    remotes[1].fault = remotes[2].fault = SILENT;
+    run_ms(20000);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+    CHECK(ModbusDeviceIsLost(&devices[1]) && ModbusDeviceIsLost(&devices[2]));
+    remotes[1].fault = remotes[2].fault = WELL;
+    for (RTS_UI32 ms = 0; ModbusDeviceIsLost(&devices[1]) && ModbusDeviceIsLost(&devices[2]); ms++) {
+        CHECK(ms < 20000);
+        run_ms(1);
+    }
+    run_ms(500);
+    CHECK(ModbusDeviceIsGood(&devices[1]) && ModbusDeviceIsGood(&devices[2]));
 }
 
 static void data_are_taken_and_given_under_the_lock(void)
@@ -293,6 +315,7 @@ int main(void)
     RUN(a_slow_line_is_not_late);
     RUN(a_device_that_comes_back_gets_all_outputs_again);
     RUN(a_broadcast_waits_for_no_reply);
+    RUN(a_broadcast_says_nothing_of_devices_that_are_lost);
     RUN(data_are_taken_and_given_under_the_lock);
     RUN(what_has_got_no_reply_is_taken_back_from_the_port);
     return test_result();

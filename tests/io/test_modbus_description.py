@@ -227,6 +227,12 @@ MISTAKES = [
     (device("word_1").replace("9600", "9601"), "9601 is not a speed of serial lines"),
     (device("word_1").replace("unit = 3", "unit = 300"), "unit is 300; it can be 0 to 247"),
     (device("word_1").replace("unit = 3", "unit = 0"), "unit 0 is all devices of the line"),
+    (
+        device("word_1")
+        .replace("unit = 3", "unit = 0")
+        .replace("device.read]]\nfunction = 3", "device.write]]\nfunction = 16\nverify = true"),
+        "unit 0 is all devices of the line",
+    ),
     (device("word_1").replace("address = 40001", "address = 40001\nwire = 0"), "write address or wire, not both"),
     (server('40001 = "Main.real_1", 40002 = "Main.word_1"'), "are at the same addresses of the holding registers"),
     (server('30001 = "Main.word_1"'), "30001 is not the address of holding registers"),

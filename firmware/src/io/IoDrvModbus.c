@@ -206,22 +206,29 @@ static void note_device(MODBUS_NOTED *noted, const MODBUS_DEVICE *device)
         note_error(noted, errors_of(device), good || device->failures != 0 ? 0 : CF_CONNECTOR_ERROR);
 }
 
-/* Of a client a line is as well as one of its devices. */
+/* Of a client a line is as well as one of its devices, of those that can reply. */
 static void note_client(MODBUS_CLIENT_LINE *line)
 {
     const MODBUS_CLIENT *client = &line->client;
     RTS_UI32 first = (RTS_UI32)(client->devices - setup.devices);
-    bool replies = client->device_count == 0;
+    bool can_reply = false;
+    bool replies = false;
+    bool failed = false;
 
     for (RTS_UI32 i = 0; i < client->device_count; i++) {
-        note_device(&setup.noted[first + i], &client->devices[i]);
-        replies = replies || (client->devices[i].good_ns != 0 && !ModbusDeviceIsLost(&client->devices[i]));
+        const MODBUS_DEVICE *device = &client->devices[i];
+        bool is_one = ModbusDeviceIsOne(client, device);
+        note_device(&setup.noted[first + i], device);
+        can_reply = can_reply || is_one;
+        replies = replies || (is_one && device->good_ns != 0 && !ModbusDeviceIsLost(device));
+        failed = failed || device->failures != 0;
     }
-    if (replies)
+    bool lost = can_reply && !replies && failed;
+    if (replies || !can_reply)
         IoMgrConfigNoteData(line->noted.connector);
-    else if (!line->noted.noted_lost && client->devices[0].failures != 0)
+    else if (lost && !line->noted.noted_lost)
         IoMgrConfigSetDiagnosis(line->noted.connector, CF_CONNECTOR_BUS_ERROR);
-    line->noted.noted_lost = !replies && client->devices[0].failures != 0;
+    line->noted.noted_lost = lost;
     note_error(&line->noted, client->link.bad_frames, 0);
 }
 

@@ -97,7 +97,7 @@ static bool describe(MODBUS_REQUEST *request, const MODBUS_DEVICE *device, RTS_U
         request->read_address = address;
         request->read_count = count;
     }
-    return kind->most_written != 0 || device->unit != MODBUS_BROADCAST || !client_of(device)->link.type->broadcasts;
+    return kind->most_written != 0 || ModbusDeviceIsOne(client_of(device), device);
 }
 
 /* What is past the last coil is 0. */

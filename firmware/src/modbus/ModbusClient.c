@@ -250,11 +250,17 @@ static void next_due(MODBUS_JOB_STATE *state, RTS_I64 interval_ns, RTS_I64 now_n
         state->due_ns = now_ns;
 }
 
+bool ModbusDeviceIsOne(const MODBUS_CLIENT *client, const MODBUS_DEVICE *device)
+{
+    return device->unit != MODBUS_BROADCAST || !client->link.type->broadcasts;
+}
+
 static bool others_reply(const MODBUS_CLIENT *client)
 {
     for (RTS_UI32 i = 0; i < client->device_count; i++) {
         const MODBUS_DEVICE *device = &client->devices[i];
-        if (device != client->device && device->asked && !ModbusDeviceIsLost(device))
+        if (device != client->device && device->asked && ModbusDeviceIsOne(client, device) &&
+            !ModbusDeviceIsLost(device))
             return true;
     }
     return false;
@@ -471,7 +477,8 @@ static bool is_too_late(const MODBUS_CLIENT *client, RTS_I64 now_ns)
 
 static void end_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
-    if (client->waits && client->device->unit == MODBUS_BROADCAST && client->link.type->broadcasts) {
+    if (client->waits && !ModbusDeviceIsOne(client, client->device)) {
+        note_reply(client, now_ns); /* all that can be known: it was sent */
         end(client, true, now_ns);
         return;
     }

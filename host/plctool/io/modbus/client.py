@@ -43,6 +43,9 @@ _MAX_TIMEOUT_US = 60_000_000
 _MAX_INTERVAL_US = 3_600_000_000
 _READ_WRITE = int(lib.MODBUS_READ_WRITE_REGISTERS)
 _TURNAROUND_US = 5000  # what a device takes to reply, for the load of a line
+_TIMEOUT_US = 1_000_000
+_AROUND = 3  # bytes around a PDU: unit and CRC
+_BROADCAST_US = 100_000  # for all devices of a line to do what is asked of them (Modbus over Serial Line 2.4.1)
 _REVERSE_FLAGS = {
     1: 0,
     2: int(lib.MODBUS_JOB_REVERSE_2),
@@ -153,14 +156,18 @@ class ModbusLine(Connector):
         """How long PDUs of these sizes take with all that is around them; 0 on a network."""
         if self.char_us is None:
             return 0.0
-        around = 3  # unit and CRC
-        return (request + reply + 2 * around) * self.char_us + 2 * self.silence_us + _TURNAROUND_US
+        return (request + reply + 2 * _AROUND) * self.char_us + 2 * self.silence_us + _TURNAROUND_US
+
+    def broadcast_us(self, request: int, pause_us: int) -> float:
+        """How long a PDU to all devices takes."""
+        return (request + _AROUND) * (self.char_us or 0.0) + self.silence_us + pause_us
 
 
 @dataclass(eq=False)
 class ModbusDevice(Connector):
-    """A device of a client."""
+    """A device of a client. `pause_us`: of all devices at once, how long the line is left to them after a request."""
 
+    pause_us: int | None = None
     order: Order = ORDERS["ABCD"]
     jobs: list[Job] = field(default_factory=list)
 
@@ -263,9 +270,12 @@ class ModbusDevice(Connector):
         assert isinstance(line, ModbusLine)
         function = job.function
         written = _data_size(function, job.write.count) if function.most_written > 1 else 0
-        job.took_us = line.transaction_us(
-            function.request + written, function.reply + _data_size(function, job.read.count)
-        )
+        if self.pause_us is not None:
+            job.took_us = line.broadcast_us(function.request + written, self.pause_us)
+        else:
+            job.took_us = line.transaction_us(
+                function.request + written, function.reply + _data_size(function, job.read.count)
+            )
         if job.verify:
             job.took_us += line.transaction_us(5, 2 + _data_size(function, job.write.count))
         if line.char_us is None or job.interval_us == 0:
@@ -325,15 +335,18 @@ def _read_device(table: Table, line: ModbusLine) -> Connector:
     device = read_connector(ModbusDevice, table, DRIVER, parent=line)
     line.devices.append(device)
     unit = table.number("unit", 0, MAX_UNIT if serial else 255, None if serial else 255, required=serial)
-    timeout_us = table.duration_us("timeout", 1000, _MAX_TIMEOUT_US, 1_000_000)
+    to_all = serial and unit == 0
+    default_us = _BROADCAST_US if to_all else _TIMEOUT_US
+    timeout_us = table.duration_us("timeout", 1000, _MAX_TIMEOUT_US, default_us) or default_us
+    device.pause_us = timeout_us if to_all else None
     device.order = table.choice("order", ORDERS, ORDERS["ABCD"]) or ORDERS["ABCD"]
     device.parameters += [
         number_parameter(int(lib.MODBUS_PARAM_UNIT), unit or 0, "unit"),
-        number_parameter(int(lib.MODBUS_PARAM_TIMEOUT), (timeout_us or 1_000_000) // 1000, "timeout"),
+        number_parameter(int(lib.MODBUS_PARAM_TIMEOUT), timeout_us // 1000, "timeout"),
     ]
     for kind in ("read", "write", "read_write"):
         device.jobs += each(table.tables(kind), lambda t, kind=kind: _read_job(t, kind))  # type: ignore[misc]
-    if unit == 0 and serial and any(j.function.most_read for j in device.jobs):
+    if to_all and any(j.function.most_read or j.verify for j in device.jobs):
         table.error("unit 0 is all devices of the line, which do not reply: they can be written only", "unit")
     device.channels = [channel for job in device.jobs for channel in job.channels]
     return device
