@@ -15,6 +15,8 @@ from plctool.image.targets import Target
 # Functions of stdlib/strings.st that have a faster body here, with the same meaning.
 LIBRARY_FUNCTIONS = {"SPAN__": "str.span", "COPY__": "str.copy", "WSPAN__": "str.wspan", "WCOPY__": "str.wcopy"}
 
+VECTOR_SIZE = 16  # bytes
+
 _ZERO = number(0)
 
 
@@ -48,7 +50,7 @@ class _Strings:
         if self.wide:
             return 0
         if self.target.vectors:
-            return 16
+            return VECTOR_SIZE
         return self.target.pointer_size if self.target.unaligned else 0
 
     @property
@@ -115,6 +117,19 @@ class _Strings:
         bit = fn.value(f"call {self._integer} @llvm.cttz.{self._integer}({self._integer} {marks}, i1 true)")
         byte = fn.value(f"lshr {self._integer} {bit}, 3")
         return byte if self.chunk == 4 else fn.value(f"trunc {self._integer} {byte} to i32")
+
+    def cut(self, fn: Function, chunk: Value, length: Value) -> Value:
+        """A vector with zeros from a character on."""
+        lanes = ", ".join(f"i8 {lane}" for lane in range(self.chunk))
+        byte = fn.value(f"trunc i32 {length} to i8")
+        first = fn.value(f"insertelement {self._chunk_type} poison, i8 {byte}, i32 0")
+        ends = fn.value(
+            f"shufflevector {self._chunk_type} {first}, {self._chunk_type} poison, <{self.chunk} x i32> zeroinitializer"
+        )
+        kept = fn.value(f"icmp ult {self._chunk_type} <{lanes}>, {ends}")
+        return fn.value(
+            f"select <{self.chunk} x i1> {kept}, {self._chunk_type} {chunk}, {self._chunk_type} zeroinitializer"
+        )
 
     def unlike(self, fn: Function, one: Value, other: Value) -> Value:
         """Whether two chunks differ."""
@@ -222,7 +237,9 @@ def _copy(fn: Function, strings: _Strings) -> None:
         return chunk
 
     start, whole = None, list[tuple[Value, str]]()
-    if strings.chunk:
+    if strings.chunk and strings.target.vectors:
+        start = _copy_vectors(fn, strings, room, count, source, target)
+    elif strings.chunk:
         start, length = _walk_chunks(fn, strings, room, count, visit)
         whole = [(length, "full")]
         fn.branch("done")
@@ -235,6 +252,47 @@ def _copy(fn: Function, strings: _Strings) -> None:
     copied = fn.phi("i32", *whole, (i, "loop"), (i, "test"))
     strings.store(fn, _ZERO, strings.at(fn, target, strings.index(fn, copied)))
     fn.terminate(f"ret i32 {fn.value(f'add i32 %pos, {copied}')}")
+
+
+def _copy_vectors(fn: Function, strings: _Strings, room: Value, count: Value, source: Value, target: Value) -> Value:
+    """From the entry on, over the vectors within `room` characters. The last one is stored with zeros from the end on:
+    a NUL that is stored by itself would make the next load of the vector wait for both to be in the cache.
+
+    Returns from the function when the end is in a vector; leads to the block `loop` from `short`, with the result as
+    the index to go on at.
+    """
+    inner = fn.value(f"call i32 @llvm.usub.sat.i32(i32 {room}, i32 {strings.chunk - 1})")
+    bound = _least(fn, inner, count)
+    fn.branch_if(fn.value(f"icmp eq i32 {bound}, 0"), "loop", "chunk")
+    fn.begin_detached("chunk")
+    at = fn.phi("i32", (_ZERO, "entry"))
+    index = strings.index(fn, at)
+    chunk = strings.load_chunk(fn, strings.at(fn, source, index))
+    place = strings.at(fn, target, index)
+    # The end is at the first NUL, or where `count` is.
+    marks = fn.value(f"zext i{strings.chunk} {strings.marks(fn, chunk)} to i32")
+    limit = fn.value(f"shl i32 1, {_least(fn, fn.value(f'sub i32 {count}, {at}'), '31')}")
+    ends = fn.value(f"or i32 {marks}, {limit}")
+    here = fn.value(f"and i32 {ends}, {(2 << strings.chunk) - 1}")
+    fn.branch_if(fn.value(f"icmp ne i32 {here}, 0"), "found", "clear")
+    fn.begin_detached("clear")
+    strings.store_chunk(fn, chunk, place)
+    after = fn.value(f"add i32 {at}, {strings.chunk}")
+    fn.add_incoming(at, after, "clear")
+    fn.branch_if(fn.value(f"icmp ult i32 {after}, {bound}"), "chunk", "short")
+    fn.begin_detached("short")
+    fn.branch("loop")
+    fn.begin_detached("found")
+    length = fn.value(f"call i32 @llvm.cttz.i32(i32 {here}, i1 true)")
+    strings.store_chunk(fn, strings.cut(fn, chunk, length), place)
+    end = fn.value(f"add i32 {at}, {length}")
+    fn.branch_if(fn.value(f"icmp eq i32 {length}, {strings.chunk}"), "after", "ended")
+    fn.begin_detached("after")
+    strings.store(fn, _ZERO, strings.at(fn, target, strings.index(fn, end)))
+    fn.branch("ended")
+    fn.begin_detached("ended")
+    fn.terminate(f"ret i32 {fn.value(f'add i32 %pos, {end}')}")
+    return after
 
 
 # ---- comparing ----
