@@ -1,5 +1,5 @@
 # make demo   the whole story on this machine        make test   the tests
-# make lint   style, types, words                   make bench  figures, side by side
+# make lint   style, types, words                   make bench  figures, side by side (ARGS="--programs DIR": more pairs)
 # make format gives C and Python their one style
 # make wheel  dist/*.whl for this kind of Linux and every Python from 3.11 on, tried in those that are here
 # make size   flash and RAM of the bare-metal runtime, per component
@@ -65,7 +65,7 @@ BENCHED := $(filter build build-cm3 build-cm4f,$(BUILDS))
 
 bench: $(BENCHED:%=%/build.ninja)
 	set -e; for build in $(BENCHED); do $(MESON) compile -C $$build; done
-	PYTHONPATH=host:build/host PLCRT=build/firmware/port/linux/plcrt $(BIN)/python bench/run.py
+	PYTHONPATH=host:build/host PLCRT=build/firmware/port/linux/plcrt $(BIN)/python bench/run.py $(ARGS)
 
 size: build-cm3/build.ninja $(RISC_V:%=%/build.ninja)
 	set -e; for build in build-cm3 $(RISC_V); do echo "$$build:"; $(MESON) compile -C $$build size; done

@@ -7,14 +7,17 @@ A program is a pair X.st and X.c. The twin has `void scan_init(void)`, `void sca
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
+import statistics
 import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -42,9 +45,10 @@ CALLS = 30_000  # of a program or twin, for its time on this machine
 HOST = "x86_64-linux"
 GUESTS = ("cortex-m3", "cortex-m4f")
 CHECKS = ("all", "none")
+TWIN_LEVELS = ("-O2", "-O3")
 VARIANTS = (("all", "-O2"), ("none", "-O2"), ("all", "-O3"), ("all", "-Os"))  # on Cortex-M
 C_FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-strict-aliasing")
-SHARED = ROOT.parent / "shared/bench"  # more programs, when this folder is beside the checkout
+ROUNDS = 7  # in each, every variant of a program is timed once
 
 
 @dataclass
@@ -74,35 +78,91 @@ def checksum(built: BuildResult) -> Symbol:
 # ---- this machine --------------------------------------------------------------------------------------------------
 
 
-def host_program(built: BuildResult) -> tuple[int, float]:
-    """Checksum and ns per cycle."""
+Timed = tuple[int, float]  # a checksum, and ns per cycle
+
+
+def time_program(built: BuildResult) -> Timed:
     with Simulator(built.image, built.symbols) as plc:
         plc.run_cycles(CYCLES)
         value = plc.read(checksum(built).name)
-        return value, min(plc.bench(0, CALLS)[0] for _ in range(3))
+        return value, plc.bench(0, CALLS)[0]
 
 
-def host_twin(twin: Path, optimisation: str, folder: Path) -> tuple[int, float]:
-    """Checksum and ns per cycle."""
-    program = folder / "twin"
+def time_twin(program: Path) -> Timed:
+    done = subprocess.run([program, str(CALLS)], check=True, capture_output=True, text=True)
+    value, ns = done.stdout.split()
+    return int(value), float(ns)
+
+
+def compiled_twin(twin: Path, optimisation: str, folder: Path) -> Path:
+    program = folder / f"twin{optimisation}"
     sources = [ROOT / "bench/twin_main.c", twin]
     subprocess.run(["cc", *C_FLAGS, optimisation, f"-DCYCLES={CYCLES}", "-o", program, *sources, "-lm"], check=True)
-    outs = [subprocess.run([program, str(CALLS)], check=True, capture_output=True, text=True) for _ in range(3)]
-    results = [out.stdout.split() for out in outs]
-    return int(results[0][0]), min(float(ns) for _, ns in results)
+    return program
+
+
+@dataclass
+class Series:
+    """What rounds of one variant took. Other work on the machine only makes a round longer, so the shortest counts."""
+
+    value: int
+    ns: list[float]
+
+    @property
+    def best(self) -> float:
+        return min(self.ns)
+
+    @property
+    def spread(self) -> float:
+        """How far the median is above the best, as a share of it."""
+        return statistics.median(self.ns) / self.best - 1
+
+
+def interleaved(variants: list[Callable[[], Timed]]) -> list[Series]:
+    """Each variant once in each round, so that what disturbs one of them disturbs all."""
+    rounds = [[variant() for variant in variants] for _ in range(ROUNDS)]
+    return [Series(runs[0][0], [ns for _, ns in runs]) for runs in zip(*rounds, strict=True)]
+
+
+@contextmanager
+def one_processor() -> Iterator[None]:
+    """Keeps this process, and those it starts, on one processor."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(allowed)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, allowed)
 
 
 def bench_host(programs: list[Program], folder: Path) -> None:
-    print("\nBenchmark programs on this machine: ns per cycle, and the ratio to their C twins")
-    print(f"  {'':<12}{'checks':<8}{'plctool':>10}{'gcc -O2':>10}{'gcc -O3':>10}{'to -O2':>8}{'to -O3':>8}")
+    print(f"\nBenchmark programs on this machine: ns per cycle, best of {ROUNDS} rounds in turn on one processor,")
+    print("the ratio to their C twins, and how far the median of the worst variant is above its best")
+    print(
+        f"  {'':<12}{'checks':<8}{'plctool':>10}{'gcc -O2':>10}{'gcc -O3':>10}{'to -O2':>8}{'to -O3':>8}{'spread':>8}"
+    )
+    ratios: dict[str, list[list[float]]] = {checks: [] for checks in CHECKS}
     for program in programs:
-        twins = [host_twin(program.twin, level, folder) for level in ("-O2", "-O3")]
-        for checks in CHECKS:
-            value, ns = host_program(program.build(HOST, checks))
-            same = "" if all(value == twin[0] for twin in twins) else "  OTHER CHECKSUM"
-            times = "".join(f"{twin[1]:>10.0f}" for twin in twins)
-            ratios = "".join(f"{ns / twin[1]:>8.2f}" for twin in twins)
-            print(f"  {program.st.stem:<12}{checks:<8}{ns:>10.0f}{times}{ratios}{same}", flush=True)
+        builds = [partial(time_program, program.build(HOST, checks)) for checks in CHECKS]
+        twins = [partial(time_twin, compiled_twin(program.twin, level, folder)) for level in TWIN_LEVELS]
+        with one_processor():
+            series = interleaved([*builds, *twins])
+        own, others = series[: len(CHECKS)], series[len(CHECKS) :]
+        for checks, mine in zip(CHECKS, own, strict=True):
+            ratios[checks].append([mine.best / other.best for other in others])
+            same = "" if all(mine.value == other.value for other in others) else "  OTHER CHECKSUM"
+            times = "".join(f"{other.best:>10.0f}" for other in others)
+            shares = "".join(f"{ratio:>8.2f}" for ratio in ratios[checks][-1])
+            spread = max(each.spread for each in (mine, *others))
+            print(
+                f"  {program.st.stem:<12}{checks:<8}{mine.best:>10.0f}{times}{shares}{spread:>8.0%}{same}", flush=True
+            )
+    for checks in CHECKS:
+        means = "".join(f"{statistics.geometric_mean(column):>8.2f}" for column in zip(*ratios[checks], strict=True))
+        print(f"  {'geometric mean':<20}{checks:<8}{'':>22}{means}")
 
 
 # ---- Cortex-M ------------------------------------------------------------------------------------------------------
@@ -157,6 +217,7 @@ def bench_guest(target: str, programs: list[Program], folder: Path) -> None:
         f"{'bytes':>10}{'gcc -Os':>10}{'gcc -O2':>10}{'to -Os':>8}{'to -O2':>8}"
     )
     guest = runner.compile(folder, ROOT / "bench/guest/iec.c", f"-DCYCLES={GUEST_CYCLES}", f"-I{ROOT / 'bench/guest'}")
+    ratios: dict[tuple[str, str], list[float]] = {variant: [] for variant in VARIANTS}
     for program in programs:
         twin_value, twin = guest_twin(runner, program.twin, "-O2", folder)
         sizes = [twin_flash(runner, program.twin, level, folder) for level in ("-Os", "-O2")]
@@ -165,9 +226,12 @@ def bench_guest(target: str, programs: list[Program], folder: Path) -> None:
             value, instructions = guest_program(runner, guest, built, folder)
             same = "" if value == twin_value else "  OTHER CHECKSUM"
             code = len(parse_image(built.image).code)
+            ratios[checks, level].append(instructions / twin)
             figures = f"{instructions:>10}{twin:>10}{instructions / twin:>8.2f}{code:>10}"
             figures += "".join(f"{size:>10}" for size in sizes) + "".join(f"{code / size:>8.2f}" for size in sizes)
             print(f"  {program.st.stem:<12}{checks:<8}{level:<8}{figures}{same}", flush=True)
+    for (checks, level), of_one in ratios.items():
+        print(f"  {'mean':<12}{checks:<8}{level:<8}{'':>20}{statistics.geometric_mean(of_one):>8.2f}  geometric")
 
 
 # ---- all of it -----------------------------------------------------------------------------------------------------
@@ -181,18 +245,21 @@ def pairs(folder: Path) -> Iterator[Program]:
             yield Program(st, twins[st.stem])
 
 
-def find_programs(more: Path, folder: Path) -> list[Program]:
-    """Ours, some of which are generated into `folder`, and those of `more` if it is there."""
+def find_programs(more: Path | None, folder: Path) -> list[Program]:
+    """Ours, some of which are generated into `folder`, and those of `more`. Raises SystemExit if that has none."""
     for generator in (logic, instances):
         for suffix, text in zip((".st", ".c"), generator.texts(), strict=True):
             (folder / f"{generator.__name__}{suffix}").write_text(text)
-    return [*pairs(ROOT / "bench/programs"), *pairs(folder), *(pairs(more) if more.is_dir() else [])]
+    others = list(pairs(more)) if more else []
+    if more and not others:
+        raise SystemExit(f"There is no pair X.st and X.c in {more}.")
+    return [*pairs(ROOT / "bench/programs"), *pairs(folder), *others]
 
 
 def main() -> None:
     """`--programs DIR` on the command line names a folder with more pairs."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--programs", type=Path, default=SHARED, help="folder with more pairs X.st and X.c")
+    parser.add_argument("--programs", type=Path, help="folder with more pairs X.st and X.c")
     more = parser.parse_args().programs
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
