@@ -211,9 +211,10 @@ def bench_day() -> None:
 
 def main() -> None:
     compiling.main()
-    bench_empty_task()
-    bench_image()
-    bench_tanks()
+    with targets.one_processor():
+        bench_empty_task()
+        bench_image()
+        bench_tanks()
     targets.main()
     overheads.main()
     bench_day()
