@@ -19,6 +19,8 @@ enum {
     IO_SIM_LATE = 0x7FFF0002,    /* its data is as old as this [ms] */
     IO_SIM_TYPE = 0x7FFF0003,    /* 1: another type of device than the configuration says */
     IO_SIM_ANSWERS = 0x7FFF0004, /* so many next answers are bad */
+    IO_SIM_CUT = 0x7FFF0005,     /* so many next answers end in the middle */
+    IO_SIM_FAULTS = 5,           /* as many as there are */
 };
 
 #ifndef RTS_CFFI

@@ -251,8 +251,8 @@ class Simulator(Controller):
         return self.io.value(name)
 
     def fault(self, device: str, fault: str, value: int = 1) -> None:
-        """Makes a device fail: "absent", "late" (ms), "type", "answers" (how many are bad); 0 ends it. A line of Modbus
-        can only be "absent", which is that it is pulled."""
+        """Makes a device fail: "absent", "late" (ms), "type", "answers" (how many are bad), "cut" (of how many only
+        half arrives); 0 ends it. A line of Modbus can only be "absent", which is that it is pulled."""
         set_fault(self._core, device, fault, value)
 
     def io_read_parameter(self, device: str, number: int, t: Type) -> Any:

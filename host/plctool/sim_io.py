@@ -18,16 +18,7 @@ from plctool.iec.addresses import parse_address
 from plctool.iec.areas import Area
 from plctool.iec.types import BOOL, Type, base_of
 from plctool.iec.values import decode, encode
-
-FAULTS = {
-    "absent": int(lib.IO_SIM_ABSENT),
-    "late": int(lib.IO_SIM_LATE),
-    "type": int(lib.IO_SIM_TYPE),
-    "answers": int(lib.IO_SIM_ANSWERS),
-}
-"""Faults of a device. absent: 1, it is not there; late: its data is as old as this [ms], on Modbus it replies so much
-later; type: 1, it is another device than the description says; answers: so many next answers are bad, on Modbus with a
-wrong CRC, on TCP without their end."""
+from plctool.io.faults import FAULTS, check_name
 
 
 @dataclass(frozen=True)
@@ -125,9 +116,8 @@ class SimIo:
 
 
 def set_fault(core: Core, device: str, fault: str, value: int) -> None:
-    """Makes a simulated device fail (FAULTS), or with 0 work again."""
-    if fault not in FAULTS:
-        raise UsageError(f"There is no fault '{fault}'; choose one of {', '.join(FAULTS)}.", "bad-fault")
+    """Makes a simulated device fail (io/faults.py), or with 0 work again."""
+    check_name(fault)
     if core.lib.SimIoFault(device.encode("ascii", "replace"), FAULTS[fault], value) != lib.ERR_OK:
         hint = "'plctool io map' lists the devices, and a line can only be absent"
         raise UsageError(f"There is no simulated device {device} that can be '{fault}'; {hint}.", "no-device")

@@ -137,7 +137,8 @@ static void a_bad_answer_is_counted_and_three_in_a_row_lose_the_device(void)
     IO_DEVICE_STATE now;
 
     begin_meter();
-    CHECK_EQUAL(SimIoFault("Meter", IO_SIM_ANSWERS, 2), ERR_OK);
+    CHECK_EQUAL(SimIoFault("Meter", IO_SIM_ANSWERS, 1), ERR_OK);
+    CHECK_EQUAL(SimIoFault("Meter", IO_SIM_CUT, 1), ERR_OK);
     CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
     CHECK_EQUAL(state().errors, 2);
     CHECK_EQUAL(state().ok, 1);

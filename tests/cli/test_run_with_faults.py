@@ -48,6 +48,8 @@ def app(tool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # type:
         (["Tank=late:60"], range(990, 1001)),
         (["Tank=answers:1@T#5s"], range(15)),
         (["Tank=answers:3@T#5s"], range(100, 260)),
+        (["Tank=cut:1@T#5s"], range(15)),
+        (["Tank=cut:3@T#5s"], range(100, 260)),
     ],
 )
 def test_a_fault_begins_when_it_is_said(tool, app: None, faults: list[str], lost: range) -> None:  # type: ignore[no-untyped-def]
@@ -67,6 +69,9 @@ def test_a_fault_begins_when_it_is_said(tool, app: None, faults: list[str], lost
         ("Tnak=absent@T#1s", "no simulated device Tnak that can be 'absent'"),
         ("Bus=late:5", "a line can only be absent"),
         ("Tank=absent@soon", "soon"),
+        ("Tank=absent@-T#1s", "T#"),
+        ("Tank=absent@T#-1s", "so it is not negative"),
+        ("Tank=late:4294967296", "at most 4294967295"),
     ],
 )
 def test_what_cannot_happen_is_an_error_before_the_run(tool, app: None, fault: str, reason: str) -> None:  # type: ignore[no-untyped-def]

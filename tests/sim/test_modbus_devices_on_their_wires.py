@@ -177,6 +177,32 @@ def test_a_damaged_reply_is_not_taken_and_asked_for_again(plc: Simulator, device
     assert plc.io_read_parameter(line, 0x8007, UDINT) == bad_frames + damaged, "a wrong CRC; on TCP the end is missing"
 
 
+@pytest.mark.parametrize(("device", "line"), [("Tank", "Bus"), ("Remote", "Net")])
+def test_half_a_reply_is_not_taken_and_asked_for_again(plc: Simulator, device: str, line: str) -> None:
+    variable = {"Tank": "Main.level", "Remote": "Main.far"}[device]
+    errors, bad_frames = plc.read(f"{device}.errors"), plc.io_read_parameter(line, 0x8007, UDINT)
+    plc.fault(device, "cut", 2)
+    plc.set_input(variable, 3)
+    assert steps_until(plc, variable, 3) > 200, "both time-outs of 200 ms, or the next two requests"
+    assert plc.read(f"{device}.ok") is True
+    assert plc.read(f"{device}.errors") == errors + 2
+    on_a_serial_line = 2 if line == "Bus" else 0
+    assert plc.io_read_parameter(line, 0x8007, UDINT) == bad_frames + on_a_serial_line
+    assert plc.io_read_parameter(device, 0x8001, UDINT) == 2, "time-outs"
+
+
+def test_half_replies_are_a_lost_device_and_leave_the_line_to_others(plc: Simulator) -> None:
+    plc.fault("Tank", "cut", 4_000_000_000)
+    plc.run_for(2000)
+    assert good(plc) == ("Drive", "Remote")
+    before = requests(plc, "Drive")
+    plc.run_for(seconds=10)
+    assert requests(plc, "Drive") - before == pytest.approx(120, abs=4)
+    plc.fault("Tank", "cut", 0)
+    plc.run_for(seconds=62)
+    assert good(plc) == DEVICES
+
+
 def test_a_late_reply_makes_the_data_old_and_a_very_late_one_is_none(plc: Simulator) -> None:
     plc.fault("Tank", "late", 150)
     plc.run_for(2000)
@@ -197,7 +223,7 @@ def test_what_is_no_fault_of_a_line_is_said(plc: Simulator) -> None:
     with pytest.raises(UsageError, match="a line can only be absent"):
         plc.fault("Bus", "late", 5)
     with pytest.raises(UsageError, match="absent, late"):
-        plc.fault("Bus", "cut")
+        plc.fault("Bus", "broken")
 
 
 def test_a_program_and_the_description_mean_the_same_register(plc: Simulator) -> None:

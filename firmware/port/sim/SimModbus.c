@@ -21,7 +21,7 @@
 #include "SysTime.h"
 #include "sim_port.h"
 
-enum { VALUES = 0x20000, FAULTS = 4 }; /* twice as many as the areas of a program have bits */
+enum { VALUES = 0x20000 }; /* twice as many as the areas of a program have bits */
 RTS_STATIC_ASSERT(2 * 8 * (APP_INPUT_SIZE + APP_OUTPUT_SIZE) <= VALUES, a_description_does_not_fill_the_table);
 
 #define REPLY_NS ((RTS_I64)2000000) /* before a device replies, besides silence */
@@ -37,8 +37,8 @@ typedef struct {
 RTS_STATIC_ASSERT(MODBUS_MAX_DEVICES < UINT8_MAX, numbers_of_devices_fit);
 
 static SIM_VALUE values[VALUES];
-static bool has_values;                            /* any entry is used */
-static RTS_UI32 faults[IO_MAX_CONNECTORS][FAULTS]; /* by id - IO_SIM_ABSENT */
+static bool has_values;                                   /* any entry is used */
+static RTS_UI32 faults[IO_MAX_CONNECTORS][IO_SIM_FAULTS]; /* by id - IO_SIM_ABSENT */
 
 static MODBUS_SETUP *setup(void)
 {
@@ -216,13 +216,26 @@ static bool is_there(const MODBUS_DEVICE *device)
     return *fault_of(connector_of(device), IO_SIM_ABSENT) == 0;
 }
 
-/* Another device than the description says has none of its registers; it replies all the same. */
-static RTS_UI32 reply_of(const MODBUS_DEVICE *device, RTS_UI8 *pdu, RTS_UI32 size, bool *damaged)
+/* How its next reply arrives, which is one of those that the faults count. */
+static SIM_ARRIVAL next_arrival(const MODBUS_DEVICE *device)
 {
-    RTS_UI32 *bad = fault_of(connector_of(device), IO_SIM_ANSWERS);
+    RTS_UI32 *damaged = fault_of(connector_of(device), IO_SIM_ANSWERS);
+    RTS_UI32 *cut = fault_of(connector_of(device), IO_SIM_CUT);
 
-    *damaged = *bad != 0;
-    *bad -= *damaged;
+    if (*damaged != 0) {
+        --*damaged;
+        return SIM_DAMAGED;
+    }
+    if (*cut == 0)
+        return SIM_WHOLE;
+    --*cut;
+    return SIM_CUT;
+}
+
+/* Another device than the description says has none of its registers; it replies all the same. */
+static RTS_UI32 reply_of(const MODBUS_DEVICE *device, RTS_UI8 *pdu, RTS_UI32 size, SIM_ARRIVAL *arrival)
+{
+    *arrival = next_arrival(device);
     return *fault_of(connector_of(device), IO_SIM_TYPE) != 0 ? refuse(pdu, MODBUS_ILLEGAL_ADDRESS)
                                                              : serve(number_of(device), pdu, size);
 }
@@ -260,7 +273,7 @@ RTS_I64 SimModbusGetDelayNs(RTS_HANDLE handle, RTS_UI8 unit)
     return REPLY_NS + *fault_of(connector_of(device), IO_SIM_LATE) * NS_PER_MS;
 }
 
-RTS_UI32 SimModbusReply(RTS_HANDLE handle, RTS_UI8 unit, RTS_UI8 *pdu, RTS_UI32 size, bool *damaged)
+RTS_UI32 SimModbusReply(RTS_HANDLE handle, RTS_UI8 unit, RTS_UI8 *pdu, RTS_UI32 size, SIM_ARRIVAL *arrival)
 {
     const MODBUS_CLIENT_LINE *line = line_of(handle);
     const MODBUS_DEVICE *device;
@@ -272,7 +285,7 @@ RTS_UI32 SimModbusReply(RTS_HANDLE handle, RTS_UI8 unit, RTS_UI8 *pdu, RTS_UI32 
         return 0;
     }
     device = device_at(line, unit);
-    return device != NULL && is_there(device) ? reply_of(device, pdu, size, damaged) : 0;
+    return device != NULL && is_there(device) ? reply_of(device, pdu, size, arrival) : 0;
 }
 
 /* ---- channels ---- */
@@ -404,7 +417,7 @@ static RTS_RESULT set_fault(const IoConfigConnector *connector, RTS_UI32 fault, 
         return ERR_NO_OBJECT;
     if (place.device == NULL && !is_line(connector))
         return ERR_NOT_SUPPORTED;
-    if (fault - IO_SIM_ABSENT >= FAULTS || (place.device == NULL && fault != IO_SIM_ABSENT))
+    if (fault - IO_SIM_ABSENT >= IO_SIM_FAULTS || (place.device == NULL && fault != IO_SIM_ABSENT))
         return ERR_NO_OBJECT;
     *fault_of(connector, fault) = value;
     return ERR_OK;

@@ -110,22 +110,21 @@ static RTS_UI32 put(WIRE *wire, const RTS_UI8 *data, RTS_UI32 size)
     return size;
 }
 
-static void end_serial(WIRE *wire, RTS_UI32 size, bool damaged)
+static void end_serial(WIRE *wire, RTS_UI32 size, SIM_ARRIVAL arrival)
 {
     RTS_UI8 *unit = wire->frame + MODBUS_AT_UNIT;
     RTS_UI16 crc = ModbusCrc(unit, 1 + size);
 
-    unit[1 + size] = (RTS_UI8)(damaged ? crc ^ 0x10 : crc);
+    unit[1 + size] = (RTS_UI8)(arrival == SIM_DAMAGED ? crc ^ 0x10 : crc);
     unit[2 + size] = (RTS_UI8)(crc >> 8);
-    wire->fill = 1 + size + MODBUS_CRC_SIZE;
+    wire->fill = (1 + size + MODBUS_CRC_SIZE) / (arrival == SIM_CUT ? 2 : 1);
     wire->quiet_ns = wire->due_ns + wire->fill * wire->char_ns + silence_of(wire);
 }
 
-/* What is damaged on a connection is the end of what its sender had to say. */
-static void end_tcp(WIRE *wire, RTS_UI32 size, bool damaged)
+static void end_tcp(WIRE *wire, RTS_UI32 size, SIM_ARRIVAL arrival)
 {
     ModbusPut16(wire->frame + MODBUS_AT_LENGTH, 1 + size);
-    wire->fill = MODBUS_AT_PDU + (damaged ? size / 2 : size);
+    wire->fill = MODBUS_AT_PDU + (arrival == SIM_WHOLE ? size : size / 2);
     wire->quiet_ns = wire->due_ns;
 }
 
@@ -133,17 +132,17 @@ static void end_tcp(WIRE *wire, RTS_UI32 size, bool damaged)
 static void begin_reply(WIRE *wire)
 {
     RTS_UI32 size = wire->fill + start_of(wire) - MODBUS_AT_PDU - (wire->char_ns != 0 ? MODBUS_CRC_SIZE : 0);
-    bool damaged = false;
+    SIM_ARRIVAL arrival = SIM_WHOLE;
 
-    size = SimModbusReply(handle_of(wire), wire->frame[MODBUS_AT_UNIT], wire->frame + MODBUS_AT_PDU, size, &damaged);
+    size = SimModbusReply(handle_of(wire), wire->frame[MODBUS_AT_UNIT], wire->frame + MODBUS_AT_PDU, size, &arrival);
     forget(wire);
     if (size == 0 || !SimModbusIsPlugged(handle_of(wire)))
         return;
     wire->replies = true;
     if (wire->char_ns != 0)
-        end_serial(wire, size, damaged);
+        end_serial(wire, size, arrival);
     else
-        end_tcp(wire, size, damaged);
+        end_tcp(wire, size, arrival);
 }
 
 static RTS_UI32 arrived(const WIRE *wire, RTS_I64 now_ns)

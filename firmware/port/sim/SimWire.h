@@ -31,7 +31,14 @@ bool SimModbusIsPlugged(RTS_HANDLE handle);
 /* How long the device needs before it replies [ns]; negative: it does not. */
 RTS_I64 SimModbusGetDelayNs(RTS_HANDLE handle, RTS_UI8 unit);
 
-/* The reply in place of a request, at most MODBUS_MAX_PDU bytes; 0: none. *damaged: it is to arrive so. */
-RTS_UI32 SimModbusReply(RTS_HANDLE handle, RTS_UI8 unit, RTS_UI8 *pdu, RTS_UI32 size, bool *damaged);
+/* How a reply arrives. What is wrong with the last bytes of a connection is that they are missing. */
+typedef enum {
+    SIM_WHOLE,
+    SIM_DAMAGED, /* with a wrong CRC */
+    SIM_CUT,     /* its first half */
+} SIM_ARRIVAL;
+
+/* The reply in place of a request, at most MODBUS_MAX_PDU bytes; 0: none. */
+RTS_UI32 SimModbusReply(RTS_HANDLE handle, RTS_UI8 unit, RTS_UI8 *pdu, RTS_UI32 size, SIM_ARRIVAL *arrival);
 
 #endif

@@ -28,9 +28,9 @@ typedef struct {
 } BLOCK;
 
 typedef struct {
-    RTS_UI32 fault[4]; /* by id - IO_SIM_ABSENT */
-    RTS_UI32 bad;      /* answers in a row */
-    RTS_UI32 last_ms;  /* of the last exchange */
+    RTS_UI32 fault[IO_SIM_FAULTS]; /* by id - IO_SIM_ABSENT */
+    RTS_UI32 bad;                  /* answers in a row */
+    RTS_UI32 last_ms;              /* of the last exchange */
 } DEVICE;
 
 static struct {
@@ -90,18 +90,28 @@ static void lose(RTS_UI32 connector, RTS_UI32 error, RTS_UI32 reset)
     IoMgrConfigSetDiagnosis(place, error);
 }
 
+/* Whether this answer is bad; half of one is as bad as a damaged one. */
+static bool take_bad(RTS_UI32 connector)
+{
+    RTS_UI32 *damaged = fault_of(connector, IO_SIM_ANSWERS);
+    RTS_UI32 *left = *damaged != 0 ? damaged : fault_of(connector, IO_SIM_CUT);
+
+    if (*left == 0)
+        return false;
+    --*left;
+    return true;
+}
+
 /* One question and its answer. */
 static void exchange(RTS_UI32 connector)
 {
     DEVICE *device = &sim.devices[connector];
-    RTS_UI32 *answers = fault_of(connector, IO_SIM_ANSWERS);
 
     if (*fault_of(connector, IO_SIM_ABSENT) != 0) {
         lose(connector, CF_CONNECTOR_BUS_ERROR, CF_CONNECTOR_FOUND | CF_CONNECTOR_ACTIVE);
     } else if (*fault_of(connector, IO_SIM_TYPE) != 0) {
         lose(connector, CF_CONNECTOR_FOUND | CF_CONNECTOR_ERROR, CF_CONNECTOR_CONFIGURED | CF_CONNECTOR_ACTIVE);
-    } else if (*answers > 0) {
-        --*answers;
+    } else if (take_bad(connector)) {
         if (++device->bad < LOST_AFTER)
             IoMgrConfigNoteError(IoMgrConfigGetConnector(connector));
         else
@@ -286,7 +296,7 @@ static RTS_UI8 *find_memory(const IoConfigConnector *connector, RTS_UI32 id, RTS
 {
     RTS_UI32 index = IoMgrConfigGetIndex(connector);
     BLOCK *block = find_block(index, id);
-    bool is_fault = id - IO_SIM_ABSENT < RTS_COUNT(sim.devices[0].fault);
+    bool is_fault = id - IO_SIM_ABSENT < IO_SIM_FAULTS;
     RTS_UI32 size = sizeof(RTS_UI32);
 
     *result = ERR_NO_OBJECT;

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from plctool.cli import io_documents
 from plctool.cli.io_documents import Document
 from plctool.cli.overwriting import check_not_read, check_output
-from plctool.cli.plants import Fault, attached, files_of_plant, plan_faults
+from plctool.cli.plants import attached, files_of_plant, plan_faults
 from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from plctool.controller import Controller, ExceptionInfo, OtherTool, PlcStatus
     from plctool.debug.symbols import SymbolTable
     from plctool.device import Plc
+    from plctool.io.faults import Fault
     from plctool.link.transports import Link
     from plctool.port_check import Outcome
     from plctool.port_check import Report as PortReport

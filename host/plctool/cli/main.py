@@ -17,7 +17,6 @@ from plctool.cli import documents, io_documents, output
 from plctool.cli.arguments import pairs, parser
 from plctool.cli.io_documents import Document
 from plctool.cli.links import all_serial_ports, find_link, link_of
-from plctool.cli.plants import parse_fault
 from plctool.errors import InternalError, PlcError, UsageError
 from plctool.files import path_error
 from plctool.link.transports import Link
@@ -98,6 +97,8 @@ def _symbols(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
+    from plctool.io.faults import parse_fault
+
     trace = documents.TraceFile(args.trace, args.output) if args.trace else None
     faults = [parse_fault(text) for text in args.fault]
     document, texts = documents.run(

@@ -6,7 +6,6 @@ import runpy
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING
 from plctool.errors import PlcError, UsageError
 
 if TYPE_CHECKING:
+    from plctool.io.faults import Fault
     from plctool.sim import Simulator
     from plctool.sim_plant import PlantProgram
 
@@ -33,28 +33,6 @@ def attached(plc: Simulator, path: Path) -> Iterator[None]:
     with PlantProgram.from_file(path) if path.suffix == ".cdl" else _compiled_plant(path) as plant:
         plc.attach(plant, plant.every_ms)
         yield
-
-
-@dataclass(frozen=True)
-class Fault:
-    """What happens to a simulated device, or to a line; `at_ms`: when, in virtual time."""
-
-    device: str
-    fault: str
-    value: int
-    at_ms: int
-
-
-def parse_fault(text: str) -> Fault:
-    """DEVICE=FAULT[:VALUE][@TIME]. Raises UsageError."""
-    from plctool.iec.value_texts import parse_time
-
-    rest, at, time = text.partition("@")
-    device, equals, what = rest.partition("=")
-    fault, colon, value = what.partition(":")
-    if not (device and equals and fault) or (colon and not value.isdecimal()) or (at and not time):
-        raise UsageError(f"'{text}' is not DEVICE=FAULT; write for example Tank=absent or Tank=late:150@T#5s.", "usage")
-    return Fault(device, fault, int(value) if colon else 1, max(0, parse_time(time)) if at else 0)
 
 
 def plan_faults(plc: Simulator, faults: Sequence[Fault]) -> None:

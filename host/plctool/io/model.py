@@ -16,12 +16,13 @@ read, for example. Then `configuration.py` writes the tables of IoConfig.h.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from plctool.core import lib
 from plctool.files import Pos
 from plctool.iec.addresses import parse_address
 from plctool.iec.types import BOOL, ArrayType, Type, base_of
+from plctool.io.faults import FAULTS
 from plctool.io.mistakes import Mistakes
 
 if TYPE_CHECKING:
@@ -97,7 +98,10 @@ class Channel:
 class Connector:
     """A bus, device or module. `type`: CT_*. `name`: as in `plctool io map`, at most 31 ASCII characters, unique.
     `driver`: szDriverName of the driver that takes it. `task`: in whose cycle the bus cycle is started, None for the
-    fastest. `variable`: it has an IO_DEVICE of its name in the program."""
+    fastest. `variable`: it has an IO_DEVICE of its name in the program. `faults`: those that it may have when it is
+    simulated."""
+
+    faults: ClassVar[tuple[str, ...]] = tuple(FAULTS)
 
     name: str
     driver: str

@@ -139,6 +139,8 @@ class ModbusLine(Connector):
     """A line of a client. `char_us`: of a serial line, how long a character takes; `load`: share of the time that its
     cyclic requests take."""
 
+    faults = ("absent",)  # it is pulled
+
     char_us: float | None = None
     silence_us: float = 0.0
     devices: list[ModbusDevice] = field(default_factory=list)

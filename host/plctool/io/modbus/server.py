@@ -66,6 +66,8 @@ class Object:
 class ModbusServer(Connector):
     """This PLC as a server. `as_bits`: its registers are coils and discrete inputs, too."""
 
+    faults = ()  # no simulated client is there that it could lose
+
     order: Order = ORDERS["ABCD"]
     as_bits: bool = False
     objects: list[Object] = field(default_factory=list)
