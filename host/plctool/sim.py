@@ -336,6 +336,11 @@ class Simulator(Controller):
             result = self._lib.SimRunFor(max(0, ns))
         _check(result, "Time does not advance")
 
+    def run_devices(self, ns: int) -> None:
+        """In a function of the program: virtual time passes for the devices, and the program stands still in its cycle.
+        Its outputs leave, and its inputs come, as often as its first task runs otherwise."""
+        _check(self._lib.SimRunDevices(ns), "Time does not advance")
+
     def bench(self, task: int, cycles: int) -> tuple[float, float]:
         """Real time per call of a task's code alone, and of a complete cycle with what the runtime adds [ns]."""
         code, cycle = self._ffi.new("double *"), self._ffi.new("double *")
@@ -360,8 +365,11 @@ class Simulator(Controller):
             memory[part] = bytes(new & change.mask | old & ~change.mask for new, old in both)
             if is_input(symbol) and table.io:
                 first = symbol.offset * 8 + (symbol.bit or 0)
-                bits = 1 if symbol.bit is not None else symbol.size * 8
-                self.io.follow(first, first + bits, partial(self.memory, Area.INPUT))
+                self.follow_inputs(first, first + (1 if symbol.bit is not None else symbol.size * 8))
+
+    def follow_inputs(self, first_bit: int, end_bit: int) -> None:
+        """These bits of the inputs were written: the devices measure that from now on."""
+        self.io.follow(first_bit, end_bit, partial(self.memory, Area.INPUT))
 
     def memory(self, area: Area, offset: int, size: int) -> memoryview:
         """Bytes of an area, to read and to write, until this simulator is closed."""

@@ -33,6 +33,14 @@ class Output:
         _write(self._core, self._type, self._address, value)
 
 
+class EndProgram(Exception):
+    """A function ends the program that calls it, with an exception of the runtime (RTSEXCPT_*)."""
+
+    def __init__(self, exception: int) -> None:
+        super().__init__(exception)
+        self.exception = exception
+
+
 @dataclass(frozen=True)
 class _Function:
     """`parameters`: their types, and whether they are inputs. `result`: None without."""
@@ -61,12 +69,21 @@ class SimFunctions:
         self._raised: BaseException | None = None
         self._callback: Any = None  # C has its address
 
+    @classmethod
+    def without_parameters(cls, pythons: Sequence[Callable[[], None]]) -> SimFunctions:
+        """Functions that the program knows by their index, and that take and return nothing."""
+        functions = cls()
+        functions._functions = [_Function(python.__name__, python, (), None) for python in pythons]
+        return functions
+
     def connect(self, core: Core) -> None:
         """The program in this runtime calls them from now on."""
 
         def call(number: int, addresses: Any, count: int, result: Any) -> int:
             try:
                 self._call(core, self._functions[number], addresses, result)
+            except EndProgram as end:
+                return end.exception
             except BaseException as error:
                 self._raised = error
                 return _FAILED

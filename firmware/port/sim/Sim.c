@@ -13,6 +13,7 @@
 #include "CmpAppEmbedded.h"
 #include "CmpIecTask.h"
 #include "CmpScheduleTimer.h"
+#include "CyclePhases.h"
 #include "SimLink.h"
 #include "SysExcept.h"
 #include "SysLock.h"
@@ -505,6 +506,49 @@ RTS_RESULT SimRunCycles(RTS_UI32 cycles)
     if (!sim.on)
         return ERR_NOTINITIALIZED;
     return with_landing(run_cycles, &cycles);
+}
+
+/* ---- time within a cycle ---- */
+
+static void exchange(const IEC_CONTEXT *context)
+{
+    CyclePhasesRun(CYCLE_OUTPUTS, 0, context);
+    CyclePhasesRun(CYCLE_INPUTS, 0, context);
+    serve_bus();
+}
+
+static void run_devices_until(RTS_I64 end_ns, RTS_I64 interval_ns, const IEC_CONTEXT *context)
+{
+    RTS_I64 due_ns = sim.now_ns;
+
+    while (sim.now_ns < end_ns) {
+        if (sim.now_ns >= due_ns) {
+            exchange(context);
+            due_ns += interval_ns;
+        }
+        if (sim.next_comm_ns <= sim.now_ns)
+            run_comm_cycle();
+        sim.now_ns = sim.next_comm_ns < due_ns ? sim.next_comm_ns : due_ns;
+        if (sim.now_ns > end_ns)
+            sim.now_ns = end_ns;
+    }
+    exchange(context);
+}
+
+RTS_RESULT SimRunDevices(RTS_I64 ns)
+{
+    IEC_CONTEXT *context;
+    IEC_TASK_INFO info;
+    IEC_ENTRY entry;
+
+    if (ns < 0 || ns >= NEVER - sim.now_ns)
+        return ERR_PARAMETER;
+    if (!sim.on)
+        return ERR_NOTINITIALIZED;
+    if (IecTaskGetInfo(0, &info) != ERR_OK || info.interval_us == 0 || IecTaskGetEntry(0, &entry, &context) != ERR_OK)
+        return ERR_INVALID_STATE;
+    run_devices_until(sim.now_ns + ns, (RTS_I64)info.interval_us * NS_PER_US, context);
+    return ERR_OK;
 }
 
 static RTS_RESULT comm_cycle(void *unused)

@@ -52,6 +52,11 @@ RTS_RESULT SimRunFor(RTS_I64 ns);
  * of virtual time. */
 RTS_RESULT SimRunCycles(RTS_UI32 cycles);
 
+/* Lets `ns` of virtual time pass for devices alone: it is called by SIM_FUNCTION, whose cycle lasts until it returns.
+ * Outputs leave, and inputs come, at once, at the end, and as often as the first task runs otherwise. Errors as
+ * SimAdvance; ERR_INVALID_STATE when there is no task. */
+RTS_RESULT SimRunDevices(RTS_I64 ns);
+
 /* One round of background work (communication, exceptions); no time passes. */
 RTS_RESULT SimCommCycle(void);
 
@@ -87,7 +92,7 @@ enum { SIM_MAX_PASSED = 64 };
 /*
  * A function of the program that the host implements: its number, the addresses of its parameters (`count`, at most
  * SIM_MAX_PASSED), and where its result goes (NULL for none). Returns RTSEXCPT_NOEXCEPTION, or what the program ends
- * with. It is called in the thread that lets time pass; it must not let time pass itself, nor switch power.
+ * with. It is called in the thread that lets time pass; it must let time pass by SimRunDevices only, and not switch power.
  */
 typedef RTS_UI32 (*SIM_FUNCTION)(RTS_UI32 number, RTS_UI8 **parameters, RTS_UI32 count, RTS_UI8 *result);
 

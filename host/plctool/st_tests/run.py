@@ -17,7 +17,7 @@ from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
 from plctool.compiler.internal import bugs_reported
-from plctool.compiler.semantics.assertions import FAILED, NUMBER, Assertion, Operand
+from plctool.compiler.semantics.assertions import FAILED, LIVE, NUMBER, Assertion, Operand
 from plctool.compiler.semantics.statement_marks import StatementMarks
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
@@ -32,6 +32,7 @@ from plctool.iec.values import decode
 from plctool.image.targets import find_target, host_target
 from plctool.sim import Simulator
 from plctool.st_tests.coverage import Coverage, marked
+from plctool.st_tests.devices import Devices
 from plctool.st_tests.report import TEST_NAME, Failure, Outcome, Report
 
 LIMIT_MS = 10_000
@@ -129,8 +130,11 @@ class TestProgram:
     def run(self, numbers: Iterable[int]) -> Iterator[Outcome]:
         """Runs the tests with these indices in `cases`, each from a cold start."""
         built = self._built
-        with Simulator(built.image, built.symbols, start=False, cycle_limit_ms=LIMIT_MS) as plc:
-            bench = _Bench(plc, built, self._suite, self._program.area_sizes)
+        sizes = self._program.area_sizes
+        devices = Devices(sizes[Area.INPUT], LIMIT_MS)
+        called = devices.functions
+        with Simulator(built.image, built.symbols, start=False, cycle_limit_ms=LIMIT_MS, functions=called) as plc:
+            bench = _Bench(plc, devices, self._suite, sizes)
             for number in numbers:
                 outcome = bench.run(number)
                 if self.coverage is not None:
@@ -159,38 +163,39 @@ def _power() -> Iterator[None]:
 class _Bench:
     """Runs one test after the other."""
 
-    def __init__(self, plc: Simulator, built: BuildResult, suite: TestSuite, sizes: dict[Area, int]) -> None:
+    def __init__(self, plc: Simulator, devices: Devices, suite: TestSuite, sizes: dict[Area, int]) -> None:
         self._plc = plc
+        self._devices = devices
         self._sizes = sizes
-        self._built = built
         self._suite = suite
 
     def run(self, number: int) -> Outcome:
         plc, case = self._plc, self._suite.cases[number]
         begin = time.perf_counter()
+        self._devices.prepare(plc, case)
         plc.reset("cold")
         failure = self._exception(case)
         if failure is None:
-            self._cycle(number)
+            self._cycle(number, live=bool(case.faults))
             failure = self._exception(case) or self._assert()
             teardown = self._suite.teardown_of(case)
             if failure is not None and failure.is_exception and teardown is not None:
-                self._continue(teardown)
+                self._continue(teardown, live=bool(case.faults))
         return Outcome(case.name, case.pos.file, case.pos.line, time.perf_counter() - begin, failure)
 
-    def _cycle(self, number: int) -> None:
-        self._plc.write({NUMBER: number})
+    def _cycle(self, number: int, *, live: bool) -> None:
+        self._plc.write({NUMBER: number, LIVE: live})
         self._plc.start()
         self._plc.run_cycles(1, check=False)
 
-    def _continue(self, number: int) -> None:
+    def _continue(self, number: int, *, live: bool) -> None:
         """Runs the test with this number on the variables as they are after an exception."""
         areas = [self._plc.memory(area, 0, size) for area, size in self._sizes.items() if size]
         kept = [bytes(area) for area in areas]
         self._plc.reset("cold")
         for area, content in zip(areas, kept, strict=True):
             area[:] = content
-        self._cycle(number)
+        self._cycle(number, live=live)
 
     def _exception(self, case: TestCase) -> Failure | None:
         info = self._plc.status().exception

@@ -17,6 +17,8 @@ NUMBER, FAILED = "__test", "__failed"
 
 TIME_NOW, LTIME_NOW = "__time", "__ltime"
 """Hidden variables: the time that the tests see."""
+LIVE = "__live"
+"""Hidden variable: the devices work while time passes."""
 _NOWHERE = Pos("", 0, 0)
 
 
@@ -48,7 +50,7 @@ class Bench:
         self.asserts = asserts
         self._world = world
         self._operands: dict[tuple[str, Type], Variable] = {}
-        hidden = ((NUMBER, DINT), (FAILED, DINT), (TIME_NOW, TIME), (LTIME_NOW, LTIME))
+        hidden = ((NUMBER, DINT), (FAILED, DINT), (TIME_NOW, TIME), (LTIME_NOW, LTIME), (LIVE, BOOL))
         self._hidden = {name: self._variable(name, t) for name, t in hidden}
         world.clock = {"TIME": self._hidden[TIME_NOW], "LTIME": self._hidden[LTIME_NOW]}
 

@@ -28,6 +28,7 @@ from plctool.compiler.semantics.rules.operators import operate
 from plctool.compiler.semantics.rules.parts import member_of
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol
+from plctool.compiler.semantics.unit_test_devices import TestDevices
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -59,10 +60,13 @@ class TestBody:
     """The body of a TEST, SETUP or TEARDOWN. It may write every variable of what it tests. `cleaning`: in TEARDOWN
     only the first failure counts."""
 
-    def __init__(self, world: World, scope: Scope, bench: Bench, *, cleaning: bool = False) -> None:
+    def __init__(
+        self, world: World, scope: Scope, bench: Bench, devices: TestDevices, *, cleaning: bool = False
+    ) -> None:
         scope.sees_inside = scope.writes_inside = True
         self._c = Checker(world, scope, self._special_calls())
         self._bench = bench
+        self._devices = devices
         self._cleaning = cleaning
         self._kept: dict[tuple[str, Type], Variable] = {}
 
@@ -81,6 +85,8 @@ class TestBody:
 
     def write(self, decl: ast.TestDecl) -> None:
         """Checks the statements into the unit of the scope."""
+        if decl.faults:
+            self._c.scope.prologue += self._devices.begin_faults(self._c, decl.pos)
         write_body(self._c, decl.body)
         if decl.keyword is not ast.TestUnit.SETUP:
             report_unused(self._c.scope)
@@ -230,7 +236,8 @@ class TestBody:
         total = Binary(BinaryOp.ADD, Load(long, LTIME, pos), step, LTIME, pos)
         milliseconds = convert_explicitly(self._c, Load(long, LTIME, pos), TIME)
         assert milliseconds is not None
-        return [Assign(long, total, pos), Assign(short, milliseconds, pos)]
+        moved = [Assign(long, total, pos), Assign(short, milliseconds, pos)]
+        return [*moved, *self._devices.let_pass(self._c, call.pos)]
 
     # ---- mocks ----
 

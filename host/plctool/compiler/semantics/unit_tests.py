@@ -21,6 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from plctool.compiler.semantics.assertions import NUMBER, Assertion, Bench
+from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.configuration import Application, configure, default_programs
 from plctool.compiler.semantics.conversions import load, whole
 from plctool.compiler.semantics.declarations.type_declarations import May
@@ -29,6 +30,7 @@ from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.statement_marks import StatementMarks
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
+from plctool.compiler.semantics.unit_test_devices import TestDevices, faults_of, host_function
 from plctool.compiler.semantics.unit_test_statements import TestBody
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
@@ -50,6 +52,7 @@ from plctool.compiler.typed import (
     Variable,
 )  # fmt: skip
 from plctool.iec.types import Keep
+from plctool.io.faults import Fault
 
 _LARGEST_ON_STACK = 0x4000  # bytes; what is larger lives in the data area
 
@@ -60,6 +63,7 @@ class TestCase:
 
     name: str
     pos: Pos
+    faults: tuple[Fault, ...] = ()  # of simulated devices, from its beginning on
 
 
 @dataclass
@@ -97,6 +101,7 @@ class TestProgram:
         self._program = program
         self._world = program.world
         self._bench = Bench(program.world, suite.asserts)
+        self._devices = TestDevices(self._bench)
         self._branches: list[tuple[list[tuple[int, int]], list[Statement]]] = []
         self._blocks: dict[str, PouSymbol] = {}  # PROGRAMs as function blocks
 
@@ -107,6 +112,9 @@ class TestProgram:
         names = self._world.names
         names.register([raising()], library=True)
         everything = [decl for _, declarations in parsed for decl in declarations]
+        self._devices.wanted = any(d.faults for d in everything if isinstance(d, ast.TestDecl))
+        if self._devices.wanted:
+            names.register([host_function()], library=True)
         mocks = Mocks((d for d in everything if isinstance(d, ast.TestDecl)), self._world.diagnostics)
         names.rewritten = mocks.rewritten
         marks = self._suite.marks
@@ -121,6 +129,7 @@ class TestProgram:
         alone = len(default_programs(self._world)) == 1
         wanted = alone or self._world.names.configurations
         application = configure(self._world, self._program.config) if wanted else Application()
+        self._devices.take_copies(application.tasks)
         application.tasks = [self._task()]
         return application
 
@@ -172,7 +181,8 @@ class TestProgram:
 
     def _test(self, decl: ast.TestDecl, file: _File) -> None:
         number, pos = len(self._suite.cases), decl.source.pos(decl.pos)
-        self._suite.cases.append(TestCase(decl.name, pos))
+        faults = faults_of(decl, self._world.io.description, self._world.diagnostics)
+        self._suite.cases.append(TestCase(decl.name, pos, faults))
         scope = self._begin(decl, file, f"TEST_{number}")
         self._declare(decl, scope, None)
         self._write(decl, scope)
@@ -182,6 +192,8 @@ class TestProgram:
             body = [_call(file.setup), If([(self._bench.passed(pos), body)], [], pos)]
         if file.teardown is not None:
             body.append(_call(file.teardown))
+        if faults:
+            body = [*self._devices.start(Checker(self._world, scope), decl.pos), *body]
         self._branches.append(([(number, number)], body))
 
     def _begin(self, decl: ast.TestDecl, file: _File, name: str) -> Scope:
@@ -193,7 +205,7 @@ class TestProgram:
         return scope
 
     def _write(self, decl: ast.TestDecl, scope: Scope, *, cleaning: bool = False) -> None:
-        TestBody(self._world, scope, self._bench, cleaning=cleaning).write(decl)
+        TestBody(self._world, scope, self._bench, self._devices, cleaning=cleaning).write(decl)
 
     def _declare(self, decl: ast.TestDecl, scope: Scope, shared: _File | None) -> None:
         """The variables: of SETUP (`shared`) in the data area, others on the stack."""

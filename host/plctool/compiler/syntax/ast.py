@@ -550,7 +550,7 @@ class ConfigurationDecl:
 @dataclass(slots=True, eq=False)
 class TestDecl:
     """A TEST, or what its file has to do before and after each TEST. The calls in the body may be those of
-    unit_tests.py: ASSERT_EQ, MOCK ..."""
+    unit_tests.py: ASSERT_EQ, MOCK ... `faults`: what {attribute 'fault' := 'text'} says, with the place of each."""
 
     pos: int
     keyword: TestUnit
@@ -559,6 +559,7 @@ class TestDecl:
     body: list[Stmt]
     source: Source
     namespace: Namespace | None = None  # what its file is USING
+    faults: list[tuple[int, str]] = field(default_factory=list)
 
 
 Declaration = TypeDecl | PouDecl | GlobalBlock | InstanceBlock | ConfigurationDecl | TestDecl

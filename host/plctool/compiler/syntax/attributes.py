@@ -15,6 +15,8 @@ from typing import Protocol
 
 Attributes = dict[int, dict[str, str]]
 """Attributes by the offset of what they stand before; name in lower case -> text."""
+Repeated = dict[int, list[tuple[int, str, str]]]
+"""The same in their order, with the offset of each: one that stands several times is there as often."""
 
 HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
@@ -25,6 +27,7 @@ HEEDED: dict[str, frozenset[str]] = {
     "call_after_init": frozenset(("FUNCTION_BLOCK", "METHOD")),
     "instance-path": frozenset(("variable",)),
     "external": frozenset(("FUNCTION",)),
+    "fault": frozenset(("TEST",)),
     "version": frozenset(("FUNCTION",)),
     "shared_output": frozenset(("variable",)),
 }

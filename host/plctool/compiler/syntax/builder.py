@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast, slips
-from plctool.compiler.syntax.attributes import Attributes
+from plctool.compiler.syntax.attributes import Attributes, Repeated
 from plctool.compiler.syntax.builder_chart import read_action, read_priority
 from plctool.compiler.syntax.builder_units import Arrangement
 from plctool.compiler.syntax.lexer import Report, Token
@@ -94,6 +94,7 @@ class Builder:
     def __init__(self) -> None:
         self.source = Source("", "")
         self.attributes: Attributes = {}
+        self.repeated: Repeated = {}
         self.places: dict[int, str] = {}  # what is declared where an attribute stands in front
         self.report: Report = lambda pos, code, message: None
         self.units = Arrangement(lambda pos, code, message: self.report(pos, code, message), self.pou)
@@ -396,7 +397,10 @@ class Builder:
 
     def test(self, keyword: Token, name: Token, blocks: Any, body: Any) -> ast.TestDecl:
         text = self.string(name)
-        return ast.TestDecl(keyword.pos, ast.TestUnit.TEST, str(text.value), blocks, body, self.source)
+        decl = ast.TestDecl(keyword.pos, ast.TestUnit.TEST, str(text.value), blocks, body, self.source)
+        if "fault" in self._attributes_at(keyword.pos, "TEST"):
+            decl.faults = [(at, said) for at, attribute, said in self.repeated[keyword.pos] if attribute == "fault"]
+        return decl
 
     def setup(self, keyword: Token, blocks: Any, body: Any) -> ast.TestDecl:
         return ast.TestDecl(keyword.pos, ast.TestUnit(keyword.type), keyword.text, blocks, body, self.source)

@@ -131,7 +131,7 @@ class Token:
 
 class Lexer:
     """Iterates over the tokens of a text; `attributes` collects the attributes by the offset of the token they precede,
-    `pragmas` all other pragmas with their own."""
+    `repeated` all of them in their order with their own offsets, `pragmas` all other pragmas with their own."""
 
     def __init__(
         self,
@@ -144,11 +144,12 @@ class Lexer:
         """`declared`: what {IF defined(pou: NAME)} finds."""
         self.text = text
         self.attributes: dict[int, dict[str, str]] = {}
+        self.repeated: dict[int, list[tuple[int, str, str]]] = {}
         self.pragmas: list[tuple[int, str]] = []
         self._report = report
         self._start = start
         self._end = len(text) if end is None else end
-        self._pending: dict[str, str] = {}
+        self._pending: list[tuple[int, str, str]] = []
         self._conditions = Conditions(report, declared)
 
     def __iter__(self) -> Iterator[Token]:
@@ -188,8 +189,8 @@ class Lexer:
                 else:
                     token = Token({"END": "$END", "DATE": "TYPED"}.get(kind, kind), word, pos)
                 if self._pending:
-                    self.attributes[pos] = self._pending
-                    self._pending = {}
+                    self.attributes[pos] = {name: said for _, name, said in self._pending}
+                    self.repeated[pos], self._pending = self._pending, []
                 if kind == "END":
                     self._conditions.finish()
                 yield token
@@ -225,7 +226,7 @@ class Lexer:
     def _pragma(self, text: str, pos: int) -> None:
         match = _ATTRIBUTE.fullmatch(text)
         if match:
-            self._pending[match.group(1).lower()] = match.group(2) or ""
+            self._pending.append((pos, match.group(1).lower(), match.group(2) or ""))
         elif _STATEMENT_IN_C.fullmatch(text):
             self._foreign(pos)
         elif not self._conditions.take(text, pos):

@@ -159,6 +159,7 @@ def parse_all(
     lexer = Lexer(source.text, recovery.report_token, start, end, declared)
     places: dict[int, str] = {}
     builder.source, builder.attributes, builder.places, builder.report = source, lexer.attributes, places, report
+    builder.repeated = lexer.repeated
     feed, text = parser.feed, plain_text(source.text, strings=True)
     for token in lexer:
         if token.type in _AMBIGUOUS:

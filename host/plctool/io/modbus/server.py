@@ -66,7 +66,7 @@ class Object:
 class ModbusServer(Connector):
     """This PLC as a server. `as_bits`: its registers are coils and discrete inputs, too."""
 
-    faults = ()  # no simulated client is there that it could lose
+    faults = ()  # its clients are not simulated
 
     order: Order = ORDERS["ABCD"]
     as_bits: bool = False
