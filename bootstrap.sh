@@ -25,6 +25,7 @@ if [ "$1" = --tests ]; then
     command -v aarch64-linux-gnu-gcc >/dev/null || set -- "$@" gcc-aarch64-linux-gnu libc6-dev-arm64-cross
     command -v qemu-aarch64 >/dev/null || set -- "$@" qemu-user
     command -v qemu-system-x86_64 >/dev/null || set -- "$@" qemu-system-x86
+    command -v xz >/dev/null || set -- "$@" xz-utils
     command -v mbpoll >/dev/null || set -- "$@" mbpoll
     ls /usr/lib/*/libmodbus.so.5 >/dev/null 2>&1 || set -- "$@" libmodbus5
     [ $# = 0 ] || install "$@" || echo "Some tests are left out; for them: sudo apt-get install $*" >&2

@@ -1,11 +1,11 @@
 /*
- * count.c - TCG plugin for QEMU 7.2: how many instructions from one place to another, each time.
+ * count.c - TCG plugin for QEMU: how many instructions from one place to another, each time.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
  * Arguments start= (an address), lo=, hi= (a range, hi excluded), out= (a file). Counts from each execution of start to
  * the next instruction within the range, and writes a line "instructions times" for each number that occurred. Debian
- * has no header for plugins; these are the few prototypes needed.
+ * has no header for plugins; these are the few prototypes needed. -DVERSION: of the interface, 2 from QEMU 9 on.
  */
 #include <stdint.h>
 #include <stdio.h>
@@ -27,7 +27,7 @@ uint64_t qemu_plugin_insn_vaddr(const struct qemu_plugin_insn *insn);
 void qemu_plugin_register_vcpu_insn_exec_cb(struct qemu_plugin_insn *insn, void (*callback)(unsigned cpu, void *data),
                                             int registers, void *data);
 
-EXPORT int qemu_plugin_version = 1;
+EXPORT int qemu_plugin_version = VERSION;
 EXPORT int qemu_plugin_install(plugin_id id, const void *info, int argc, char **argv);
 
 static uint64_t start, lo, hi, executed, started, counted;

@@ -9,8 +9,6 @@ Counted by a plugin of QEMU on the running firmware. The program's own instructi
 from __future__ import annotations
 
 import argparse
-import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -22,6 +20,7 @@ sys.path[:0] = [str(HERE), str(HERE.parents[1] / "host"), str(HERE.parents[1] / 
 
 from elftools.elf.elffile import ELFFile  # noqa: E402
 from environment import TARGETS  # noqa: E402
+from plugins import compile_plugin  # noqa: E402
 from programs import Built, compile_text, program  # noqa: E402
 from qemu import Board  # noqa: E402
 
@@ -56,9 +55,7 @@ class Counter:
         self.firmware, self.built, self.folder = firmware, built, folder
         with self.board, Plc(Connection(self.board.line())) as plc:
             plc.flash(built.path)
-        self.plugin = folder / "count.so"
-        compiler = shutil.which("cc") or "gcc"
-        subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", self.plugin, HERE / "count.c"], check=True)
+        self.plugin = compile_plugin("count", self.board.qemu.program, folder)
 
     def count(self, start: str, end: Range, work: Callable[[Plc], None] = lambda plc: time.sleep(0.05)) -> int:
         """The usual number of instructions from function `start` to the range `end`, while `work` is repeated."""

@@ -7,7 +7,8 @@
  * offset of its aligned block of 8 bytes (u32) and what that block holds afterwards to `out`, at once: the flash after
  * n stores is the flash before, with the first n of these written over it. With sector= stores are commands to a flash
  * with sectors of that size: what counts is each block of the sector that they have changed. Debian has no header for
- * plugins; these are the few prototypes needed, which are the same in all versions. -DVERSION=2 from QEMU 9 on.
+ * plugins; these are the few prototypes needed, which are the same in all versions. -DVERSION: of the
+ * interface, 2 from QEMU 9 on.
  */
 #include <fcntl.h>
 #include <stdbool.h>
@@ -32,10 +33,6 @@ void qemu_plugin_register_vcpu_mem_cb(struct qemu_plugin_insn *insn,
                                       void (*callback)(unsigned cpu, uint32_t info, uint64_t address, void *data),
                                       int registers, int kind, void *data);
 bool qemu_plugin_mem_is_store(uint32_t info);
-
-#ifndef VERSION
-#define VERSION 1
-#endif
 
 EXPORT int qemu_plugin_version = VERSION;
 EXPORT int qemu_plugin_install(plugin_id id, const void *info, int argc, char **argv);

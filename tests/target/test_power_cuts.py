@@ -10,10 +10,7 @@ POWER_CUTS=few a fifth of the selection.
 from __future__ import annotations
 
 import os
-import re
-import shutil
 import struct
-import subprocess
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -23,6 +20,7 @@ from queue import SimpleQueue
 
 import pytest
 from environment import MACHINE, TARGET, eventually, firmware
+from plugins import compile_plugin, compiler
 from programs import COUNTER, TWO_TASKS, Built, compile_text
 from qemu import Board
 
@@ -85,25 +83,15 @@ class Replacement:
                 yield Cut(n, offset in slot)
 
 
-def plugin_version(qemu: str) -> int:
-    """Of its interface for plugins."""
-    said = subprocess.run([qemu, "--version"], check=True, capture_output=True, text=True).stdout
-    found = re.search(r"version (\d+)", said)
-    assert found, said
-    return 2 if int(found[1]) >= 9 else 1
-
-
 @pytest.fixture(scope="module")
 def replacement(tmp_path_factory: pytest.TempPathFactory) -> Replacement:
     """Recorded on a board whose time does not depend on the host."""
-    compiler = shutil.which("cc")
-    if compiler is None:
+    if compiler() is None:
         pytest.skip("needs a C compiler for QEMU's plugin")
     folder = tmp_path_factory.mktemp("replacement")
-    plugin, record = folder / "stores.so", folder / "stores"
+    record = folder / "stores"
     board = Board(MACHINE, firmware("standard"), folder)
-    version = f"-DVERSION={plugin_version(board.qemu.program)}"
-    subprocess.run([compiler, "-O2", "-shared", "-fPIC", version, "-o", plugin, HERE / "stores.c"], check=True)
+    plugin = compile_plugin("stores", board.qemu.program, folder)
     old, new = (compile_text(text, TARGET, folder) for text in (COUNTER, TWO_TASKS))
 
     board.power_on("exact")
