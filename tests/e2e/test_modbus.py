@@ -457,3 +457,16 @@ def test_line_that_two_want_refuses_the_image(plant: Plant, tmp_path: Path) -> N
     with pytest.raises(PlcError, match=r"Twice \(IoDrvModbus\): the serial line \".*\" is in use"):
         plant.plc.flash(tmp_path / "main.cdl")
     eventually(lambda: ok(plant, "Meter"))  # the old program goes on, with its devices
+
+
+def test_line_whose_direction_the_port_cannot_switch_refuses_the_image(plant: Plant, tmp_path: Path) -> None:
+    """Pseudo terminals cannot."""
+    (tmp_path / "main.st").write_text(PROGRAM)
+    with Wire() as wire:
+        (tmp_path / "main.io.toml").write_text(f'[[modbus.rs485]]\nname = "Bus"\nport = "{wire.plc}"\ndrive = true\n')
+        compile_sources([tmp_path / "main.st"]).write(tmp_path / "main.cdl")
+        with pytest.raises(PlcError, match=r"Bus .*cannot run with this baud, parity, stop_bits or drive"):
+            plant.plc.flash(tmp_path / "main.cdl")
+    why = f"Serial device {wire.plc} cannot run with its settings: its driver cannot switch the direction of the bus"
+    assert any(why in entry.text for entry in plant.plc.log())
+    eventually(lambda: ok(plant, "Meter"))

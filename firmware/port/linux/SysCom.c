@@ -36,6 +36,7 @@ typedef struct {
     PORT_SOURCE source; /* what is read and written; no file while the device is away */
     bool open;
     RTS_UI32 tried_ms;
+    int error;       /* why it could not be opened */
     RTS_I64 byte_ns; /* when bytes were read last */
 } LINE;
 
@@ -113,11 +114,45 @@ static bool make_raw(int file, const SYSCOM_SETTINGS *wanted)
     return cfgetospeed(&taken) == *find_speed(wanted->baud) && (taken.c_cflag & frame) == (settings.c_cflag & frame);
 }
 
-/* The driver of the device switches RTS, which drives the bus; adapters that do it by themselves need none of it. */
+/* Delays, and the level of RTS that drives the bus, are those that the board has. Its own bytes are not heard. */
+static void choose_drive(int file, struct serial_rs485 *rs485)
+{
+    const __u32 levels = SER_RS485_RTS_ON_SEND | SER_RS485_RTS_AFTER_SEND;
+    memset(rs485, 0, sizeof(*rs485));
+    (void)ioctl(file, TIOCGRS485, rs485);
+    if ((rs485->flags & levels) != SER_RS485_RTS_AFTER_SEND) {
+        rs485->flags = (rs485->flags & ~levels) | SER_RS485_RTS_ON_SEND;
+    }
+    rs485->flags = (rs485->flags & ~(__u32)SER_RS485_RX_DURING_TX) | SER_RS485_ENABLED;
+}
+
+/* The driver of the device switches RTS, which drives the bus; adapters that do it by themselves need none of it.
+ * EOPNOTSUPP: the driver cannot, which some say only by what they have taken over. */
 static bool drive_bus(int file, const SYSCOM_SETTINGS *wanted)
 {
-    struct serial_rs485 rs485 = {.flags = SER_RS485_ENABLED | SER_RS485_RTS_ON_SEND};
-    return !wanted->rs485 || ioctl(file, TIOCSRS485, &rs485) == 0;
+    struct serial_rs485 rs485;
+    if (!wanted->rs485) {
+        return true;
+    }
+    choose_drive(file, &rs485);
+    bool taken = ioctl(file, TIOCSRS485, &rs485) == 0;
+    if (taken || errno == ENOTTY || errno == EINVAL) {
+        errno = EOPNOTSUPP;
+    }
+    return taken && (rs485.flags & SER_RS485_ENABLED) != 0;
+}
+
+/* Whether a device that could not be opened is there, but cannot run as its line is to. */
+static bool is_unable(int error)
+{
+    return error == EOPNOTSUPP || error == EINVAL || error == ENOTTY;
+}
+
+static const char *text_of(int error)
+{
+    return error == EOPNOTSUPP ? "its driver cannot switch the direction of the bus (drive); many adapters do it by "
+                                 "themselves"
+                               : strerror(error);
 }
 
 /* TIOCEXCL keeps all out but root, the lock keeps other plcrt and plctool out. */
@@ -298,6 +333,16 @@ static void lose_device(LINE *line)
     line->tried_ms = SysTimeGetMs();
 }
 
+/* Once, while it is the same device. */
+static void note_unable(LINE *line, int error)
+{
+    if (is_unable(error) && error != line->error) {
+        LogAdd(CMPID_SysCom, LOG_ERROR, ERR_NOT_SUPPORTED, "Serial device %s cannot run with its settings: %s",
+               line->path, text_of(error));
+    }
+    line->error = error;
+}
+
 static void look_for_device(LINE *line)
 {
     if (SysTimeGetMs() - line->tried_ms < PORT_REOPEN_MS) {
@@ -306,6 +351,8 @@ static void look_for_device(LINE *line)
     line->tried_ms = SysTimeGetMs();
     if (open_device(line)) {
         LogAdd(CMPID_SysCom, LOG_INFO, ERR_OK, "Serial device %s is back", line->path);
+    } else {
+        note_unable(line, errno);
     }
 }
 
@@ -344,14 +391,20 @@ RTS_UI32 SysComGetCount(void)
     return state.configured ? 1 : 0;
 }
 
-/* A device that is away is looked for. */
-static void open_or_wait(LINE *line)
+/* A device that is away is looked for. False: it is there, but cannot run like that. */
+static bool open_or_wait(LINE *line)
 {
     line->open = true;
     line->tried_ms = SysTimeGetMs();
-    if (line->source.file < 0 && !open_device(line)) {
-        LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is away: %s", line->path, strerror(errno));
+    if (line->source.file >= 0 || open_device(line)) {
+        return true;
     }
+    int error = errno;
+    note_unable(line, error);
+    if (!is_unable(error)) {
+        LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is away: %s", line->path, text_of(error));
+    }
+    return !is_unable(error);
 }
 
 RTS_RESULT SysComOpen(RTS_UI32 index)
@@ -359,7 +412,7 @@ RTS_RESULT SysComOpen(RTS_UI32 index)
     if (index >= SysComGetCount()) {
         return ERR_DEVICE;
     }
-    open_or_wait(own);
+    (void)open_or_wait(own);
     return ERR_OK;
 }
 
@@ -401,8 +454,7 @@ bool PortComCheck(const char *path, const SYSCOM_SETTINGS *settings, PORT_REASON
     strcpy(line.path, path);
     if (!open_device(&line)) {
         int error = errno;
-        PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)settings->baud,
-                   strerror(error));
+        PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)settings->baud, text_of(error));
         reason->busy = error == EBUSY;
         return false;
     }
@@ -429,7 +481,10 @@ RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS
         return ERR_NO_OBJECT;
     }
     *index = (RTS_UI32)(line - lines);
-    open_or_wait(line);
+    if (!open_or_wait(line)) {
+        SysComClose(*index);
+        return ERR_NOT_SUPPORTED;
+    }
     return ERR_OK;
 }
 

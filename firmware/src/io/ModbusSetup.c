@@ -71,7 +71,8 @@ static RTS_RESULT refuse_line(const IoConfigConnector *connector, RTS_RESULT res
     case ERR_DUPLICATE:
         return MODBUS_REFUSE(connector, result, "the serial line \"%s\" is in use.", name);
     default:
-        return MODBUS_REFUSE(connector, result, "the serial line \"%s\" cannot run with these settings.", name);
+        return MODBUS_REFUSE(connector, result,
+                             "the serial line \"%s\" cannot run with this baud, parity, stop_bits or drive.", name);
     }
 }
 
