@@ -497,6 +497,23 @@ static void a_scan_may_begin_again_in_the_middle(void)
     CHECK_EQUAL(module.slot, 2);
 }
 
+/* What the previous scan has found may be gone. */
+static void a_scan_that_begins_again_after_its_first_device_asks_for_it_again(void)
+{
+    IoDrvModule module;
+
+    begin_scan();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(scan_on(0, &module), ERR_OK);
+    CHECK_EQUAL(module.slot, WELL_KNOWN_UNIT);
+    CHECK_EQUAL(IoMgrScanModules(0, 1, &module), ERR_PENDING);
+    run_passes(100 / PASS_MS);
+    line.identification_of = 0;
+    CHECK_EQUAL(scan_on(0, &module), ERR_OK);
+    CHECK_EQUAL(module.slot, ID_UNIT);
+    CHECK_EQUAL(scan_on(1, &module), ERR_NO_OBJECT);
+}
+
 /* A configuration that is given back while it runs takes its scan along. */
 static void a_scan_ends_with_its_configuration(void)
 {
@@ -524,6 +541,7 @@ int main(void)
     RUN(a_scan_finds_who_replies);
     RUN(a_scan_that_nobody_goes_on_with_ends);
     RUN(a_scan_may_begin_again_in_the_middle);
+    RUN(a_scan_that_begins_again_after_its_first_device_asks_for_it_again);
     RUN(a_scan_ends_with_its_configuration);
     RUN(only_lines_of_clients_are_scanned);
     NEEDS_X86_64;

@@ -134,6 +134,7 @@ static void take_reply(RTS_I64 now_ns)
         describe(call);
         scan.found++;
         scan.wanted = false;
+        scan.taken = false;
         scan.call->state = MODBUS_CALL_FREE;
     }
 }
@@ -172,7 +173,6 @@ static RTS_RESULT go_on(RTS_I64 now_ns)
     }
     scan.asked_ns = now_ns;
     scan.wanted = true;
-    scan.taken = false;
     return ERR_PENDING;
 }
 
