@@ -1,13 +1,9 @@
-"""Modbus of a real plcrt with other programs: pymodbus, mbpoll and libmodbus as clients, pymodbus as devices."""
+"""Modbus of a real plcrt with pymodbus as clients and devices, over time; each function is in test_modbus_matrix.py."""
 
 from __future__ import annotations
 
-import ctypes
-import ctypes.util
-import shutil
 import socket
 import struct
-import subprocess
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -16,8 +12,7 @@ from pathlib import Path
 
 import pytest
 from modbus_support import Devices, Wire, eventually, free_port
-from pymodbus.client import ModbusSerialClient, ModbusTcpClient
-from pymodbus.client.base import ModbusBaseSyncClient
+from pymodbus.client import ModbusTcpClient
 
 import plctool
 from plctool.compiler import compile_sources
@@ -26,14 +21,13 @@ from plctool.errors import PlcError
 from plctool.testing.plcrt import Plcrt
 
 CONNECTIONS = 32  # MODBUS_MAX_CONNECTIONS of plcrt
-UNIT = 7
 
 PROGRAM = """
 PROGRAM Main
 VAR
     n : DINT; setpoint : INT; ratio : REAL; recipe : ARRAY[0..9] OF INT; enable, lamp : BOOL;
     echo : INT; half : REAL; sum : DINT; alive : BOOL;
-    rtu_set : INT; rtu_get : INT; ghost_in, ghost_out : INT;
+    ghost_in, ghost_out : INT;
     power, energy : REAL; counter : UDINT; speed, reference : INT; pump : BOOL; level : INT;
     wanted, given : INT; wanted_real, given_real : REAL;
 END_VAR
@@ -45,7 +39,6 @@ alive := enable;
 lamp := enable;
 sum := 0;
 FOR i := 0 TO 9 DO sum := sum + recipe[i]; END_FOR
-rtu_get := rtu_set + 1;
 END_PROGRAM
 CONFIGURATION C RESOURCE R ON PLC
     TASK T(INTERVAL := T#10ms, PRIORITY := 1);
@@ -68,12 +61,6 @@ identification = {{ vendor = "Acme", product = "Tanks", version = "1.2" }}
 40002 = "Main.ratio"
 40011 = "Main.recipe"
 40030 = {{ var = "Main.echo", read_only = true }}
-
-[modbus.server.rs485]
-port = "{slave_line}"
-unit = {unit}
-holding = {{ 40001 = "Main.rtu_set" }}
-input = {{ 30001 = "Main.rtu_get" }}
 
 [[modbus.rs485]]
 port = "{master_line}"
@@ -158,7 +145,6 @@ class Plant:
     plc: Plc
     folder: Path  # of its program
     server: int  # TCP port
-    slave: Wire
     master: Wire
     meter: Devices
     drive: Devices
@@ -167,19 +153,15 @@ class Plant:
         """A client of the PLC's server."""
         return ModbusTcpClient("127.0.0.1", port=self.server, timeout=10, retries=0)
 
-    def rtu(self) -> ModbusSerialClient:
-        """A client on the serial line."""
-        return ModbusSerialClient(self.slave.other, baudrate=19200, timeout=10, retries=0)
-
 
 @pytest.fixture(scope="module")
 def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
     folder = tmp_path_factory.mktemp("modbus")
     server, drive = free_port(), free_port()
-    with Wire() as slave, Wire() as master:
+    with Wire() as master:
         master.absent = {4}
         (folder / "main.st").write_text(PROGRAM)
-        places = {"server": server, "drive": drive, "unit": UNIT, "slave_line": slave.plc, "master_line": master.plc}
+        places = {"server": server, "drive": drive, "master_line": master.plc}
         (folder / "main.io.toml").write_text(DESCRIPTION.format(**places))
         image = folder / "main.cdl"
         compile_sources([folder / "main.st"]).write(image)
@@ -187,16 +169,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
         drives = Devices([1], tcp=drive)
         with meter, drives, Plcrt(folder / "flash") as plcrt, plctool.connect(f"serial:{plcrt.port}") as plc:
             plc.flash(image)
-            yield Plant(plc, folder, server, slave, master, meter, drives)
-
-
-@pytest.fixture(params=["tcp", "rtu"])
-def client(request: pytest.FixtureRequest, plant: Plant) -> Iterator[ModbusBaseSyncClient]:
-    """A client of the PLC on either line."""
-    made = plant.tcp() if request.param == "tcp" else plant.rtu()
-    eventually(made.connect)
-    yield made
-    made.close()
+            yield Plant(plc, folder, server, master, meter, drives)
 
 
 def words(value: float) -> list[int]:
@@ -221,29 +194,6 @@ def test_program_sees_what_is_written_and_the_client_what_it_computes(plant: Pla
         eventually(lambda: client.read_discrete_inputs(5000, count=1).bits[0])
         eventually(lambda: client.read_holding_registers(29, count=1).registers == [0x1234])
         assert client.read_coils(0, count=16).bits == [bool(0x1234 >> i & 1) for i in range(16)]
-
-
-def test_every_function_works_on_either_line(client: ModbusBaseSyncClient) -> None:
-    rtu = {"device_id": UNIT}
-    assert not client.write_register(0, 0xF0, **rtu).isError()
-    assert not client.mask_write_register(address=0, and_mask=0xF2, or_mask=0x25, **rtu).isError()
-    assert client.read_holding_registers(0, count=1, **rtu).registers == [0xF5]
-    assert not client.write_registers(0, [5], **rtu).isError()
-    found = client.readwrite_registers(read_address=0, read_count=1, write_address=0, values=[77], **rtu)
-    assert found.registers == [77]
-    eventually(lambda: not client.read_input_registers(0, count=1, **rtu).isError())
-    assert client.report_device_id(**rtu).isError() is False
-    information = client.read_device_information(**rtu).information
-    assert set(information) >= {0, 1, 2}
-
-
-def test_what_cannot_be_is_an_exception(client: ModbusBaseSyncClient) -> None:
-    illegal_function, illegal_address = 1, 2
-    rtu = {"device_id": UNIT}
-    assert client.read_holding_registers(500, count=1, **rtu).exception_code == illegal_address
-    assert client.write_register(500, 1, **rtu).exception_code == illegal_address
-    assert client.read_exception_status(**rtu).exception_code == illegal_function
-    assert client.read_coils(60000, count=8, **rtu).exception_code == illegal_address
 
 
 def test_read_only_registers_are_not_written(plant: Plant) -> None:
@@ -310,35 +260,6 @@ def test_flood_of_requests_is_replied_to_in_order(plant: Plant) -> None:
             assert part
             replies += part
         assert [struct.unpack(">H", replies[11 * i : 11 * i + 2])[0] for i in range(count)] == list(range(count))
-
-
-def test_mbpoll_reads_and_writes(plant: Plant) -> None:
-    if shutil.which("mbpoll") is None:
-        pytest.skip("mbpoll is not installed: apt-get install mbpoll")
-    command = ["mbpoll", "-m", "tcp", "-p", str(plant.server), "-a", "1", "-r", "1", "-1"]
-    done = subprocess.run([*command, "127.0.0.1", "321"], capture_output=True, text=True, check=False, timeout=60)
-    assert done.returncode == 0, done.stdout + done.stderr
-    done = subprocess.run([*command, "-c", "1", "127.0.0.1"], capture_output=True, text=True, check=False, timeout=60)
-    assert "[1]:" in done.stdout
-    assert "321" in done.stdout
-
-
-def test_libmodbus_reads_and_writes(plant: Plant) -> None:
-    name = ctypes.util.find_library("modbus") or "libmodbus.so.5"
-    try:
-        library = ctypes.CDLL(name)
-    except OSError:
-        pytest.skip("libmodbus is not installed: apt-get install libmodbus5")
-    library.modbus_new_tcp.restype = ctypes.c_void_p
-    context = ctypes.c_void_p(library.modbus_new_tcp(b"127.0.0.1", plant.server))
-    assert library.modbus_connect(context) == 0
-    sent, received = (ctypes.c_uint16 * 123)(*range(123)), (ctypes.c_uint16 * 125)()
-    assert library.modbus_write_registers(context, 10, 10, sent) == 10
-    assert library.modbus_read_registers(context, 10, 10, received) == 10
-    assert list(received[:10]) == list(range(10))
-    assert library.modbus_read_registers(context, 500, 1, received) == -1
-    library.modbus_close(context)
-    library.modbus_free(context)
 
 
 # ---- the PLC as a client -------------------------------------------------------------------------------------------
