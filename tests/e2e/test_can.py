@@ -41,15 +41,14 @@ def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CanHub]:
 
 
 class _Fixed(random.Random):
-    """Chooses the same address first, then others."""
+    """Chooses the same address twice, then others."""
 
     def __init__(self, first: int) -> None:
         super().__init__()
-        self.first: int | None = first
+        self.first = [first, first]
 
     def randint(self, a: int, b: int) -> int:
-        first, self.first = self.first, None
-        return super().randint(a, b) if first is None else first
+        return self.first.pop() if self.first else super().randint(a, b)
 
 
 TransportOf = Callable[..., CanTransport]

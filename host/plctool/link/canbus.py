@@ -380,7 +380,7 @@ class CanTransport:
     def _take_address(self) -> None:
         """Takes an address that no other tool has. Raises LinkError when there is none."""
         for _ in range(_CLAIMS):
-            self._address = self._random.randint(_FIRST_TOOL, _LAST_TOOL)
+            self._address = self._another_address()
             self.local_address = bytes([0, self._address])
             self._collided = self._settled = False
             self._claim(lib.CAN_FRAME_CLAIM)
@@ -393,6 +393,11 @@ class CanTransport:
                 self._settled = True
                 return
         raise LinkError(f"All addresses of tools on CAN {self.name} are in use; close some of them.", "open")
+
+    def _another_address(self) -> int:
+        while (address := self._random.randint(_FIRST_TOOL, _LAST_TOOL)) == self._address:
+            pass  # another tool has that one
+        return address
 
     def _receive_now(self, timeout: float) -> can.Message | None:
         try:
