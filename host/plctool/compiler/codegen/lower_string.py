@@ -11,7 +11,6 @@ from dataclasses import replace
 from plctool.compiler.codegen.ir import FALSE, Value, number
 from plctool.compiler.codegen.lower_arith import compare
 from plctool.compiler.codegen.lower_frame import Frame, Ref
-from plctool.compiler.codegen.string_functions import VECTOR_SIZE
 from plctool.compiler.typed import BinaryOp
 from plctool.iec.types import DINT, StringType
 
@@ -50,13 +49,10 @@ def copy_literal(frame: Frame, target: Ref, text: str) -> None:
 
 
 def literal_text(frame: Frame, text: str, *, wide: bool) -> Ref:
-    """A constant string in the image; where strings are read as vectors, there is room for whole ones."""
-    size = len(text) + 1
-    if frame.unit.target.vectors and not wide:
-        size = -(-size // VECTOR_SIZE) * VECTOR_SIZE
-    t = StringType(size - 1, wide)
-    pointer = frame.unit.module.constant(encode_text(text.ljust(size, "\0"), t), t.align)
-    return Ref(pointer, 0, t, direct=True, capacity=number(size - 1))
+    """A constant string in the image."""
+    t = StringType(len(text), wide)
+    pointer = frame.unit.module.constant(encode_text(text + "\0", t), t.align)
+    return Ref(pointer, 0, t, direct=True, capacity=number(len(text)))
 
 
 def _terminate(frame: Frame, target: Ref, length: int) -> None:

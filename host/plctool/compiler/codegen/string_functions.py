@@ -15,8 +15,6 @@ from plctool.image.targets import Target
 # Functions of stdlib/strings.st that have a faster body here, with the same meaning.
 LIBRARY_FUNCTIONS = {"SPAN__": "str.span", "COPY__": "str.copy", "WSPAN__": "str.wspan", "WCOPY__": "str.wcopy"}
 
-VECTOR_SIZE = 16  # bytes
-
 _ZERO = number(0)
 
 
@@ -50,7 +48,7 @@ class _Strings:
         if self.wide:
             return 0
         if self.target.vectors:
-            return VECTOR_SIZE
+            return 16
         return self.target.pointer_size if self.target.unaligned else 0
 
     @property
