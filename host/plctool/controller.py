@@ -288,7 +288,7 @@ class Controller(ABC):
         return values if len(names) > 1 or is_pattern(names[0]) else values[names[0]]
 
     def read_all(self, names: Sequence[str]) -> dict[str, Any]:
-        """Values by name. Structs and arrays come as dicts and lists, TIME as a string."""
+        """Values by name. Structs and arrays come as dicts and lists, TIME as a string with a `timedelta`."""
         return self.sample(names).values
 
     def sample(self, names: Sequence[str]) -> Reading:

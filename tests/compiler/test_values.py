@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from datetime import timedelta
 
 import pytest
 from hypothesis import given, settings
@@ -108,11 +109,13 @@ def test_time_is_shown_as_a_literal(ms: int, text: str) -> None:
 @given(st.integers(-(2**31), 2**31 - 1))
 def test_any_time_is_read_as_it_is_shown(ms: int) -> None:
     assert parse_time(format_time(ms, TIME)) == ms
+    assert format_time(ms, TIME).timedelta == timedelta(milliseconds=ms)
 
 
 @given(st.integers(-(2**63), 2**63 - 1))
 def test_any_ltime_is_read_as_it_is_shown(ns: int) -> None:
     assert parse_time(format_time(ns, LTIME), LTIME) == ns
+    assert 0 <= ns - format_time(ns, LTIME).timedelta // timedelta(microseconds=1) * 1000 < 1000
 
 
 @pytest.mark.parametrize(

@@ -69,6 +69,8 @@ def test_durations_may_be_timedeltas(source: Path) -> None:
         assert plc.now_ns == 2_000_000_000
         plc.write({"Main.pause": timedelta(minutes=1, milliseconds=5), "Main.long": timedelta(microseconds=-3)})
         assert plc.read("Main.pause", "Main.long") == {"Main.pause": "T#1m5ms", "Main.long": "LTIME#-3us"}
+        assert plc.read("Main.pause").timedelta == timedelta(minutes=1, milliseconds=5)
+        assert plc.read("Main.long").timedelta == timedelta(microseconds=-3)
         with pytest.raises(UsageError, match="whole number"):
             plc.write({"Main.pause": timedelta(microseconds=1)})
         with pytest.raises(UsageError):

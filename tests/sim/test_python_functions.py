@@ -102,6 +102,8 @@ def test_values_of_every_kind_go_there_and_back(
 def test_durations_may_be_timedelta(tmp_path: Path) -> None:
     declaration = "FUNCTION F : TIME VAR_INPUT x : INT; END_VAR"
     assert called(tmp_path, declaration, "r := F(1);", lambda x: timedelta(seconds=x), "r : TIME;") == "T#1s"
+    declaration = "FUNCTION F : BOOL VAR_INPUT x : TIME; END_VAR"
+    assert called(tmp_path, declaration, "r := F(T#2s);", lambda x: x.timedelta > timedelta(seconds=1), "r : BOOL;")
 
 
 def test_outputs_and_in_outs_are_set(tmp_path: Path) -> None:

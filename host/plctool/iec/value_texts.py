@@ -88,7 +88,16 @@ def quoted(text: str, wide: bool) -> str:
     return quote + "".join(map(shown, text)) + quote
 
 
-def format_time(value: int, t: Type) -> str:
+class Duration(str):
+    """A TIME or LTIME as ST writes it."""
+
+    @property
+    def timedelta(self) -> datetime.timedelta:
+        """To compute with; of an LTIME the whole microseconds, rounded down."""
+        return datetime.timedelta(microseconds=parse_time(self, ELEMENTARY["LTIME"]) // 1000)
+
+
+def format_time(value: int, t: Type) -> Duration:
     """'T#1h2m3s4ms' for TIME [ms], 'LTIME#...' for LTIME [ns]."""
     wide = base_of(t).size == 8
     prefix, left = ("LTIME#", abs(value)) if wide else ("T#", abs(value) * 1_000_000)
@@ -98,7 +107,7 @@ def format_time(value: int, t: Type) -> str:
             text += f"{left // size}{unit}"
             left %= size
     sign = "-" if value < 0 else ""
-    return prefix + sign + (text or ("0ns" if wide else "0ms"))
+    return Duration(prefix + sign + (text or ("0ns" if wide else "0ms")))
 
 
 def format_date(value: int, t: Type) -> str:

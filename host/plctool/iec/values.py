@@ -1,7 +1,8 @@
 """Values of variables: bytes in memory <-> Python values, which are ready for JSON.
 
-TIME and dates are strings such as 'T#1s500ms', values of enumerations their names, a REAL is the number with the fewest
-digits that reads back as the same. How strings look is in `value_texts`.
+TIME and dates are strings such as 'T#1s500ms', those of TIME with a `timedelta` for Python; values of enumerations are
+their names, a REAL is the number with the fewest digits that reads back as the same. How strings look is in
+`value_texts`.
 """
 
 from __future__ import annotations
