@@ -49,6 +49,14 @@ def wrong_password() -> DeviceError:
     )
 
 
+def password_not_taken() -> DeviceError:
+    return DeviceError(
+        "The device takes no password now, because it was given wrong ones before; try again in a moment.",
+        "password-not-taken",
+        lib.ERR_NOT_READY_YET,
+    )
+
+
 def verifier_of(password: str | None) -> bytes:
     """What a device keeps of a password (USER_VERIFIER); all zero for none. Raises UsageError for one that is too short
     or too long."""

@@ -12,7 +12,14 @@ from plctool.errors import DeviceError
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import PATIENCE, MessageLink
-from plctool.link.passwords import AskPassword, no_password, password_needed, proof_of, wrong_password
+from plctool.link.passwords import (
+    AskPassword,
+    no_password,
+    password_needed,
+    password_not_taken,
+    proof_of,
+    wrong_password,
+)
 from plctool.link.wire import Layout
 
 _T = TypeVar("_T")
@@ -21,7 +28,7 @@ _APPLICATION = "Application"
 _LOGIN_REPLY = Layout("APP_LOGIN_REPLY")
 _CHALLENGE_SIZE = Layout("DEV_CHALLENGE").size
 _PAUSE = 0.1  # between two tries while the device takes no password, because of a wrong one before [s]
-_PAUSE_PATIENCE = 3 * lib.PASSWORD_PAUSE_MS / 1000  # [s]
+_PAUSE_PATIENCE = 10 * lib.PASSWORD_PAUSE_MS / 1000  # [s]; the clock of a busy device may be slow
 
 
 @dataclass(frozen=True)
@@ -186,9 +193,11 @@ class Session:
                 raise password_needed()
             proof = proof_of(password, reply.bytes(lib.TAG_DEV_CHALLENGE, _CHALLENGE_SIZE))
             result, reply = self._ask_for_login(lib.DEV_CRYPT_PROOF, bintag.raw(lib.TAG_DEV_PROOF, proof))
-            if result == lib.ERR_NOT_READY_YET and self.connection.now() < end:
+            if result == lib.ERR_NOT_READY_YET:
+                if self.connection.now() >= end:
+                    raise password_not_taken()
                 self.connection.wait(_PAUSE)
-            elif result in (lib.ERR_NO_ACCESS_RIGHTS, lib.ERR_NOT_READY_YET):
+            elif result == lib.ERR_NO_ACCESS_RIGHTS:
                 raise wrong_password()
             else:
                 l7.check_result(result, "login")
