@@ -42,6 +42,9 @@ typedef struct {
     RTS_UI8 peer_words;
     RTS_UI8 peer_address[2 * ROUTER_MAX_NETWORK];
 #endif
+#if COMM_HOST_CHANNELS
+    RTS_UI32 (*host_of)(const struct ROUTER_PEER *peer); /* its machine; 0: this one. NULL: not known */
+#endif
     void *instance; /* the driver's own */
 
     /* Queues one packet made of `count` parts, BLK_MAX_SIZE bytes at most; the parts are copied. To a peer whose

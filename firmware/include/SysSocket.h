@@ -20,6 +20,12 @@ typedef struct {
     RTS_UI16 port;
 } SOCKADDRESS;
 
+/* The machine at an address; 0 for this one. */
+static inline RTS_UI32 SockHost(RTS_UI32 ip)
+{
+    return ip >> 24 == 127 ? 0 : ip;
+}
+
 typedef struct {
     RTS_UI32 ip;
     RTS_UI32 mask;

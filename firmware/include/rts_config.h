@@ -294,6 +294,11 @@
 #define COMM_ENDPOINTS 0
 #endif
 
+/* Channels that the peers of one machine on a network may have together, so that it leaves one to others; 0: no limit. */
+#ifndef COMM_HOST_CHANNELS
+#define COMM_HOST_CHANNELS (COMM_ENDPOINTS && COMM_MAX_CLIENTS > 2 ? COMM_MAX_CLIENTS - 1 : 0)
+#endif
+
 /* TCP connections at a time: one more than clients that may be logged in, so that a new one is always accepted. Each
  * costs its two buffers and 90 bytes. */
 #ifndef TCP_MAX_CONNECTIONS

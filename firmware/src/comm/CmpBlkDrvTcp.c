@@ -35,6 +35,7 @@ typedef struct {
     bool heard;         /* a frame has come */
     RTS_UI32 began_at;  /* when the frame that is on its way began, the first one with the connection; SysTimeGetMs */
     RTS_UI32 moved_at;  /* when something was received or taken last */
+    RTS_UI32 host;      /* of the peer; 0: this machine */
     RTS_UI32 in_size;   /* received, not yet a complete frame */
     RTS_UI32 out_begin; /* what is still to be sent */
     RTS_UI32 out_end;
@@ -244,6 +245,15 @@ static void put_address(TCP_ADDRESS *address, const SOCKADDRESS *end)
         address->ip[i] = (RTS_UI8)(end->ip >> 8 * (sizeof(address->ip) - 1 - i));
 }
 
+#if COMM_HOST_CHANNELS
+static RTS_UI32 host_of(const ROUTER_PEER *peer)
+{
+    const CONNECTION *connection = peer->driver->instance;
+
+    return connection->host;
+}
+#endif
+
 static void begin(CONNECTION *connection, RTS_HANDLE socket, const SOCKADDRESS *peer)
 {
     BLK_DRV *driver = &connection->driver;
@@ -253,6 +263,7 @@ static void begin(CONNECTION *connection, RTS_HANDLE socket, const SOCKADDRESS *
     COMM_COUNT(counters.accepted);
     memset(connection, 0, offsetof(CONNECTION, in));
     connection->socket = socket;
+    connection->host = SockHost(peer->ip);
     connection->began_at = connection->moved_at = SysTimeGetMs();
     (void)SysSockGetOwn(socket, &own, &prefix);
     driver->type = BLK_DRV_TYPE_TCP;
@@ -264,13 +275,29 @@ static void begin(CONNECTION *connection, RTS_HANDLE socket, const SOCKADDRESS *
     put_address((TCP_ADDRESS *)driver->peer_address, peer);
     driver->instance = connection;
     driver->send = tcp_send;
+#if COMM_HOST_CHANNELS
+    driver->host_of = host_of;
+#endif
 }
 
-/* Whether `a` is less useful than `b`: it has not sent a frame, or has been silent longer. */
+/* Connections of its machine. */
+static RTS_UI32 count_of_host(const CONNECTION *one)
+{
+    RTS_UI32 count = 0;
+
+    FOR_EACH_CONNECTION(connection)
+    count += !is_free(connection) && connection->host == one->host;
+    return count;
+}
+
+/* Whether `a` is less useful than `b`: its machine has more connections, it has not sent a frame, or has been silent
+ * longer. */
 static bool is_less(const CONNECTION *a, const CONNECTION *b)
 {
     RTS_UI32 now_ms = SysTimeGetMs();
 
+    if (a->host != b->host && count_of_host(a) != count_of_host(b))
+        return count_of_host(a) > count_of_host(b);
     return a->heard != b->heard ? !a->heard : now_ms - a->moved_at > now_ms - b->moved_at;
 }
 

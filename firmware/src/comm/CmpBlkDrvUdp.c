@@ -90,6 +90,13 @@ static RTS_RESULT udp_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_U
     return SysSockSendTo(udp.own.socket, packet, size, &to);
 }
 
+#if COMM_HOST_CHANNELS
+static RTS_UI32 host_of(const ROUTER_PEER *peer)
+{
+    return SockHost(address_of(peer->endpoint).ip);
+}
+#endif
+
 static void take(const LISTENER *listener, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *from)
 {
     if (size > BLK_MAX_SIZE) {
@@ -135,6 +142,9 @@ static void open_listener(LISTENER *listener, SYSSOCK_PURPOSE purpose)
     listener->driver.type = BLK_DRV_TYPE_UDP;
     listener->driver.point_to_point = purpose == SYSSOCK_UDP;
     listener->driver.send = udp_send;
+#if COMM_HOST_CHANNELS
+    listener->driver.host_of = host_of;
+#endif
 }
 
 static void open_all(void)

@@ -280,14 +280,46 @@ static bool is_better(const CHANNEL *a, const CHANNEL *b, RTS_UI32 now_ms)
     return now_ms - a->last_received > now_ms - b->last_received;
 }
 
+/* The machine of a peer; 0: not known, or this one. */
+static RTS_UI32 host_of(const ROUTER_PEER *peer)
+{
+#if COMM_HOST_CHANNELS
+    return peer->driver->host_of != NULL ? peer->driver->host_of(peer) : 0;
+#else
+    RTS_UNUSED(peer);
+    return 0;
+#endif
+}
+
+static bool is_at_host(const CHANNEL *channel, RTS_UI32 host)
+{
+    return channel->id != 0 && host_of(&channel->peer) == host;
+}
+
+/* A machine with many ports or connections does not get all channels: it has to do with those it has. */
+static bool has_its_share(RTS_UI32 host)
+{
+    RTS_UI32 count = 0;
+
+    if (host == 0)
+        return false;
+    FOR_EACH_CLIENT (client)
+        count += is_at_host(&client->channel, host);
+    return count + 1 > COMM_HOST_CHANNELS; /* where there are no hosts it is 0 */
+}
+
 /* The one this peer has, or one that can be given to it; NULL when all are taken. */
 static COMM_CLIENT *claim_client(const ROUTER_PEER *peer, RTS_UI32 now_ms)
 {
     COMM_CLIENT *found = NULL;
+    RTS_UI32 host = host_of(peer);
+    bool own_only = has_its_share(host);
 
     FOR_EACH_CLIENT (client) {
         if (client->channel.id != 0 && RouterIsSamePeer(peer, &client->channel.peer))
             return client;
+        if (own_only && !is_at_host(&client->channel, host))
+            continue;
         if (!is_taken(client, now_ms) && !is_settling(client, now_ms) &&
             (found == NULL || is_better(&client->channel, &found->channel, now_ms)))
             found = client;
