@@ -9,8 +9,12 @@
  *   tIIIL<data>\r TIIIIIIIIL<data>\r    frame with 11 or 29 bits, L bytes; r and R: remote
  *   dIIIL<data>\r DIIIIIIIIL<data>\r    FD, L is the length code 0..F; b and B: with the second bit rate
  *   C\r S6\r Y2\r O\r                   to an adapter: close, bit rate, second bit rate, open
+ *   F\r -> Fxx\r                       its status flags: 0x04 warning, 0x20 passive, 0x01 and 0x08 frames were lost
+ *   sbRRRTTT\r                         the state has changed: a(ctive), w(arning), p(assive), b(us off), and the
+ *                                      counters of errors in receiving and sending, decimal
  *
- * What is no frame (an answer of the adapter, noise) is passed over; four digits of a time stamp may follow a frame.
+ * Adapters know F (LAWICEL), or send state lines (as Linux takes them), or neither. What is neither a frame nor one of
+ * these (another answer of the adapter, noise) is passed over; four digits of a time stamp may follow a frame.
  */
 #ifndef SLCAN_H
 #define SLCAN_H
@@ -23,6 +27,7 @@ enum {
     SLCAN_COMMANDS_SIZE = 16,
     SLCAN_CHUNK = 32,
     SLCAN_FILTERS = 4,
+    SLCAN_ASK_MS = 1000, /* the status flags are asked for so often: adapters want 500 ms at least */
 };
 
 /* Writes the line of a frame with its end, SLCAN_TEXT_SIZE at most; returns its length. */
@@ -42,11 +47,15 @@ typedef struct {
     SLCAN_LINE line;
     RTS_UI32 bit_rate;
     RTS_UI32 data_bit_rate;
-    RTS_UI32 lost; /* lines that were damaged */
+    RTS_UI32 lost; /* lines that were damaged, and times the adapter had no room */
     CAN_FILTER filter[SLCAN_FILTERS];
     RTS_UI32 filters;
     RTS_UI32 fill;
     bool too_long;
+    RTS_UI8 bus; /* CAN_BUS_STATE, as far as the adapter says it */
+    RTS_UI16 tx_errors;
+    RTS_UI16 rx_errors;
+    RTS_UI32 asked_ms;
     RTS_UI8 chunk[SLCAN_CHUNK];
     RTS_UI32 chunk_size;
     RTS_UI32 chunk_read;
@@ -63,5 +72,13 @@ RTS_RESULT SlcanOpen(SLCAN *slcan, SLCAN_LINE line, RTS_UI32 bit_rate, RTS_UI32 
 RTS_RESULT SlcanSetFilters(SLCAN *slcan, const CAN_FILTER *filters, RTS_UI32 count);
 RTS_RESULT SlcanSend(SLCAN *slcan, const CAN_FRAME *frame);
 RTS_RESULT SlcanReceive(SLCAN *slcan, CAN_FRAME *frame);
+void SlcanGetState(const SLCAN *slcan, CAN_STATE *state);
+
+/* Ends bus off, by opening the adapter again. */
+void SlcanRestart(SLCAN *slcan);
+
+/* Asks the adapter for its state, SLCAN_ASK_MS after the last time. For each cycle; not where the line has no adapter at
+ * its other end. */
+void SlcanAsk(SLCAN *slcan, RTS_UI32 now_ms);
 
 #endif

@@ -197,6 +197,101 @@ static void an_adapter_is_opened_at_the_bit_rate(void)
     CHECK_EQUAL(SlcanOpen(&slcan, (SLCAN_LINE){read_line, write_line}, 500000, 3000000), ERR_NOT_SUPPORTED);
 }
 
+/* After what the adapter has said. */
+static CAN_STATE state_after(const char *text)
+{
+    CAN_FRAME frame;
+    CAN_STATE state;
+
+    arrives(text);
+    CHECK_EQUAL(SlcanReceive(&slcan, &frame), ERR_NOTHING_TO_DO);
+    SlcanGetState(&slcan, &state);
+    return state;
+}
+
+static bool is_sent(const char *text)
+{
+    bool is = line.out_size == strlen(text) && memcmp(line.out, text, line.out_size) == 0;
+
+    line.out_size = 0;
+    return is;
+}
+
+static void an_adapter_that_reports_its_state_is_believed(void)
+{
+    start();
+    CAN_STATE state = state_after("");
+    CHECK(state.bus == CAN_BUS_ACTIVE && state.tx_errors == 0 && state.rx_errors == 0);
+    CHECK(state.bit_rate == BIT_RATE && state.data_bit_rate == 0);
+    state = state_after("sw057101\r");
+    CHECK(state.bus == CAN_BUS_WARNING && state.rx_errors == 57 && state.tx_errors == 101);
+    CHECK_EQUAL(state_after("sp000128\r").bus, CAN_BUS_PASSIVE);
+    CHECK_EQUAL(state_after("sa000000\r").bus, CAN_BUS_ACTIVE);
+    CHECK_EQUAL(state_after("sb256256\r").bus, CAN_BUS_OFF);
+    CHECK_EQUAL(state_after("").lost, 0);
+}
+
+static void what_is_no_report_changes_no_state(void)
+{
+    static const char *const lines[] = {"sb25625\r",  "sb2562560\r", "sx000000\r", "s\r",  "sb25A256\r",
+                                        "sb256 56\r", "sb256256\a",  "b256256\r",  "F2\r", "F200\r",
+                                        "FX0\r",      "f20\r",       "F20\a",      "20\r"};
+
+    start();
+    for (RTS_UI32 i = 0; i < RTS_COUNT(lines); i++)
+        CHECK_EQUAL(state_after(lines[i]).bus, CAN_BUS_ACTIVE);
+}
+
+static void bus_off_ends_when_the_adapter_is_opened_again(void)
+{
+    start();
+    SlcanRestart(&slcan);
+    CHECK(is_sent(""));
+    CHECK_EQUAL(state_after("sb256256\r").bus, CAN_BUS_OFF);
+    CHECK_EQUAL(SlcanSend(&slcan, &examples[0].frame), ERR_DEVICE);
+    CHECK_EQUAL(state_after("F00\r").bus, CAN_BUS_OFF); /* flags do not say bus off */
+    SlcanRestart(&slcan);
+    CHECK(is_sent("C\rS6\rO\r"));
+    CAN_STATE state = state_after("\r\r\r");
+    CHECK(state.bus == CAN_BUS_ACTIVE && state.tx_errors == 0);
+    CHECK_EQUAL(SlcanSend(&slcan, &examples[0].frame), ERR_OK);
+    CHECK(is_sent(examples[0].text));
+}
+
+static void the_flags_are_asked_for_now_and_then_and_their_answer_is_the_state(void)
+{
+    start();
+    SlcanAsk(&slcan, SLCAN_ASK_MS - 1);
+    CHECK(is_sent(""));
+    SlcanAsk(&slcan, SLCAN_ASK_MS);
+    CHECK(is_sent("F\r"));
+    SlcanAsk(&slcan, 2 * SLCAN_ASK_MS - 1);
+    CHECK(is_sent(""));
+    CHECK_EQUAL(state_after("F04\r").bus, CAN_BUS_WARNING);
+    CHECK_EQUAL(state_after("F24\r").bus, CAN_BUS_PASSIVE);
+    CHECK_EQUAL(state_after("F80\r").bus, CAN_BUS_ACTIVE);
+    CHECK_EQUAL(state_after("\a").bus, CAN_BUS_ACTIVE); /* it does not know F */
+    CHECK_EQUAL(state_after("").lost, 0);
+    CHECK_EQUAL(state_after("F08\r").lost, 1);
+    CHECK_EQUAL(state_after("F01\r").lost, 2);
+}
+
+static void a_frame_that_the_line_has_not_taken_is_not_cut_by_a_question(void)
+{
+    CAN_FRAME frame;
+
+    start();
+    line.write_limit = 2;
+    CHECK_EQUAL(SlcanSend(&slcan, &examples[0].frame), ERR_OK);
+    SlcanAsk(&slcan, SLCAN_ASK_MS); /* four of six characters */
+    CHECK(line.out_size == 4);
+    line.write_limit = LINE_SIZE;
+    SlcanAsk(&slcan, SLCAN_ASK_MS);
+    CHECK_EQUAL(SlcanSend(&slcan, &examples[0].frame), ERR_OK);
+    (void)SlcanReceive(&slcan, &frame);
+    CHECK(is_sent("t1230\rF\rt1230\r"));
+}
+
 int main(void)
 {
     RUN(frames_are_lines_and_lines_are_frames);
@@ -207,5 +302,10 @@ int main(void)
     RUN(a_line_that_never_ends_is_one_damaged_line);
     RUN(a_line_that_is_full_is_waited_for);
     RUN(an_adapter_is_opened_at_the_bit_rate);
+    RUN(an_adapter_that_reports_its_state_is_believed);
+    RUN(what_is_no_report_changes_no_state);
+    RUN(bus_off_ends_when_the_adapter_is_opened_again);
+    RUN(the_flags_are_asked_for_now_and_then_and_their_answer_is_the_state);
+    RUN(a_frame_that_the_line_has_not_taken_is_not_cut_by_a_question);
     return test_result();
 }

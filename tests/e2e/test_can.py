@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import random
 import re
+import select
 import sys
 import threading
+import tty
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -252,7 +255,44 @@ def test_an_adapter_belongs_to_one_tool(hub: CanHub, tool: Any) -> None:
         assert plc.identity().node_name == "press"
 
 
-def test_what_is_no_interface_is_told(tool: Any) -> None:
+class _Adapter:
+    """An SLCAN adapter on a pseudo terminal of its own, that says what a test wants."""
+
+    def __init__(self) -> None:
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        self.path = os.ttyname(self._slave)
+        self._received = b""
+
+    def say(self, line: str) -> None:
+        os.write(self._master, line.encode() + b"\r")
+
+    def expects(self, *lines: str) -> None:
+        """Waits for these lines, in this order and next to each other; fails when they do not come."""
+        wanted = b"".join(line.encode() + b"\r" for line in lines)
+        while wanted not in self._received:
+            assert select.select([self._master], [], [], PATIENCE)[0], self._received
+            self._received += os.read(self._master, 4096)
+        self._received = self._received.partition(wanted)[2]
+
+    def close(self) -> None:
+        os.close(self._master)
+        os.close(self._slave)
+
+
+def test_bus_off_that_an_adapter_reports_is_logged_and_ended(tmp_path: Path) -> None:
+    with closing(_Adapter()) as adapter, Plcrt(tmp_path / "off.flash", "--can", f"slcan:{adapter.path}") as plcrt:
+        adapter.expects("C", "S6", "O")
+        adapter.expects("F")
+        adapter.say("F04")
+        adapter.say("sb256000")
+        adapter.expects("C", "S6", "O")
+        with plctool.connect(f"serial:{plcrt.port}") as plc:
+            said = [entry.text for entry in plc.log() if entry.text.startswith("CAN")]
+    assert said == ["CAN: bus off; check the bit rate and the cable", "CAN: the bus is back"]
+
+
+def test_what_is_no_interface_expects(tool: Any) -> None:
     for place, status, said in (
         ("can0", 2, "is not a CAN interface"),
         ("teapot:can0", 2, "is not a CAN interface"),
@@ -275,6 +315,6 @@ def test_wrong_options_of_plcrt_are_refused(tmp_path: Path) -> None:
             Plcrt(tmp_path / "other.flash", *options).start()
 
 
-def test_a_device_that_is_gone_is_told(hub: CanHub) -> None:
+def test_a_device_that_is_gone_expects(hub: CanHub) -> None:
     with pytest.raises(LinkError, match="No device answers"), plctool.connect(link_of(hub, 0, 55)) as plc:
         plc.identity()

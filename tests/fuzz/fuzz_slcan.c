@@ -38,6 +38,7 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
 {
     static const char *const seeds[] = {"\x40t12330A0B0C\rT1F40058080102030405060708\r",
                                         "\x07t0012AABB1234\rr1234\rR000000051\r\a\r",
+                                        "\x09sw057101\rF24\rsb256256\rF00\rsa000000\r",
                                         "\001B00000001107\rd0019090000000000000000000000\rD1FFFFFFF0\r"};
 
     (void)capacity;

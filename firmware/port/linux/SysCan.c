@@ -340,6 +340,9 @@ RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)
         can.is_slcan ? SlcanReceive(&can.slcan, frame) : CanSocketReceive(can.line.file, frame, &can.state);
     frame->time_us = (RTS_UI32)(SysTimeGetNs() / 1000);
     if (can.is_slcan) {
+        if (result != ERR_OK && can.slave < 0) { /* at the other end of a pseudo terminal is a tool */
+            SlcanAsk(&can.slcan, SysTimeGetMs());
+        }
         return result;
     }
     if (result == ERR_DEVICE) {
@@ -355,16 +358,18 @@ RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)
 void SysCanGetState(RTS_UI32 index, CAN_STATE *state)
 {
     *state = can.state;
-    if (index != 0 || !can.open) {
+    if (can.is_slcan) {
+        SlcanGetState(&can.slcan, state);
+    }
+    if (index != 0 || !can.open || can.state.bus == CAN_BUS_STOPPED) {
         state->bus = CAN_BUS_STOPPED;
     }
-    state->bit_rate = can.is_slcan ? can.options.bit_rate : 0;
-    state->data_bit_rate = can.is_slcan ? can.options.data_bit_rate : 0;
-    state->lost += can.slcan.lost;
 }
 
 /* The kernel restarts a controller, if its interface has a restart-ms; a process without rights cannot. */
 void SysCanRestart(RTS_UI32 index)
 {
-    RTS_UNUSED(index);
+    if (can.is_slcan && ready(index)) {
+        SlcanRestart(&can.slcan);
+    }
 }

@@ -12,7 +12,13 @@ enum {
     ERROR = '\a', /* of an adapter; ends a line too */
     STANDARD_DIGITS = 3,
     EXTENDED_DIGITS = 8,
-    READ_MAX = 2048, /* bytes per call, so that a babbling line does not stop the rest of the runtime */
+    COUNTER_DIGITS = 3,
+    STATE_SIZE = 2 + 2 * COUNTER_DIGITS,
+    FLAGS_SIZE = 3,
+    FLAG_WARNING = 0x04,
+    FLAG_PASSIVE = 0x20,
+    FLAG_LOST = 0x09, /* its queue was full, or its controller overrun */
+    READ_MAX = 2048,  /* bytes per call, so that a babbling line does not stop the rest of the runtime */
 };
 
 /* ---- text ---- */
@@ -169,23 +175,30 @@ static void put_command(SLCAN *slcan, char letter, char code)
     slcan->out[slcan->out_size++] = END;
 }
 
+/* Whatever the line has not taken yet is forgotten. */
+static void open_adapter(SLCAN *slcan)
+{
+    slcan->out_size = slcan->out_sent = 0;
+    slcan->bus = CAN_BUS_ACTIVE;
+    slcan->tx_errors = slcan->rx_errors = 0;
+    put_command(slcan, 'C', 0);
+    put_command(slcan, 'S', code_of(slcan->bit_rate));
+    if (slcan->data_bit_rate != 0)
+        put_command(slcan, 'Y', (char)('0' + slcan->data_bit_rate / 1000000));
+    put_command(slcan, 'O', 0);
+    (void)flush(slcan);
+}
+
 RTS_RESULT SlcanOpen(SLCAN *slcan, SLCAN_LINE line, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
 {
-    char code = code_of(bit_rate);
-    char data_code = (char)('0' + data_bit_rate / 1000000);
-
-    if (code == 0 || (data_bit_rate != 0 && (!CAN_FD || (data_bit_rate != 2000000 && data_bit_rate != 5000000))))
+    if (code_of(bit_rate) == 0 ||
+        (data_bit_rate != 0 && (!CAN_FD || (data_bit_rate != 2000000 && data_bit_rate != 5000000))))
         return ERR_NOT_SUPPORTED;
     memset(slcan, 0, sizeof(*slcan));
     slcan->line = line;
     slcan->bit_rate = bit_rate;
     slcan->data_bit_rate = data_bit_rate;
-    put_command(slcan, 'C', 0);
-    put_command(slcan, 'S', code);
-    if (data_bit_rate != 0)
-        put_command(slcan, 'Y', data_code);
-    put_command(slcan, 'O', 0);
-    (void)flush(slcan);
+    open_adapter(slcan);
     return ERR_OK;
 }
 
@@ -203,6 +216,8 @@ RTS_RESULT SlcanSend(SLCAN *slcan, const CAN_FRAME *frame)
 {
     if (!CanIsFrame(frame))
         return ERR_PARAMETER;
+    if (slcan->bus == CAN_BUS_OFF)
+        return ERR_DEVICE;
     if (!flush(slcan))
         return ERR_NOBUFFER;
     slcan->out_sent = 0;
@@ -210,6 +225,86 @@ RTS_RESULT SlcanSend(SLCAN *slcan, const CAN_FRAME *frame)
     (void)flush(slcan);
     return ERR_OK;
 }
+
+/* ---- what the adapter says ---- */
+
+static bool get_counter(const char *text, RTS_UI16 *counter)
+{
+    RTS_UI32 value = 0;
+
+    for (RTS_UI32 i = 0; i < COUNTER_DIGITS; i++) {
+        RTS_UI32 digit = digit_of(text[i]);
+        if (digit > 9)
+            return false;
+        value = 10 * value + digit;
+    }
+    *counter = (RTS_UI16)value;
+    return true;
+}
+
+static bool take_state(SLCAN *slcan)
+{
+    static const char letters[] = "awpb"; /* from CAN_BUS_ACTIVE on */
+    const char *letter = memchr(letters, slcan->in[1], sizeof(letters) - 1);
+    RTS_UI16 rx, tx;
+
+    if (letter == NULL || !get_counter(slcan->in + 2, &rx) || !get_counter(slcan->in + 2 + COUNTER_DIGITS, &tx))
+        return false;
+    slcan->bus = (RTS_UI8)(CAN_BUS_ACTIVE + (letter - letters));
+    slcan->rx_errors = rx;
+    slcan->tx_errors = tx;
+    return true;
+}
+
+/* They do not say bus off, and so do not end it. */
+static bool take_flags(SLCAN *slcan)
+{
+    RTS_UI32 flags;
+
+    if (!get_hex(slcan->in + 1, 2, &flags))
+        return false;
+    slcan->lost += (flags & FLAG_LOST) != 0;
+    if (slcan->bus != CAN_BUS_OFF)
+        slcan->bus = (flags & FLAG_PASSIVE) != 0   ? CAN_BUS_PASSIVE
+                     : (flags & FLAG_WARNING) != 0 ? CAN_BUS_WARNING
+                                                   : CAN_BUS_ACTIVE;
+    return true;
+}
+
+static bool take_answer(SLCAN *slcan)
+{
+    if (slcan->fill == STATE_SIZE && slcan->in[0] == 's')
+        return take_state(slcan);
+    return slcan->fill == FLAGS_SIZE && slcan->in[0] == 'F' && take_flags(slcan);
+}
+
+void SlcanAsk(SLCAN *slcan, RTS_UI32 now_ms)
+{
+    if (now_ms - slcan->asked_ms < SLCAN_ASK_MS || !flush(slcan))
+        return;
+    slcan->asked_ms = now_ms;
+    slcan->out_size = slcan->out_sent = 0;
+    put_command(slcan, 'F', 0);
+    (void)flush(slcan);
+}
+
+void SlcanGetState(const SLCAN *slcan, CAN_STATE *state)
+{
+    *state = (CAN_STATE){.bus = (CAN_BUS_STATE)slcan->bus,
+                         .bit_rate = slcan->bit_rate,
+                         .data_bit_rate = slcan->data_bit_rate,
+                         .tx_errors = slcan->tx_errors,
+                         .rx_errors = slcan->rx_errors,
+                         .lost = slcan->lost};
+}
+
+void SlcanRestart(SLCAN *slcan)
+{
+    if (slcan->bus == CAN_BUS_OFF)
+        open_adapter(slcan);
+}
+
+/* ---- receiving ---- */
 
 /* True when the byte ends the line of a frame that passes. */
 static bool take_byte(SLCAN *slcan, char byte, CAN_FRAME *frame)
@@ -221,6 +316,8 @@ static bool take_byte(SLCAN *slcan, char byte, CAN_FRAME *frame)
         return false;
     }
     bool whole = byte == END && !slcan->too_long && SlcanDecode(slcan->in, slcan->fill, frame);
+    if (!whole && byte == END && !slcan->too_long)
+        (void)take_answer(slcan);
     slcan->lost += slcan->too_long || (!whole && slcan->fill > EXTENDED_DIGITS);
     slcan->fill = 0;
     slcan->too_long = false;

@@ -82,20 +82,22 @@ RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)
     RTS_RESULT result = is_open ? SlcanReceive(&slcan, frame) : ERR_NOTHING_TO_DO;
     if (result == ERR_OK)
         frame->time_us = 1000 * SysTimeGetMs();
+    else if (is_open)
+        SlcanAsk(&slcan, SysTimeGetMs());
     return result;
 }
 
-/* The errors of the bus are those of the adapter, which keeps them. */
 void SysCanGetState(RTS_UI32 index, CAN_STATE *state)
 {
     RTS_UNUSED(index);
-    *state = (CAN_STATE){.bus = is_open ? CAN_BUS_ACTIVE : CAN_BUS_STOPPED,
-                         .bit_rate = slcan.bit_rate,
-                         .data_bit_rate = slcan.data_bit_rate,
-                         .lost = slcan.lost};
+    SlcanGetState(&slcan, state);
+    if (!is_open)
+        state->bus = CAN_BUS_STOPPED;
 }
 
 void SysCanRestart(RTS_UI32 index)
 {
     RTS_UNUSED(index);
+    if (is_open)
+        SlcanRestart(&slcan);
 }
