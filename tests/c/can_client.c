@@ -10,7 +10,7 @@
 #include "comm_fakes.h"
 
 #define NS_PER_MS 1000000
-enum { PATIENCE_MS = 5000, QUIET_MS = 150 };
+enum { PATIENCE_MS = 5000, QUIET_MS = 150, SETTLE_STEPS = 4000 };
 
 static struct {
     CAN_TOOL tool[CAN_TOOLS];
@@ -75,6 +75,15 @@ static void poll_tool(CAN_TOOL *tool)
     (void)IsoTpReceiveExpired(&tool->rx, fakes.now_ms);
 }
 
+void can_restart(CAN_TOOL *tool)
+{
+    memset(&tool->tx, 0, sizeof(tool->tx));
+    memset(&tool->rx, 0, sizeof(tool->rx));
+    tool->rx.buffer = tool->in;
+    tool->rx.capacity = sizeof(tool->in);
+    tool->count = 0;
+}
+
 bool can_put(CAN_TOOL *tool, const RTS_UI8 *packet, RTS_UI32 size)
 {
     if (IsoTpIsSending(&tool->tx))
@@ -125,6 +134,14 @@ void can_pass(RTS_UI32 ms)
         step();
 }
 
+void can_settle(void)
+{
+    for (RTS_UI32 idle = 0, steps = 0; idle < 2 && steps < SETTLE_STEPS; steps++) {
+        idle = SimCanNext() == INT64_MAX ? idle + 1 : 0;
+        step();
+    }
+}
+
 /* ---- for comm_client.h ---- */
 
 static void send_packet(void *instance, const RTS_UI8 *packet, RTS_UI32 size)
@@ -151,8 +168,7 @@ CAN_TOOL *can_tool(RTS_UI8 address)
 
     tool->node = bus.tools; /* the device is 0 */
     tool->address = address;
-    tool->rx.buffer = tool->in;
-    tool->rx.capacity = sizeof(tool->in);
+    can_restart(tool);
     tool->link = (CLIENT_LINK){send_packet, receive_packet, tool};
     SimCanStart(tool->node);
     const CAN_FILTER own = {CAN_ID_BASE | (RTS_UI32)address << CAN_TARGET_SHIFT, 0x1FFFFF00, true};

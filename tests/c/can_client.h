@@ -43,6 +43,12 @@ void can_frame(const CAN_TOOL *tool, RTS_UI8 target, const void *data, RTS_UI8 s
 /* Lets time pass on the bus, in the device and in all tools. */
 void can_pass(RTS_UI32 ms);
 
+/* The same until nothing is sent any more. */
+void can_settle(void);
+
+/* The tool forgets what it was sending and receiving. */
+void can_restart(CAN_TOOL *tool);
+
 /* Begins to send a packet to the device; and takes one that has arrived, 0 when there is none. */
 bool can_put(CAN_TOOL *tool, const RTS_UI8 *packet, RTS_UI32 size);
 RTS_UI32 can_take(CAN_TOOL *tool, RTS_UI8 *packet, RTS_UI32 capacity);

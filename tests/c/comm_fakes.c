@@ -34,6 +34,9 @@
 #include "SysLock.h"
 #include "SysTime.h"
 
+/* COMM_CAN_TESTED: 1 the driver of CAN in place of those of networks, 2 beside them. */
+#define NETWORK_TESTED (COMM_ENDPOINTS && COMM_CAN_TESTED != 1)
+
 FAKES fakes;
 
 /* ---- system ---- */
@@ -397,7 +400,8 @@ const BLK_COUNTERS *const BlkCounters[] = {
     &BlkDrvComCounters,
 #if COMM_CAN_TESTED
     &BlkDrvCanCounters,
-#elif COMM_ENDPOINTS
+#endif
+#if NETWORK_TESTED
     &BlkDrvTcpCounters,
     &BlkDrvUdpCounters,
 #endif
@@ -422,7 +426,8 @@ void fakes_hook(CMP_HOOK hook)
         CmpBlkDrvSimpleCom_Hook,
 #if COMM_CAN_TESTED
         CmpBlkDrvCan_Hook,
-#elif COMM_ENDPOINTS
+#endif
+#if NETWORK_TESTED
         CmpBlkDrvTcp_Hook,
         CmpBlkDrvUdp_Hook,
 #endif

@@ -1,17 +1,18 @@
 /*
- * fuzz_lines.c - whole conversations of five peers on three lines at once: each gets what is its own, and afterwards every
- * line serves a new client.
+ * fuzz_lines.c - whole conversations of seven peers on four lines at once: each gets what is its own, and afterwards
+ * every line serves a new client.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
  * Input: steps, each a byte (bits 0..2 the peer, bits 3..5 what it does), two bytes of length, low byte first, and as
- * many bytes. Peer 0 is on the serial line, 1 and 2 send datagrams, 3 and 4 have a connection. A peer has a client that
- * puts in what a recording (make_corpus.py) cannot know: channel ids, sessions, CRCs.
+ * many bytes. Peer 0 is on the serial line, 1 and 2 send datagrams, 3 and 4 have a connection, 5 and 6 are tools on CAN.
+ * A peer has a client that puts in what a recording (make_corpus.py) cannot know: channel ids, sessions, CRCs.
  */
 #include <string.h>
 
 #include "CmpBytes.h"
 #include "CmpPackets.h"
+#include "can_client.h"
 #include "comm_client.h"
 #include "comm_fakes.h"
 #include "fuzz.h"
@@ -22,7 +23,7 @@ typedef enum {
     STEP_MESSAGE, /* of layer 7, on a channel that is opened when there is none */
     STEP_PACKAGE, /* of layer 4 */
     STEP_PACKET,  /* of layer 3, as it is */
-    STEP_BYTES,   /* on the line; a datagram */
+    STEP_BYTES,   /* on the line; a datagram; frames, each after a byte: bits 0..3 its size, bit 4 to all */
     STEP_WAIT,    /* 10 ms for each unit of length */
     STEP_VANISH,  /* the client begins again without a word; a connection ends */
     STEP_OPEN,
@@ -33,9 +34,11 @@ enum {
     LINE_SERIAL,
     LINE_UDP,
     LINE_TCP = 3,
-    FUZZED = 5, /* peers */
+    LINE_CAN = 5,
+    FUZZED = 7, /* peers */
     LATER_UDP = FUZZED,
     LATER_TCP,
+    LATER_CAN,
     PEERS,
 
     HEAD = 3,
@@ -45,6 +48,11 @@ enum {
     MAX_GRANTED = 64,
     FIRST_WORD = 0x0102, /* addresses of peers */
     FIRST_PORT = 50100,
+    FIRST_TOOL = 200, /* addresses on CAN */
+    LISTENER = SIM_CAN_NODES - 1,
+    SIZE_MASK = 0x0F,
+    TO_ALL = 0x10,
+    BIT_RATE = 500000,
 };
 
 typedef struct {
@@ -54,9 +62,18 @@ typedef struct {
     RTS_UI16 granted[MAX_GRANTED]; /* channels, in turn */
     uint32_t grants;
     uint32_t seen; /* bytes on its connection that were looked at */
+    CAN_TOOL *tool;
 } PEER;
 
 static PEER peers[PEERS];
+
+static int line_of(const PEER *peer)
+{
+    static const int lines[PEERS] = {LINE_SERIAL, LINE_UDP, LINE_UDP, LINE_TCP, LINE_TCP,
+                                     LINE_CAN,    LINE_CAN, LINE_UDP, LINE_TCP, LINE_CAN};
+
+    return lines[peer - peers];
+}
 
 /* ---- what the device sends ---- */
 
@@ -90,6 +107,23 @@ static void check_packet(PEER *peer, const uint8_t *packet, uint32_t size)
     FUZZ_CHECK(size >= header);
     if (packet[3] == ROUTER_SVC_CHANNEL)
         check_package(peer, packet + header, size - header);
+}
+
+/* Frames are of the device and for a tool that has sent something. */
+static void check_frames(void)
+{
+    CAN_FRAME frame;
+
+    while (SimCanReceive(LISTENER, &frame) == ERR_OK) {
+        uint32_t target = frame.id >> CAN_TARGET_SHIFT & CAN_ADDRESS_MASK;
+        bool is_sent = false;
+        if ((frame.id & CAN_ADDRESS_MASK) >= CAN_TOOL_MIN)
+            continue;
+        for (uint32_t i = 0; i < PEERS; i++)
+            is_sent |= line_of(&peers[i]) == LINE_CAN && peers[i].has_sent && peers[i].tool->address == target;
+        FUZZ_CHECK((frame.id & CAN_ADDRESS_MASK) == DEVICE_NODE && is_sent && frame.size != 0);
+        FUZZ_CHECK(IsoTpKind(frame.data, frame.size) != ISOTP_OTHER);
+    }
 }
 
 static uint32_t take_datagram(const PEER *peer, uint8_t *packet)
@@ -143,12 +177,14 @@ static RTS_UI32 receive(void *instance, RTS_UI8 *packet, RTS_UI32 capacity)
     PEER *peer = instance;
     uint32_t size;
 
-    if (peer == &peers[LINE_SERIAL])
+    if (line_of(peer) == LINE_SERIAL)
         size = (uint32_t)serial_take(data);
-    else if (peer < &peers[LINE_TCP] || peer == &peers[LATER_UDP])
+    else if (line_of(peer) == LINE_UDP)
         size = take_datagram(peer, data);
-    else
+    else if (line_of(peer) == LINE_TCP)
         size = take_from_connection(peer, data);
+    else
+        size = can_take(peer->tool, data, sizeof(data));
     if (size == 0)
         return 0;
     FUZZ_CHECK(peer->has_sent && size <= capacity);
@@ -159,16 +195,47 @@ static RTS_UI32 receive(void *instance, RTS_UI8 *packet, RTS_UI32 capacity)
 
 /* ---- what peers send ---- */
 
+/* The listener takes part, so that what it has not looked at yet does not get lost. */
+static void settle(void)
+{
+    can_settle();
+    check_frames();
+}
+
+static void send_frames(const CAN_TOOL *tool, const uint8_t *data, uint32_t size)
+{
+    while (size != 0) {
+        uint8_t head = *data++;
+        uint32_t part = head & SIZE_MASK;
+        size--;
+        part = part < size ? part : size;
+        part = part < CAN_CLASSIC_SIZE ? part : CAN_CLASSIC_SIZE;
+        can_frame(tool, (head & TO_ALL) != 0 ? CAN_TO_ALL : DEVICE_NODE, data, (RTS_UI8)part);
+        data += part;
+        size -= part;
+        settle();
+    }
+}
+
 static void send_bytes(PEER *peer, const uint8_t *data, uint32_t size)
 {
     peer->has_sent = true;
-    if (peer == &peers[LINE_SERIAL])
+    if (line_of(peer) == LINE_SERIAL)
         serial_deliver(data, size);
-    else if (peer < &peers[LINE_TCP] || peer == &peers[LATER_UDP])
+    else if (line_of(peer) == LINE_UDP)
         sockets_give_datagram((SOCKADDRESS){SOCKETS_OWN_IP, (RTS_UI16)(FIRST_PORT + (peer - peers))}, data, size);
-    else
+    else if (line_of(peer) == LINE_TCP)
         sockets_give(connection_of(peer), data, size);
+    else
+        send_frames(peer->tool, data, size);
     fakes_cycle(0);
+}
+
+static void send_on_can(PEER *peer, const uint8_t *packet, uint32_t size)
+{
+    peer->has_sent = true;
+    (void)can_put(peer->tool, packet, size);
+    settle();
 }
 
 static void send(void *instance, const RTS_UI8 *packet, RTS_UI32 size)
@@ -176,12 +243,14 @@ static void send(void *instance, const RTS_UI8 *packet, RTS_UI32 size)
     static uint8_t frame[2 * CLIENT_LONGEST + 8];
     PEER *peer = instance;
 
-    if (peer == &peers[LINE_SERIAL])
+    if (line_of(peer) == LINE_SERIAL)
         send_bytes(peer, frame, (uint32_t)serial_frame(packet, size, frame));
-    else if (peer < &peers[LINE_TCP] || peer == &peers[LATER_UDP])
+    else if (line_of(peer) == LINE_UDP)
         send_bytes(peer, packet, size);
-    else
+    else if (line_of(peer) == LINE_TCP)
         send_bytes(peer, frame, sockets_frame(packet, size, frame));
+    else
+        send_on_can(peer, packet, size);
 }
 
 /* ---- a step ---- */
@@ -253,9 +322,11 @@ static void begin(PEER *peer)
 
 static void vanish(PEER *peer)
 {
-    if (peer >= &peers[LINE_TCP])
+    if (line_of(peer) == LINE_CAN)
+        can_restart(peer->tool);
+    else if (line_of(peer) == LINE_TCP)
         connection_of(peer)->ended = true;
-    else if (peer >= &peers[LINE_UDP])
+    else if (line_of(peer) == LINE_UDP)
         sockets.refused = (SOCKADDRESS){SOCKETS_OWN_IP, (RTS_UI16)(FIRST_PORT + (peer - peers))};
     begin(peer);
 }
@@ -290,6 +361,7 @@ static void step(PEER *peer, STEP what, uint8_t *data, uint32_t size)
         break;
     }
     fakes_cycle(1);
+    settle();
     for (uint32_t i = 0; i < PEERS; i++)
         drain(&peers[i]);
     check_datagrams();
@@ -318,7 +390,11 @@ static void start(void)
         peers[i].link = (CLIENT_LINK){send, receive, &peers[i]};
         begin(&peers[i]);
     }
-    fakes_start();
+    can_start(BIT_RATE, 0);
+    SimCanStart(LISTENER);
+    for (uint32_t i = 0; i < PEERS; i++)
+        if (line_of(&peers[i]) == LINE_CAN)
+            peers[i].tool = can_tool((RTS_UI8)(FIRST_TOOL + i));
     fakes_cycle(0);
 }
 
@@ -343,9 +419,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fakes_cycle(CHANNEL_IDLE_MS);
     sockets.dialled = SOCKETS_TCP;
     fakes_cycle(0);
+    settle();
     fakes.line_out_size = 0;
     check_served(&peers[LATER_UDP]);
     check_served(&peers[LATER_TCP]);
+    check_served(&peers[LATER_CAN]);
     serial_deliver((const uint8_t *)"#>#>", 4); /* the end of what was begun */
     check_served(&peers[LINE_SERIAL]);
     return 0;
@@ -353,13 +431,21 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 
 /* ---- inputs ---- */
 
-/* Three open channels, time passes, one vanishes and one closes. The others are recordings. */
+/* Three open channels, time passes, one vanishes and one closes; two tools on CAN of which one leaves a packet in its
+ * midst, and a scan. The others are recordings. */
 size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
 {
-    static const uint8_t steps[] = {0x30, 1, 0, 0x31, 2, 0, 0x33, 3, 0, 0x20, 0x40, 0, 0x2B, 0, 0, 0x38, 0, 0};
+    static const uint8_t three[] = {0x30, 1, 0, 0x31, 2, 0, 0x33, 3, 0, 0x20, 0x40, 0, 0x2B, 0, 0, 0x38, 0, 0};
+    static const uint8_t can[] = {0x35, 1,    0,    0x1E, 9,    0, 8,    0x10, 0x60, 0xC5, 0x6B, 0x40,
+                                  0x40, 0x00, 0x11, 0x36, 2,    0, 0x2D, 0,    0,    0x1D, 9,    0,
+                                  0x18, 0x40, 0x01, 0x00, 0x04, 1, 2,    3,    4,    0x20, 0xC8, 0};
+    static const struct {
+        const uint8_t *data;
+        size_t size;
+    } seeds[] = {{three, sizeof(three)}, {can, sizeof(can)}};
 
-    if (index > 0 || sizeof(steps) > capacity)
+    if (index >= RTS_COUNT(seeds) || seeds[index].size > capacity)
         return 0;
-    memcpy(data, steps, sizeof(steps));
-    return sizeof(steps);
+    memcpy(data, seeds[index].data, seeds[index].size);
+    return seeds[index].size;
 }

@@ -183,7 +183,7 @@ DESCRIBED = {
 
 # ---- conversations: fuzz_lines.c says what a step is ----
 
-SERIAL, UDP, OTHER_UDP, TCP, OTHER_TCP = range(5)
+SERIAL, UDP, OTHER_UDP, TCP, OTHER_TCP, CAN, OTHER_CAN = range(7)
 MESSAGE, PACKAGE, PACKET, BYTES, WAIT, VANISH, OPEN, CLOSE = range(8)
 FAKE_IMAGE_CRC = 0x1C2D3E4F  # of comm_fakes.h
 L7_SIZE = 20  # bytes of the header that plctool sends
@@ -291,7 +291,7 @@ def conversations(folder: Path) -> dict[str, bytes]:
     alone = {
         f"{name}_{line}": at_once(spoken(peer, messages))
         for name, messages in said.items()
-        for line, peer in (("serial", SERIAL), ("udp", UDP), ("tcp", TCP))
+        for line, peer in (("serial", SERIAL), ("udp", UDP), ("tcp", TCP), ("can", CAN))
     }
     together = {
         "flash_beside_watching": at_once(spoken(SERIAL, flash), spoken(TCP, watch)),
@@ -299,6 +299,8 @@ def conversations(folder: Path) -> dict[str, bytes]:
             spoken(SERIAL, watch), spoken(UDP, look), spoken(OTHER_UDP, control), spoken(TCP, watch)
         ),
         "five_for_four_places": at_once(*(spoken(peer, look) for peer in range(5))),
+        "tools_on_can": at_once(spoken(CAN, flash), spoken(OTHER_CAN, watch), spoken(SERIAL, look)),
+        "vanishes_on_can": b"".join([*spoken(CAN, flash)[:cut], step(CAN, VANISH), *spoken(OTHER_CAN, control)]),
         "vanishes_in_a_download": b"".join(
             [*spoken(TCP, flash)[:cut], step(TCP, VANISH), *spoken(OTHER_TCP, flash)[:cut], *spoken(SERIAL, watch)]
         ),
