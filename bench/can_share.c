@@ -23,19 +23,20 @@ enum {
     HEADS = 44,           /* of the message and its elements */
     UNIT = 16,            /* pieces are multiples of it */
     ACKNOWLEDGEMENTS = 4, /* at most, before a reply */
-    UNDER_WAY = 2,        /* messages */
+    UNDER_WAY = 6,        /* messages */
+    FOR_ALL = 4,          /* messages for which there is one reply */
 };
 
 static RTS_UI8 image[IMAGE];
 
-static void send_piece(CLIENT *client, RTS_UI32 offset, RTS_UI32 size)
+static void send_piece(CLIENT *client, RTS_UI32 offset, RTS_UI32 size, bool may_wait)
 {
     static RTS_UI8 content[NETSERVER_MESSAGE_SIZE];
     static RTS_UI8 message[NETSERVER_MESSAGE_SIZE];
     CDL_POSITION position;
     BTAG_WRITER writer;
 
-    BytesPut32(position.flags, offset == 0 ? 0 : DLF_CONTINUEDOWNLOAD);
+    BytesPut32(position.flags, (offset == 0 ? 0 : DLF_CONTINUEDOWNLOAD) | (may_wait ? DLF_REPLYMAYWAIT : 0));
     BytesPut32(position.offset, offset);
     BytesPut32(position.total_size, IMAGE);
     BytesPut32(position.crc, 0x12345678);
@@ -72,17 +73,33 @@ static RTS_UI32 piece_of(const CLIENT *client, RTS_UI32 longest)
     return ((filled == 0 ? longest : filled - PREFIX) - HEADS) / UNIT * UNIT;
 }
 
+/* Each FOR_ALL pieces have one reply, and so has the last one. */
+static bool has_reply(RTS_UI32 piece, RTS_UI32 pieces)
+{
+    return piece % FOR_ALL == FOR_ALL - 1 || piece + 1 == pieces;
+}
+
 static bool send_image(CLIENT *client, RTS_UI32 longest)
 {
     RTS_UI32 piece = piece_of(client, longest);
+    RTS_UI32 pieces = (IMAGE + piece - 1) / piece;
+    RTS_UI32 replied = 0;
     RTS_UI32 arrived = 0;
 
-    for (RTS_UI32 offset = 0; offset < IMAGE; offset += piece) {
-        send_piece(client, offset, IMAGE - offset < piece ? IMAGE - offset : piece);
-        if (offset >= (UNDER_WAY - 1) * piece)
-            arrived = take_reply(client);
+    for (RTS_UI32 sent = 0; sent < pieces || replied < pieces;) {
+        RTS_UI32 left = IMAGE - sent * piece;
+        if (sent < pieces && sent - replied < UNDER_WAY) {
+            send_piece(client, sent * piece, left < piece ? left : piece, !has_reply(sent, pieces));
+            sent++;
+            continue;
+        }
+        for (; !has_reply(replied, pieces); replied++)
+            client->received++;
+        replied++;
+        if ((arrived = take_reply(client)) == 0)
+            return false;
     }
-    return arrived == IMAGE || take_reply(client) == IMAGE;
+    return arrived == IMAGE;
 }
 
 static double frame_seconds(RTS_UI32 size, bool fd)

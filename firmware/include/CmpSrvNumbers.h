@@ -111,10 +111,11 @@ enum {
     CHANNEL_TIMEOUT_MS = 30000,
     CHANNEL_IDLE_MS = 5000,
     CHANNEL_COMPLAINT_MS = 100,
-    CHANNEL_LOGIN_MS = 5000,   /* on a network or bus: a channel ends when it has had no login for so long */
-    CHANNEL_PROBE_MS = 200,    /* what has been silent for so long is sent something when all channels are in use */
-    CHANNEL_SETTLE_MS = 1000,  /* and is not given to another peer before, once it has been used */
-    CHANNEL_MIN_MESSAGE = 128, /* an open request for a smaller buffer is ignored */
+    CHANNEL_LOGIN_MS = 5000,      /* on a network or bus: a channel ends when it has had no login for so long */
+    CHANNEL_REPLY_WAIT_MS = 1000, /* a reply that may wait is sent when nothing has come for so long */
+    CHANNEL_PROBE_MS = 200,       /* what has been silent for so long is sent something when all channels are in use */
+    CHANNEL_SETTLE_MS = 1000,     /* and is not given to another peer before, once it has been used */
+    CHANNEL_MIN_MESSAGE = 128,    /* an open request for a smaller buffer is ignored */
 };
 
 /* ---- layer 7 (4.1) ---- */

@@ -88,6 +88,9 @@ typedef struct {
 typedef struct {
     CHANNEL channel;
     SRV_SESSION session;
+#if COMM_ENDPOINTS
+    bool reply_may_wait; /* set by a service: the reply to the next request, if that comes soon, will do for both */
+#endif
 #if COMM_PASSWORD
     bool login_paused; /* by CmpUserMgr, for all that get this channel, from then on */
     RTS_UI32 paused_since;

@@ -216,6 +216,7 @@ enum {
     DLF_CONTINUEDOWNLOAD = 1,
     DLF_USEBOOTAPPFROMDOWNLOAD = 2,
     DLF_WRITEBOOTAPPLICATION = 4,
+    DLF_REPLYMAYWAIT = 0x100, /* own, of the service: the next block follows at once, and its reply will do for both */
 };
 
 /* Device identities that plctool compiles for. Vendor 0 is the open default; a vendor's own id comes from SysTarget. */

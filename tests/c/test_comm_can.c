@@ -85,6 +85,99 @@ static void a_tool_that_asks_may_send_long_packets(void)
     CHECK_EQUAL(packets_of_an_echo(4095), 1);
 }
 
+enum { PIECE = 100, TOTAL = 3 * PIECE };
+
+static void send_piece(CLIENT *client, RTS_UI32 offset, RTS_UI32 flags)
+{
+    RTS_UI8 content[PIECE + 32];
+    RTS_UI8 message[PIECE + 64];
+    CDL_POSITION position;
+    BTAG_WRITER writer;
+
+    BytesPut32(position.flags, flags);
+    BytesPut32(position.offset, offset);
+    BytesPut32(position.total_size, TOTAL);
+    BytesPut32(position.crc, 0x12345678);
+    BTagWriterInit(&writer, content, sizeof(content));
+    BTagWrite(&writer, TAG_CDL_POSITION, BTAG_ALIGN_0, &position, sizeof(position));
+    BTagWrite(&writer, TAG_CDL_DATA, BTAG_ALIGN_0, payload, PIECE);
+    client_send_message(
+        client, message,
+        client_message(client, SG_APPLICATION, SRV_APP_DOWNLOAD_COMPACT, content, writer.size, message));
+}
+
+/* What the device has by now, as the next block it sends says, which has this number; 0: it sends none. */
+static RTS_UI32 arrived(CLIENT *client, RTS_UI32 number)
+{
+    RTS_UI8 message[NETSERVER_MESSAGE_SIZE];
+    REPLY reply;
+
+    client->received = number - 1;
+    RTS_UI32 size = client_take_message(client, message);
+    if (size < 20)
+        return 0;
+    BTagReaderInit(&reply.tags, message + 20, size - 20);
+    return reply_number(&reply, TAG_CDL_NEXT);
+}
+
+static void start_download(CLIENT *client)
+{
+    can_start(500 * KBIT, 0);
+    CHECK(can_connect(client, can_tool(200)));
+    send_piece(client, 0, DLF_REPLYMAYWAIT);
+    can_pass(CHANNEL_REPLY_WAIT_MS / 2);
+    CHECK_EQUAL(arrived(client, client->received + 1), 0);
+}
+
+static void a_reply_that_may_wait_is_left_out(void)
+{
+    CLIENT client;
+
+    start_download(&client);
+    RTS_UI32 number = client.received + 1;
+    send_piece(&client, PIECE, DLF_CONTINUEDOWNLOAD | DLF_REPLYMAYWAIT);
+    send_piece(&client, 2 * PIECE, DLF_CONTINUEDOWNLOAD);
+    CHECK_EQUAL(arrived(&client, number + 2), TOTAL);
+    CHECK_EQUAL(arrived(&client, number + 3), 0);
+    CHECK(ask(&client));
+    can_end();
+}
+
+static void a_reply_that_waits_is_sent_when_nothing_else_comes(void)
+{
+    CLIENT client;
+
+    start_download(&client);
+    RTS_UI32 number = client.received + 1;
+    can_pass(CHANNEL_REPLY_WAIT_MS / 2);
+    CHECK(arrived(&client, number) == PIECE || arrived(&client, number) == PIECE); /* after a keepalive */
+    can_end();
+}
+
+static void a_reply_that_waits_is_sent_when_the_tool_polls(void)
+{
+    CLIENT client;
+    RTS_UI8 package[BLK_MAX_SIZE];
+
+    start_download(&client);
+    RTS_UI32 number = client.received + 1;
+    client_send_block(&client, client.sent, CHANNEL_FLAG_TO_SERVER, payload, 0, 0, 0);
+    CHECK(client_take(&client, NULL, package) != 0 && package[0] == CHANNEL_PKG_ACK);
+    CHECK_EQUAL(arrived(&client, number), PIECE);
+    can_end();
+}
+
+static void a_refusal_does_not_wait(void)
+{
+    CLIENT client;
+
+    start_download(&client);
+    RTS_UI32 number = client.received + 2;
+    send_piece(&client, 2 * PIECE, DLF_CONTINUEDOWNLOAD | DLF_REPLYMAYWAIT);
+    CHECK_EQUAL(arrived(&client, number), PIECE);
+    can_end();
+}
+
 static void two_tools_are_served_at_once(void)
 {
     CLIENT a;
@@ -393,6 +486,10 @@ int main(void)
 {
     RUN(a_tool_logs_in_on_classic_can_and_fd);
     RUN(a_tool_that_asks_may_send_long_packets);
+    RUN(a_reply_that_may_wait_is_left_out);
+    RUN(a_reply_that_waits_is_sent_when_nothing_else_comes);
+    RUN(a_reply_that_waits_is_sent_when_the_tool_polls);
+    RUN(a_refusal_does_not_wait);
     RUN(two_tools_are_served_at_once);
     RUN(packets_of_several_tools_arrive_at_the_same_time);
     RUN(more_packets_than_there_is_room_for_are_sent_again);

@@ -373,6 +373,7 @@ class Wire:
     places = NO_PLACES
     byte_rate = math.inf
     is_slow = False
+    is_bus = False
 
     def __init__(self, fd: int) -> None:
         self.fd = fd

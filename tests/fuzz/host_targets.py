@@ -74,6 +74,7 @@ class Replies(Connection):
     is_open = True
     buffer_size = best_size = 2048
     is_slow = False
+    is_bus = False
 
     def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
         asked = l7.decode(message)

@@ -56,6 +56,7 @@ class FakeLine:
         self.rate = baud / BITS_PER_BYTE
         self.byte_rate = self.rate if known_rate else math.inf
         self.is_slow = True
+        self.is_bus = False
         self.cut = False  # a cut line carries nothing
         self.gone = False  # an unplugged adapter raises
         self.sent_bytes = 0
@@ -146,6 +147,7 @@ class FakeDevice:
         self.messages: list[bytes] = []
         self.requests_repeated = 0
         self._decoder = simplecom.Decoder(simplecom.LONG_PACKET)
+        self.leaves_out: Callable[[bytes], bool] = lambda message: False  # the reply to this, unless it is asked for
         self._peer = b""
         self._ids = itertools.count(0x5A01)
         self._reset_channel(0, 0)
@@ -267,6 +269,8 @@ class FakeDevice:
             packages.append(head + message[at : at + 500 - len(head)])
             at += 500 - len(head)
         self._reply = _Reply(packages, self._sent)
+        if self.leaves_out(self.messages[-1]):
+            return
         self._send_reply(self._reply)
         self._repeat_later(self._reply)
 

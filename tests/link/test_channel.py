@@ -269,6 +269,40 @@ def test_streams_lose_no_request_and_invent_no_reply(seed: int, count: int) -> N
     assert replies[-1] == acknowledge(messages[-1])
 
 
+def leaves_out(message: bytes) -> bool:
+    """A reply is left out for all but each fourth and the last one of ten."""
+    return message[0] % 4 != 3 and message[0] != 9
+
+
+def test_requests_may_share_replies() -> None:
+    device = FakeDevice(acknowledge, buffer_size=2048)
+    device.leaves_out = leaves_out
+    connection = connect(FakeLine(device))
+    messages = [bytes([n]) * 2000 for n in range(10)]
+    begin = connection.now()
+    assert [reply[0] for reply in connection.stream(messages, sharing=True)] == [3, 7, 9]
+    assert device.messages == messages and device.requests_repeated == 0
+    assert connection.now() - begin < 1.1 * 10 * 2000 / connection.transport.byte_rate
+    assert connection.exchange(b"after") == acknowledge(b"after")
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32), st.sampled_from([0.0002, 0.001]))
+def test_shared_replies_arrive_over_bad_lines(seed: int, rate: float) -> None:
+    device = FakeDevice(acknowledge, buffer_size=2048)
+    device.leaves_out = leaves_out
+    connection = connect(FakeLine(device, to_device=damage(seed, rate), to_client=damage(seed + 1, rate)))
+    messages = [bytes([n]) * 2000 for n in range(10)]
+    try:
+        replies = list(connection.stream(messages, sharing=True))
+        last = connection.exchange(b"after")
+    except ChannelLost:
+        reject()
+    assert device.messages == [*messages, b"after"]
+    assert set(replies) <= {acknowledge(m) for m in messages}
+    assert (replies[-1], last) == (acknowledge(messages[-1]), acknowledge(b"after"))
+
+
 class Dropper:
     """Damages the frames with the given numbers (counted from 1 after `arm`) and no others."""
 

@@ -91,6 +91,7 @@ class SocketSerial:
     places = NO_PLACES
     byte_rate = math.inf
     is_slow = False
+    is_bus = False
     local_address = b"\x00\x02"
 
     def __init__(self, port: int) -> None:

@@ -447,6 +447,17 @@ static RTS_RESULT take_block(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *bl
     return write_new_part(block);
 }
 
+/* On a bus replies take the time of what is sent to the device. A question has its reply in any case. */
+static void let_reply_wait(const SRV_REQUEST *request, const DOWNLOAD_BLOCK *block, RTS_RESULT result)
+{
+#if COMM_ENDPOINTS
+    request->client->reply_may_wait = result == ERR_OK && block->size != 0 && (block->flags & DLF_REPLYMAYWAIT) != 0;
+#endif
+    RTS_UNUSED(request);
+    RTS_UNUSED(block);
+    RTS_UNUSED(result);
+}
+
 static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     enum { REASON_OVERHEAD = 8 }; /* head of the element, NUL, padding; the smallest message has room for more */
@@ -462,6 +473,7 @@ static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
     RTS_UI32 next = bytes_received(&block);
     if (result == ERR_OK && is_under_way(&block) && next == block.total)
         result = AppDownloadEnd(&refusal);
+    let_reply_wait(request, &block, result);
     BTagWrite16(reply, TAG_SERVICE_RESULT, result);
     BTagWrite32(reply, TAG_CDL_NEXT, next);
 #if APP_UNPACK_SIZE > 0

@@ -151,9 +151,30 @@ static RTS_RESULT send_short(const CHANNEL *channel, RTS_UI8 type, RTS_UI8 flags
 
 /* ---- life of the channel ---- */
 
+/* Whether the reply is kept back, because the one to the next request will do for both (reply_may_wait). */
+static bool is_reply_waiting(const COMM_CLIENT *client)
+{
+#if COMM_ENDPOINTS
+    return client->reply_may_wait;
+#else
+    RTS_UNUSED(client);
+    return false;
+#endif
+}
+
+static void let_reply_go(COMM_CLIENT *client)
+{
+#if COMM_ENDPOINTS
+    client->reply_may_wait = false;
+#else
+    RTS_UNUSED(client);
+#endif
+}
+
 static void forget_channel(COMM_CLIENT *client)
 {
     client->channel.id = 0;
+    let_reply_go(client);
     SrvEndSession(client);
 }
 
@@ -443,7 +464,7 @@ static RTS_RESULT send_next(COMM_CLIENT *client, RTS_UI32 now_ms)
             send_short(channel, CHANNEL_PKG_ACK, channel->missing_due ? CHANNEL_FLAG_MISSING : 0, sizeof(CHANNEL_ACK));
         channel->ack_due = result != ERR_OK;
         channel->missing_due = channel->missing_due && channel->ack_due;
-    } else if (channel->tx.sent < channel->tx.count) {
+    } else if (channel->tx.sent < channel->tx.count && !is_reply_waiting(client)) {
         result = send_block(client);
         if (result == ERR_OK) {
             channel->tx.sent++;
@@ -510,6 +531,7 @@ static RTS_RESULT handle_message(COMM_CLIENT *client)
 
     if (CRC32Update(0, message, size) != BytesGet32(head->crc))
         return ERR_CHS_CHECKSUM;
+    let_reply_go(client);
     size = SrvHandleMessage(client, message, size, client->reply + COMM_PREFIX_SIZE, client->channel.limit);
     if (size == 0)
         return ERR_CHS_REQNOTHANDLED;
@@ -566,9 +588,12 @@ static bool is_guessing(RTS_UI32 now_ms)
 }
 
 /* A block received before: its acknowledgement was lost, and perhaps the reply too. */
-static void handle_duplicate(CHANNEL *channel, RTS_UI32 now_ms)
+static void handle_duplicate(COMM_CLIENT *client, RTS_UI32 now_ms)
 {
+    CHANNEL *channel = &client->channel;
+
     COMM_COUNT(counters.duplicates);
+    let_reply_go(client);
     channel->ack_due = true;
     if (is_waiting_for_ack(&channel->tx) && now_ms - channel->tx.sent_at >= REPEAT_GAP_MS)
         repeat_reply(&channel->tx);
@@ -607,7 +632,7 @@ static void handle_data(COMM_CLIENT *client, const CHANNEL_DATA *data, RTS_UI32 
     if (ahead == 1)
         result = accept_block(client, is_first, (const RTS_UI8 *)(data + 1), size - (RTS_UI32)sizeof(*data));
     else if ((RTS_I32)ahead <= 0)
-        handle_duplicate(channel, now_ms);
+        handle_duplicate(client, now_ms);
     else
         handle_gap(channel, ahead);
     if (COMM_ENDPOINTS && result == ERR_CHS_CHECKSUM)
@@ -755,6 +780,8 @@ static void cycle_client(COMM_CLIENT *client, RTS_UI32 now_ms)
         close_channel(client, ERR_CHS_TIMEOUT);
         return;
     }
+    if (now_ms - client->channel.last_received >= CHANNEL_REPLY_WAIT_MS)
+        let_reply_go(client);
     if (!is_reliable(&client->channel.peer))
         repeat_when_overdue(&client->channel.tx, now_ms);
     pump(client, now_ms);

@@ -213,6 +213,7 @@ class GatewayConnection:
         self.buffer_size = 0
         self.best_size = 0
         self.is_slow = False
+        self.is_bus = False  # a bus needs no gateway
         self._place = place
         self._link = link
         self._words = words
@@ -262,8 +263,11 @@ class GatewayConnection:
         number = self._ask(Kind.EXCHANGE, Request(self._channel(), patience, message).encode())
         return self._reply(self._answer(number, patience)).message
 
-    def stream(self, messages: Iterable[bytes], patience: float = PATIENCE) -> Iterator[bytes]:
+    def stream(
+        self, messages: Iterable[bytes], patience: float = PATIENCE, *, sharing: bool = False
+    ) -> Iterator[bytes]:
         """Sends requests, the next ones already while the device works, and yields the replies; see Connection."""
+        assert not sharing
         generation, source = self._channel(), iter(messages)
         following = next(source, None)
         if following is None:

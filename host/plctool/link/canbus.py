@@ -239,6 +239,7 @@ class CanTransport:
         self.packet_overhead = 0
         self.byte_rate = math.inf  # `send` waits for the bus
         self.is_slow = True
+        self.is_bus = True
         self.point_to_point = False
         self.node = node
         self._places: dict[bytes, str] = {}

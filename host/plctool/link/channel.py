@@ -8,7 +8,8 @@ So the client sends all it has and goes back when asked. When nothing is heard, 
 polls: an empty block with a number that the device has already makes it say what it has, and send a lost reply again.
 Blocks are given out at the rate of the line, so that little is thrown away after a loss, and their size follows the
 error rate, because on a bad line most long blocks arrive damaged. Up to two requests may be under way, so that the line
-does not idle while the device works.
+does not idle while the device works, or more if the device replies to several with one reply; a reply that is left out
+counts in the numbers of the device's blocks.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ _ACK = Layout("CHANNEL_ACK")
 
 WANTED_BUFFER = 0x4000  # longest message we would like to send or get, bytes
 MAX_REQUESTS = 2  # requests under way at the same time
+MAX_SHARING = 6  # the same, if several of them share a reply
 _OPEN_RETRY = 0.3  # first repetition of a lost request to open [s]
 _LONGEST_RETRY = 1.0
 _NO_PROGRESS = 2  # times the patience: how long a device may be heard without anything getting on
@@ -145,7 +147,8 @@ class ErrorRate:
 
 
 class Channel:
-    """State machine of one channel: `open`, then `send` up to MAX_REQUESTS messages and take their `replies`."""
+    """State machine of one channel: `open`, then `send` messages, MAX_REQUESTS or MAX_SHARING at a time, and take their
+    `replies`."""
 
     def __init__(self, line: Line, address_words: int, request_id: int) -> None:
         self.state = State.CLOSED
@@ -201,7 +204,7 @@ class Channel:
 
     def send(self, message: bytes, now: float) -> None:
         """Takes a request to be sent."""
-        assert self.state is State.OPEN and self.outstanding < MAX_REQUESTS
+        assert self.state is State.OPEN and self.outstanding < MAX_SHARING
         if len(message) > self.buffer_size:
             raise LinkError(f"A request of {len(message)} bytes is too long for the device.", "too-long")
         self._outbox.append(message)
@@ -435,12 +438,12 @@ class Channel:
         self._receive_ack(head.acknowledged, now)
         if number <= self._received:
             self._acknowledge()  # our acknowledgement was lost
-        elif number > self._received + 1 and not (first and self._unanswered == MAX_REQUESTS):
+        elif number > self._received + 1 and not (first and self._unanswered > 1):
             if now - self._asked_at >= self._round_trip.timeout:
                 self._ask_missing(now)
         elif self._unanswered and self._take(package[_DATA.size :], first):
-            if number > self._received + 1:
-                self._answered()  # the previous reply was lost for good
+            for _ in range(min(number - self._received - 1, self._unanswered - 1)):
+                self._answered()  # a previous reply was left out, or lost for good
             self._received = number
             self._asked_at = -math.inf
             self._progress = now

@@ -12,7 +12,7 @@ from typing import Protocol
 from plctool.core import lib
 from plctool.errors import LinkError
 from plctool.link import names, router
-from plctool.link.channel import MAX_REQUESTS, Channel, ChannelLost, Line, State
+from plctool.link.channel import MAX_REQUESTS, MAX_SHARING, Channel, ChannelLost, Line, State
 from plctool.link.transport import BlockTransport
 
 PATIENCE = 8.0  # default time of silence after which a channel counts as lost [s]
@@ -90,9 +90,15 @@ class MessageLink(Protocol):
     def is_slow(self) -> bool:
         """Whether it pays to pack what is sent; False while no channel is open."""
 
+    @property
+    def is_bus(self) -> bool:
+        """Whether a reply takes the time of what is sent, so that one reply should do for several requests."""
+
     def open(self) -> None: ...
     def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes: ...
-    def stream(self, messages: Iterable[bytes], patience: float = PATIENCE) -> Iterator[bytes]: ...
+    def stream(
+        self, messages: Iterable[bytes], patience: float = PATIENCE, *, sharing: bool = False
+    ) -> Iterator[bytes]: ...
     def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[names.Node]: ...
     def now(self) -> float:
         """Monotonic time in seconds; virtual for virtual lines."""
@@ -140,6 +146,10 @@ class Connection:
     @property
     def is_slow(self) -> bool:
         return self.transport.is_slow
+
+    @property
+    def is_bus(self) -> bool:
+        return self.transport.is_bus
 
     def open(self) -> None:
         """Opens a new channel, after a name request on the first time. Raises LinkError if no device answers."""
@@ -206,20 +216,27 @@ class Connection:
         return reply
 
     def stream(
-        self, messages: Iterable[bytes], patience: float = PATIENCE, check: Callable[[], None] = lambda: None
+        self,
+        messages: Iterable[bytes],
+        patience: float = PATIENCE,
+        check: Callable[[], None] = lambda: None,
+        *,
+        sharing: bool = False,
     ) -> Generator[bytes, None, None]:
         """Sends requests, the next one already while the device works on the previous one, and yields the replies.
 
-        On a bad line there may be fewer replies than requests, but never none to the last one. When the stream is left
+        On a bad line there may be fewer replies than requests, but never none to the last one. `sharing`: in the
+        requests the device was asked to leave replies out, so more may be under way. When the stream is left
         before its end the channel is closed, so that the device gets no more of it. `check` is called again and again
         meanwhile; what it raises ends the stream.
         """
         if self._channel is None:
             raise ChannelLost("There is no connection to the device.", "closed")
         channel, requests = self._channel, iter(messages)
+        most = MAX_SHARING if sharing else MAX_REQUESTS
         try:
             while True:
-                while channel.outstanding < MAX_REQUESTS and (message := next(requests, None)) is not None:
+                while channel.outstanding < most and (message := next(requests, None)) is not None:
                     channel.send(message, self.transport.now())
                     self._send_some(channel)  # the next message may take time to make
                 if not channel.outstanding:

@@ -295,6 +295,7 @@ class ModbusTransport:
         self.packet_overhead = simplecom.FRAME_OVERHEAD
         self.byte_rate = bus.byte_rate
         self.is_slow = bus.byte_rate < math.inf
+        self.is_bus = False  # each request has its reply
         self.point_to_point = False
         self.places = NO_PLACES
         self._bus = bus

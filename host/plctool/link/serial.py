@@ -35,6 +35,7 @@ class SerialTransport:
         real = is_real_line(url) if paced is None else paced
         self.byte_rate = baud / BITS_PER_BYTE / (1 + 1 / _ESCAPE_SHARE) if real else math.inf
         self.is_slow = self.byte_rate < _FAST
+        self.is_bus = False
         self._decoder = simplecom.Decoder()
         self._packets: deque[bytes] = deque()
         self._port = open_port(url, baud)

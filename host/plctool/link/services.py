@@ -322,6 +322,7 @@ _BLOCK_OVERHEAD = 44  # layer 7 header and tags around the data of a block, byte
 _PACKED_SIZE = 8192  # of packed data at most, bytes
 _FIRST_PACKED_SIZE = 900  # of the first message: the line need not wait for a long search, and is busy during the next
 _PACKED_AHEAD = 2  # blocks that are packed while the line carries others
+_SHARING = 4  # blocks for which one reply does, on a bus
 _BLOCK_ALIGN = 16  # flash is written best in whole program units
 
 
@@ -419,15 +420,19 @@ class _Transfer:
         """Sends everything from `start_at` on and waits for the verdict."""
         self._session.ensure()
         request = self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, b"")
-        for reply in self._session.connection.stream(self._messages(start_at), _TRANSFER_PATIENCE):
+        connection = self._session.connection
+        for reply in connection.stream(self._messages(start_at), _TRANSFER_PATIENCE, sharing=connection.is_bus):
             self._take(_arrived(l7.decode_reply(reply, request)))
         if self.arrived != len(self._image):
             raise DeviceError(f"The device took {self.arrived} of {len(self._image)} bytes; try again.", "incomplete")
 
     def _messages(self, start_at: int) -> Iterator[bytes]:
         offset = start_at
-        for data, size in self._blocks(start_at):
-            position = _position(self._image, lib.DLF_CONTINUEDOWNLOAD if offset else 0, offset)
+        for number, (data, size) in enumerate(self._blocks(start_at), 1):
+            flags = lib.DLF_CONTINUEDOWNLOAD if offset else 0
+            if self._session.connection.is_bus and number % _SHARING and offset + size < len(self._image):
+                flags |= lib.DLF_REPLYMAYWAIT
+            position = _position(self._image, flags, offset)
             content = bintag.encode([position, data])
             yield l7.encode(self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, content))
             offset += size

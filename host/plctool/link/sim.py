@@ -21,6 +21,7 @@ class SimTransport:
     packet_overhead = 0
     byte_rate = math.inf
     is_slow = False
+    is_bus = False
     point_to_point = False
     places = NO_PLACES
 

@@ -33,6 +33,7 @@ class TcpTransport:
         self.packet_overhead = _HEADER.size
         self.byte_rate = math.inf
         self.is_slow = False
+        self.is_bus = False
         self.point_to_point = True  # with NAT the device knows this end by another address
         self.places = NO_PLACES
         self._place = network.find_host(host), port or int(lib.TCP_PORT)

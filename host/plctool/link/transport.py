@@ -23,6 +23,7 @@ class BlockTransport(Protocol):
     packet_overhead: int  # bytes the line carries for a packet besides the packet itself
     byte_rate: float  # bytes the line carries per second; math.inf if unknown or irrelevant
     is_slow: bool  # it pays to pack what is sent
+    is_bus: bool  # what the device sends takes the time of what is sent to it
     point_to_point: bool  # every packet is from the one device to this end, whatever its addresses
     places: Mapping[bytes, str]  # of the devices that replied on a link to several, by router address
 

@@ -37,6 +37,7 @@ class UdpTransport:
         self.packet_overhead = 0
         self.byte_rate = math.inf
         self.is_slow = False
+        self.is_bus = False
         self.point_to_point = False
         self._places: dict[bytes, str] = {}
         self.places: Mapping[bytes, str] = MappingProxyType(self._places)

@@ -25,6 +25,7 @@ class SimSerial:
     point_to_point = False
     places = NO_PLACES
     is_slow = True
+    is_bus = False
 
     def __init__(
         self, to_device: Damage | None = None, to_client: Damage | None = None, baud: int = DEFAULT_BAUD
