@@ -15,9 +15,9 @@
 #include "CmpStd.h"
 
 enum {
-    IO_CONFIG_VERSION = 1,
+    IO_CONFIG_VERSION = 2,
     IO_CONFIG_NONE = 0xFFFF, /* instead of an index: there is none */
-    IO_CONFIG_MAX_NAME = 32, /* of a connector or driver, with NUL */
+    IO_CONFIG_MAX_NAME = 32, /* of a connector, driver or board, with NUL */
 };
 
 /* Instead of an offset: there is none. */
@@ -42,6 +42,8 @@ typedef struct {
     RTS_UI16 connector_maps; /* IoConfigConnectorMap */
     RTS_UI16 channel_maps;   /* IoConfigChannelMap */
     RTS_UI32 data_size;      /* bytes, a multiple of 4 */
+    RTS_UI32 board;          /* in the data, with NUL: the board whose lines and devices are meant (SysTargetIsBoard);
+                              * IO_CONFIG_NOWHERE: any that has them */
 } IO_CONFIG;
 
 /* Flags of a connector (8.8.1). The configuration has CF_ENABLE and CF_OPTIONAL only; the others are set while it runs,
@@ -140,7 +142,7 @@ typedef struct {
 } IO_DEVICE_STATE;
 
 #ifndef RTS_CFFI
-RTS_STATIC_ASSERT(sizeof(IO_CONFIG) == 16, io_config_is_16_bytes);
+RTS_STATIC_ASSERT(sizeof(IO_CONFIG) == 20, io_config_is_20_bytes);
 RTS_STATIC_ASSERT(sizeof(IoConfigConnector) == 24, io_config_connector_is_24_bytes);
 RTS_STATIC_ASSERT(sizeof(IoConfigParameter) == 16, io_config_parameter_is_16_bytes);
 RTS_STATIC_ASSERT(sizeof(IoConfigTaskMap) == 8, io_config_task_map_is_8_bytes);

@@ -34,6 +34,11 @@ RTS_UI32 SysTargetRandom(void);
  * same ones, which the log says of a device on a network or bus, or with a password. From main. */
 bool SysTargetHasGenerator(void);
 
+/* Whether this device is the board of that name, which is what plctool calls it: `name` of device.toml, or of --board. A
+ * program with inputs and outputs of another board is refused, since what has the same name there may be another pin. From
+ * main. */
+bool SysTargetIsBoard(const char *name);
+
 /* The stack of main. From main, on request: may take a while. */
 SYS_STACK SysTargetGetStack(void);
 

@@ -33,6 +33,7 @@ static inline void io_init(IO_SPEC *io)
 {
     memset(io, 0, sizeof *io);
     io->head.version = IO_CONFIG_VERSION;
+    io->head.board = IO_CONFIG_NOWHERE;
 }
 
 static inline RTS_UI32 io_add_data(IO_SPEC *io, const void *data, RTS_UI32 size)

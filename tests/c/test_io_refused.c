@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  */
 #include "IoDrvSim.h"
+#include "Sim.h"
 #include "io_driver.h"
 
 static APP_REFUSAL refusal;
@@ -214,6 +215,28 @@ static void a_part_that_the_runtime_does_not_know(void)
     CHECK_EQUAL(app_state(), AS_RUN);
 }
 
+static void inputs_and_outputs_of_another_board(void)
+{
+    begin_with_old();
+    SimSetBoard("IO-16");
+    io.head.board = io_add_text(&io, "IO-8");
+    check_refused(ERR_ID_MISMATCH, "The inputs and outputs are those of the board IO-8, this is plctool simulator.");
+    SimSetBoard("IO-8");
+    CHECK_EQUAL(try_load(), ERR_OK);
+    SimSetBoard(NULL);
+}
+
+static void a_board_without_a_name(void)
+{
+    begin_with_old();
+    SimSetBoard("");
+    io.head.board = io_add_text(&io, "");
+    check_refused(ERR_SIZE_MISMATCH, "is not as long as it says: build again.");
+    io.head.board = io.head.data_size;
+    check_refused(ERR_SIZE_MISMATCH, "is not as long as it says: build again.");
+    SimSetBoard(NULL);
+}
+
 static void a_boot_project_is_refused_like_a_download(void)
 {
     begin_with_old();
@@ -240,6 +263,8 @@ int main(void)
     RUN(one_that_failed_is_what_boots_again_after_a_refused_one);
     RUN(an_optional_device_that_the_driver_refuses_is_left_out);
     RUN(a_driver_whose_devices_were_all_refused_is_told_of_the_end);
+    RUN(inputs_and_outputs_of_another_board);
+    RUN(a_board_without_a_name);
     RUN(a_part_that_the_runtime_does_not_know);
     RUN(a_boot_project_is_refused_like_a_download);
     return test_result();

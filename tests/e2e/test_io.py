@@ -61,6 +61,19 @@ def test_devices_of_a_running_program(tool: Tool, plcrt: Plcrt, eventually) -> N
     refused(tool, plcrt)
 
 
+def test_program_of_another_board_is_refused_by_its_name(tool: Tool, tmp_path: Path) -> None:
+    """What a machine is, only its user can say: plcrt --board."""
+    (tool.folder / "main.io.toml").write_text(DESCRIPTION)
+    (tool.folder / "press.toml").write_text('name = "Press 4"\n')
+    image = tool.build("main", PROGRAM, "--device", "press.toml")
+    assert tool.ok("info", str(image))["board"] == "Press 4"
+    for board, said in (("Press 4", None), ("Press 5", "those of the board Press 4, this is Press 5"), (None, None)):
+        options = () if board is None else ("--board", board)
+        with Plcrt(tmp_path / f"{board}.flash", *options) as other:
+            done = tool("flash", "--port", other.port, str(image))
+            assert (done.status, said or "") == (0 if said is None else 1, said if said and said in done.err else "")
+
+
 def lost_and_found(tool: Tool, link: tuple[str, ...], eventually) -> None:  # type: ignore[no-untyped-def]
     """A device that does not answer is shown, and the program knows; both end when it answers again."""
 

@@ -48,6 +48,12 @@ PROGRAMS = {
 }
 
 
+DEVICE = """
+name = "IO-16"
+[gpio]
+in = { DI0 = "DI0", DI1 = "DI1", DI2 = "DI2" }
+out = { DO0 = "DO0", DO1 = "DO1" }"""
+
 # Programs with descriptions of their inputs and outputs: each driver, every kind of parameter and channel.
 DESCRIBED = {
     "gpio": (
@@ -60,6 +66,7 @@ DESCRIBED = {
             PROGRAM Main WITH Cycle : Main; PROGRAM Count WITH OnEdge : Count;
         END_RESOURCE END_CONFIGURATION""",
         """
+        device = "device.toml"
         [gpio]
         name = "Board"
         [gpio.in]
@@ -329,6 +336,7 @@ def configuration(folder: Path, name: str, text: str, description: str) -> bytes
     place = folder / name
     place.mkdir()
     (place / f"{name}.io.toml").write_text(description)
+    (place / "device.toml").write_text(DEVICE)
     image = parse_image(compile_image(place, name, text))
     if image.io is None:
         raise SystemExit(f"{name} has no I/O configuration.")

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from plctool.core import ffi
 from plctool.errors import UsageError
 from plctool.io.configuration import (
     ChannelEntry,
@@ -34,7 +35,7 @@ CHANNELS = st.builds(ChannelEntry, U32, U32, U32, U16, U16, U32)
 MAPS = st.builds(ConnectorMap, U16, st.lists(CHANNELS, max_size=3).map(tuple))
 TASKS = st.builds(TaskMap, U16, st.sampled_from([0, 1]), st.lists(MAPS, max_size=3).map(tuple))
 CONFIGURATIONS = st.builds(
-    Configuration, st.lists(CONNECTORS, max_size=4).map(tuple), st.lists(TASKS, max_size=3).map(tuple)
+    Configuration, st.lists(CONNECTORS, max_size=4).map(tuple), st.lists(TASKS, max_size=3).map(tuple), NAMES
 )
 
 
@@ -71,7 +72,8 @@ def test_ranges_of_tables_follow_each_other() -> None:
         for n, size in enumerate(sizes)
     ]
     packed = pack_configuration(Configuration(tuple(connectors), ()))
-    firsts = [int.from_bytes(packed[16 + 24 * n + 8 : 16 + 24 * n + 10], "little") for n in range(3)]
+    entries = ffi.from_buffer("IoConfigConnector[]", packed[ffi.sizeof("IO_CONFIG") :][: 3 * 24])
+    firsts = [entry.first_parameter for entry in entries]
     assert firsts == [0, *accumulate(sizes)][:3]
 
 

@@ -14,6 +14,7 @@ from plctool.compiler import IoFiles, compile_sources
 from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.errors import DeviceError
+from plctool.image.board import read_firmware
 from plctool.link.connection import Connection
 from plctool.link.transports import make_link
 from plctool.port_check import parse_wire
@@ -36,10 +37,12 @@ LED1 = { var = "Main.dark", on_stop = 0 }
 pytestmark = pytest.mark.skipif(not MACHINE.startswith("mps2"), reason="the lines are those of MPS2 boards")
 
 
-def build(folder: Path, lines: str) -> Path:
+def build(folder: Path, lines: str, board: str | None = None, device: str = "") -> Path:
     (folder / "main.st").write_text(PROGRAM)
     (folder / "main.io.toml").write_text(lines)
-    built = compile_sources([folder / "main.st"], target=TARGET, io=IoFiles(device=None))
+    (folder / "device.toml").write_text(device)
+    io = IoFiles(device=folder / "device.toml" if device else None)
+    built = compile_sources([folder / "main.st"], target=TARGET, io=io, board=board)
     image = folder / "main.cdl"
     image.write_bytes(built.image)
     built.symbols.save(symbol_path(image))
@@ -67,6 +70,20 @@ def test_outputs_are_the_leds_of_the_board(tmp_path: Path) -> None:
             plc.flash(build(tmp_path / "bad", LINES.replace("LED1", "LED7")))
         eventually(lambda: leds() == 3)  # what ran before runs again
         assert plc.stack().unused >= HEADROOM  # the deepest that there is
+
+
+def test_program_for_another_board_of_the_same_processor_is_refused(tmp_path: Path) -> None:
+    """A lamp of its name may be a motor of the other."""
+    elf = firmware("full")
+    slug = read_firmware(elf).board.slug
+    with Board(MACHINE, elf, tmp_path) as board, Plc(Connection(board.line())) as plc:
+        plc.flash(build(tmp_path, LINES, board=slug))
+        assert plc.io_devices()[0].state == "ok"
+        lines = "".join(f"{name} = '{name}'\n" for name in ("LED0", "LED1"))
+        other = f"name = 'IO-16'\n[gpio]\nin.BUTTON0 = 'BUTTON0'\n[gpio.out]\n{lines}"
+        with pytest.raises(DeviceError, match=r"those of the board IO-16, this is MPS2 AN\d+"):
+            plc.flash(build(tmp_path, LINES, device=other))
+        eventually(lambda: plc.read("Main.held") is True)  # what ran before goes on
 
 
 def test_port_check_finds_that_a_wire_is_missing(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ static struct {
     char serial_number[17];
 } state;
 
-static const SYS_TARGET target = {
+static SYS_TARGET target = {
     .type = TARGET_TYPE_PROGRAMMABLE,
     .id = BOARD_TARGET_ID,
     .version = 0x01000000,
@@ -34,15 +34,27 @@ static const SYS_TARGET target = {
 };
 
 static const char *given_name; /* by the user; NULL: none */
+static const char *board_name; /* of the machine, by the user; NULL: not known */
 
 void PortTargetSetName(const char *name)
 {
     given_name = name;
 }
 
+void PortTargetSetBoard(const char *name)
+{
+    target.device_name = board_name = name;
+}
+
 const SYS_TARGET *SysTargetGet(void)
 {
     return &target;
+}
+
+/* A process runs on any machine: which board that is only the user can say. */
+bool SysTargetIsBoard(const char *name)
+{
+    return board_name == NULL || strcmp(name, board_name) == 0;
 }
 
 /* It grows by need: what the system says it has grown to, against its limit. */

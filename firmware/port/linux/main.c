@@ -12,6 +12,7 @@
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
 #include "CmpSrvNumbers.h"
+#include "IoConfig.h"
 #include "Modbus.h"
 #include "ModbusToolLine.h"
 #include "Supervisor.h"
@@ -58,7 +59,7 @@ static const char usage[] =
     "             [--udp ADDRESS[:INDEX]] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
     "             [--tunnel PATH] [--tunnel-unit N] [--tunnel-baud N] [--tunnel-parity even|odd|none] "
     "[--tunnel-drive]\n"
-    "             [--event NAME=PIPE]...\n"
+    "             [--board NAME] [--event NAME=PIPE]...\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
@@ -86,6 +87,8 @@ static const char usage[] =
     "                  even, odd or none; even if not given\n"
     "  --tunnel-drive  the port switches the direction of the bus; adapters do it by themselves\n"
     "  --name NAME     of the device in a scan; the name of this machine if not given\n"
+    "  --board NAME    what device.toml calls this machine: programs with inputs and outputs of another board are "
+    "refused\n"
     "  --event N=PIPE  each byte written into the named pipe is the external event N of tasks\n"
     "  --reset-password\n"
     "                  removes the password that is in the flash file, and ends\n"
@@ -123,6 +126,16 @@ static RTS_UI32 parse_baud(const char *option, const char *text)
     return (RTS_UI32)baud;
 }
 
+static const char *parse_board(const char *text)
+{
+    size_t length = strlen(text);
+    if (length == 0 || length >= IO_CONFIG_MAX_NAME) {
+        refuse("--board '%s' is no name of a board: give 1 to %d characters, as device.toml has them", text,
+               IO_CONFIG_MAX_NAME - 1);
+    }
+    return text;
+}
+
 static void print_and_exit(const char *text)
 {
     fputs(text, stdout);
@@ -143,6 +156,7 @@ enum {
     OPTION_BIT_RATE,
     OPTION_CAN_BASE,
     OPTION_NAME,
+    OPTION_BOARD,
     OPTION_UDP,
     OPTION_TCP,
     OPTION_TUNNEL,
@@ -167,6 +181,7 @@ static const struct option long_options[] = {
     {"bitrate", required_argument, NULL, OPTION_BIT_RATE},
     {"can-base", required_argument, NULL, OPTION_CAN_BASE},
     {"name", required_argument, NULL, OPTION_NAME},
+    {"board", required_argument, NULL, OPTION_BOARD},
     {"udp", optional_argument, NULL, OPTION_UDP},
     {"tcp", optional_argument, NULL, OPTION_TCP},
     {"tunnel", required_argument, NULL, OPTION_TUNNEL},
@@ -302,6 +317,8 @@ static void take_can_option(OPTIONS *options, int option)
         options->can_options.base = parse_can_base(optarg);
     } else if (option == OPTION_NAME) {
         PortTargetSetName(optarg);
+    } else if (option == OPTION_BOARD) {
+        PortTargetSetBoard(parse_board(optarg));
     }
 }
 

@@ -114,6 +114,8 @@ const char *PortCanPtyName(void);
 
 /* The name of the device in a scan; the text stays. Before CMInit. */
 void PortTargetSetName(const char *name);
+/* The board that this machine is; the text stays. Before CMInit. */
+void PortTargetSetBoard(const char *name);
 
 /* ---- SysSocket ---- */
 

@@ -19,6 +19,8 @@ enum { NODE_NAME_SIZE = 32 };
 
 static char node_name[NODE_NAME_SIZE] = "simulator";
 
+static const char *board_name;
+
 static SYS_TARGET target = {
     TARGET_TYPE_PROGRAMMABLE, SIM_TARGET_ID, 0x01000000, "plctool simulator", "plctool", node_name, "0",
 };
@@ -26,6 +28,12 @@ static SYS_TARGET target = {
 const SYS_TARGET *SysTargetGet(void)
 {
     return &target;
+}
+
+/* It stands for any board, unless a test says which one it is. */
+bool SysTargetIsBoard(const char *name)
+{
+    return board_name == NULL || strcmp(name, board_name) == 0;
 }
 
 SYS_STACK SysTargetGetStack(void)
@@ -54,6 +62,11 @@ void SimSetTarget(RTS_UI32 type, RTS_UI32 id, RTS_UI32 version)
     target.type = type;
     target.id = id;
     target.version = version;
+}
+
+void SimSetBoard(const char *name)
+{
+    board_name = name;
 }
 
 void SimSetNodeName(const char *name)

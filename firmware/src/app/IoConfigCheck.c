@@ -10,6 +10,7 @@
 #include "IoConfigCheck.h"
 
 #include "AppIo.h"
+#include "SysTarget.h"
 
 #if IO_MAX_CONNECTORS > 0
 
@@ -229,8 +230,12 @@ static RTS_RESULT open_tables(IO_CHECK *c)
     }
     c->at[TABLES] = at;
     c->data_size = head.data_size;
-    if (at > end || head.data_size != end - at || head.data_size % 4 != 0)
+    if (at > end || head.data_size != end - at || head.data_size % 4 != 0 ||
+        (head.board != IO_CONFIG_NOWHERE && !read_name(c, head.board, c->name)))
         return refuse(c->l, ERR_SIZE_MISMATCH, "The I/O configuration is not as long as it says: build again.");
+    if (head.board != IO_CONFIG_NOWHERE && !SysTargetIsBoard(c->name))
+        return refuse(c->l, ERR_ID_MISMATCH, "The inputs and outputs are those of the board %s, this is %s.", c->name,
+                      SysTargetGet()->device_name);
     if (c->count[CONNECTORS] > IO_MAX_CONNECTORS)
         return refuse(c->l, ERR_NOMEMORY, "There are %u devices and buses, this device can have %u.",
                       U(c->count[CONNECTORS]), U(IO_MAX_CONNECTORS));

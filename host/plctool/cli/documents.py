@@ -249,6 +249,8 @@ def info(path: Path) -> Document:
 
     data = read_image(path)
     document = describe_image(data)
+    if board := io_documents.board_in(data):
+        document["board"] = board
     if devices := io_documents.devices_of(data):
         document["devices"] = devices
     try:

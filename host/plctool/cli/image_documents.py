@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from plctool.cli.io_documents import Document
+from plctool.cli.io_documents import Document, board_in
 from plctool.errors import UsageError
 from plctool.files import read_image
 
@@ -21,6 +21,12 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
     of_firmware = None if firmware is None else read_firmware(firmware)
     wanted = board_of(board, of_firmware)
     data = read_image(image)
+    meant = board_in(data)
+    if meant not in ("", wanted.name) and not wanted.is_program:
+        raise UsageError(
+            f"The inputs and outputs of {image} are those of {meant}, this is {wanted.title}; build it for this board.",
+            "other-board",
+        )
     pieces = production_pieces(data, wanted, of_firmware)
     write_production(output, pieces, wanted)
     apart = None if firmware is None or wanted.flash.address is not None else str(firmware)

@@ -16,6 +16,7 @@ from plctool.files import make_folder, read_image, write_atomically
 if TYPE_CHECKING:
     from plctool.device import Plc
     from plctool.iec.types import Type
+    from plctool.io.configuration import Configuration
     from plctool.io.device_file import DeviceFile
 
 Document = dict[str, Any]
@@ -52,17 +53,31 @@ def oldest_input(channels: Sequence[Document]) -> Document | None:
     return {"channel": f"{oldest['device']}.{oldest['channel']}", "age_us": oldest["age_us"]}
 
 
-def devices_of(data: bytes) -> list[Document]:
-    """The devices in the I/O configuration of an image."""
-    from plctool.core import lib
+def configuration_in(data: bytes) -> Configuration | None:
+    """The I/O configuration of an image, None if it has none. Raises UsageError for one that is damaged."""
     from plctool.image.file import parse_image
     from plctool.io.configuration import parse_configuration
 
     image = parse_image(data)
     if image.io is None:
-        return []
+        return None
     offset, size = image.io
-    configuration = parse_configuration(image.code[offset : offset + size])
+    return parse_configuration(image.code[offset : offset + size])
+
+
+def board_in(data: bytes) -> str:
+    """The board whose inputs and outputs an image means, "" for any."""
+    configuration = configuration_in(data)
+    return "" if configuration is None else configuration.board
+
+
+def devices_of(data: bytes) -> list[Document]:
+    """The devices in the I/O configuration of an image."""
+    from plctool.core import lib
+
+    configuration = configuration_in(data)
+    if configuration is None:
+        return []
     maps = [m for task in configuration.task_maps for m in task.connectors]
     places = [
         {(c.parameter, c.parameter_bit) for m in maps if m.connector == i for c in m.channels}

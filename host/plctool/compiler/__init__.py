@@ -130,7 +130,7 @@ def compile_sources(
     from plctool.compiler.build import build_program
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
     from plctool.compiler.diagnostics import render
-    from plctool.compiler.fit import check_program_fits
+    from plctool.compiler.fit import board_meant, check_program_fits
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
@@ -150,6 +150,8 @@ def compile_sources(
             "that has it.",
             "bad-target",
         )
+    if description is not None:
+        description.board = board_meant(options.target, known, description.device)
     sources = files.load_sources()
     imported = files.load_libraries()
     shown = [*sources, *io_sources(description), *library_sources(imported)]

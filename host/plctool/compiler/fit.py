@@ -36,6 +36,13 @@ def check_program_fits(
         check_fit(needs, limits, names, f"Make the program smaller; if your firmware has more room, {_OTHERWISE}.")
 
 
+def board_meant(target: Target, board: Board | None, device: DeviceFile | None) -> str:
+    """What the device calls itself whose inputs and outputs a description means, "" for any that has them."""
+    if device is not None and device.name:
+        return device.name if device.target in ("", target.name) else ""  # else it is built for a simulator
+    return "" if board is None or board.is_program else board.name
+
+
 def _boards_like(target: Target) -> list[Board]:
     """The boards with this processor; of one that no board has, those with a processor of its size."""
     boards = {t.name: [b for b in known_boards() if b.device_id == getattr(lib, t.device_id)] for t in TARGETS.values()}

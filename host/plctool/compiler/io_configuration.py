@@ -79,7 +79,7 @@ def configuration_of(program: TypedProgram, description: Description) -> Configu
             parts = tuple(_connector_maps(description.connectors, number, kind))
             if parts:
                 maps.append(TaskMap(number, kind, parts))
-    return Configuration(connectors, tuple(maps))
+    return Configuration(connectors, tuple(maps), description.board)
 
 
 def _connector_maps(connectors: list[Connector], task: int, kind: int) -> Iterator[ConnectorMap]:

@@ -21,6 +21,7 @@ from plctool.errors import UsageError, did_you_mean
 from plctool.iec.areas import Area
 from plctool.image.file import target_name
 from plctool.image.limits import of_area
+from plctool.image.targets import TARGETS
 
 SLOT_A, SLOT_B, COMMIT, RETAIN = (int(n) for n in (lib.FILE_SLOT_A, lib.FILE_SLOT_B, lib.FILE_COMMIT, lib.FILE_RETAIN))
 _SECTION = "board_facts"
@@ -60,6 +61,11 @@ class Board:
     @property
     def target(self) -> str:
         return target_name(self.device_id)
+
+    @property
+    def is_program(self) -> bool:
+        """Whether it is plcrt, which does not know what board it runs on unless its user says so."""
+        return not TARGETS[self.target].compact
 
     @property
     def title(self) -> str:
@@ -144,8 +150,8 @@ def find_board(text: str) -> Board:
         )
     slugs = [b.slug for b in boards]
     raise UsageError(
-        f"There is no board '{text}'{did_you_mean(text, slugs)}. Choose one of {', '.join(slugs)}; for a board of your "
-        "own give its ELF file with --firmware.",
+        f"There is no board '{text}'{did_you_mean(text, slugs) or '.'} Choose one of {', '.join(slugs)}; for a board "
+        "of your own give its ELF file with --firmware.",
         "no-such-board",
     )
 

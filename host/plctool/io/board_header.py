@@ -72,6 +72,10 @@ def _names(device: DeviceFile) -> tuple[str, str]:
 
 
 def _lines(device: DeviceFile) -> Iterator[_Line]:
+    if device.name:
+        comment = "images with inputs and outputs of another board are refused"
+        yield _Definition("BOARD_DEVICE_NAME", _string(device.name), Pos(device.path, 1, 1), comment)
+        yield ""
     if device.lines:
         yield "/* Lines, by the names that SysGpio gets. */"
         for line in device.lines.values():

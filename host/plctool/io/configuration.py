@@ -75,10 +75,11 @@ class TaskMap:
 
 @dataclass(frozen=True)
 class Configuration:
-    """All tables."""
+    """All tables. `board`: the one whose inputs and outputs are meant, "" for any."""
 
     connectors: tuple[ConnectorEntry, ...]
     task_maps: tuple[TaskMap, ...]
+    board: str = ""
 
 
 # ---- writing -------------------------------------------------------------------------------------------------------
@@ -125,7 +126,10 @@ class _Writer:
             *self._connector_maps(connector_maps),
             *(_struct("IoConfigChannelMap", **vars(c)) for c in channels),
         ]
-        head = _struct("IO_CONFIG", version=int(lib.IO_CONFIG_VERSION), **counts, data_size=len(self._data))
+        board = self._text(self._configuration.board) if self._configuration.board else NOWHERE
+        head = _struct(
+            "IO_CONFIG", version=int(lib.IO_CONFIG_VERSION), **counts, data_size=len(self._data), board=board
+        )
         return b"".join((head, *tables, bytes(self._data)))
 
     def _connectors(self) -> Iterator[bytes]:
@@ -210,6 +214,7 @@ class _Reader:
         self._data = self._left
         if len(self._data) != head.data_size:
             raise _damaged("is cut off")
+        self._board = "" if head.board == NOWHERE else self._text(head.board)
 
     def _take(self, kind: str, count: int) -> list[Any]:
         size = ffi.sizeof(kind)
@@ -228,6 +233,7 @@ class _Reader:
                 TaskMap(int(t.task), int(t.type), self._maps(t.first_connector_map, t.connector_map_count))
                 for t in self._task_maps
             ),
+            self._board,
         )
 
     def _connector(self, c: Any) -> ConnectorEntry:

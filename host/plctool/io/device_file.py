@@ -1,6 +1,6 @@
 """What the vendor of a board says of it: `device.toml`.
 
-name = "IO-16"
+name = "IO-16"                            # what its firmware calls itself
 vendor = "Acme"
 target = "cortex-m3"
 
@@ -127,7 +127,7 @@ class DeviceFile:
 def read_device_file(text: TomlText, mistakes: Mistakes) -> DeviceFile:
     """What the text says; mistakes are reported."""
     root = Table(text, (), text.values, mistakes)
-    device = DeviceFile(text.path, _one_line(root, "name"), _one_line(root, "vendor"))
+    device = DeviceFile(text.path, _device_name(root), _one_line(root, "vendor"))
     device.target = root.choice("target", {name: name for name in TARGETS}) or ""
     limits = root.table("limits")
     if limits is not None:
@@ -148,6 +148,15 @@ def read_device_file(text: TomlText, mistakes: Mistakes) -> DeviceFile:
         device.modules[module.name] = module
     root.close()
     return device
+
+
+def _device_name(table: Table) -> str:
+    """What its firmware calls itself, which an image has room for."""
+    name = _one_line(table, "name")
+    if len(name) > MAX_NAME or not name.isascii():
+        table.error(f"name is what the firmware calls itself, at most {MAX_NAME} ASCII characters", "name")
+        return ""
+    return name
 
 
 def _one_line(table: Table, key: str) -> str:

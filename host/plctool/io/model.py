@@ -136,7 +136,8 @@ class Context:
 @dataclass
 class Description:
     """A description that was read. A parent comes before its children. `contents`: those of the files, by path, for
-    messages. `readable`: the files are TOML."""
+    messages. `readable`: the files are TOML. `board`: what the device it is for calls itself, "" for any; the compiler
+    sets it."""
 
     path: str
     connectors: list[Connector]
@@ -144,6 +145,7 @@ class Description:
     contents: dict[str, str]
     device: DeviceFile | None = None
     readable: bool = True
+    board: str = ""
 
     @property
     def channels(self) -> list[tuple[Connector, Channel]]:

@@ -5,6 +5,8 @@
  */
 #include "SysTarget.h"
 
+#include <string.h>
+
 #include "CompactDownload.h"
 
 /* Write here: your vendor id in the high half of `id` with the device in the low one (plctool must know that pair as a
@@ -21,6 +23,12 @@ const SYS_TARGET *SysTargetGet(void)
         .serial_number = "0",
     };
     return &target;
+}
+
+/* device_name is the `name` in device.toml, too. A firmware for several boards looks which one it is on. */
+bool SysTargetIsBoard(const char *name)
+{
+    return strcmp(name, SysTargetGet()->device_name) == 0;
 }
 
 /* Write here: when start-up paints the stack of main with a pattern, how much of it is left. Not known: as it is. */

@@ -31,6 +31,11 @@ SYS_STACK SysTargetGetStack(void)
     return stack;
 }
 
+bool SysTargetIsBoard(const char *name)
+{
+    return strcmp(name, SysTargetGet()->device_name) == 0;
+}
+
 void ResetHandler(void)
 {
     RTS_UI8 *const lowest = stack_bottom + UNPAINTED;

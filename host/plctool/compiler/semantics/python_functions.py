@@ -42,10 +42,8 @@ class PythonFunctions:
         units = {s.decl.full_name.casefold(): s for s in program.world.names.functions()}
         for name in self._numbers:
             if name not in units:
-                raise UsageError(
-                    f"There is no function {name}{did_you_mean(name, [s.decl.full_name for s in units.values()])}.",
-                    "unknown-function",
-                )
+                suggestion = did_you_mean(name, [s.decl.full_name for s in units.values()])
+                raise UsageError(f"There is no function {name}{suggestion or '.'}", "unknown-function")
             info = program.world.declared.function(units[name], {})
             if info is not None:
                 self.units.append(_callable(info.pou))
