@@ -85,7 +85,7 @@
 #define IO_MAX_CONNECTORS 0
 #endif
 
-/* Connectors of IoDrvGpio, with up to 32 lines each; 28 bytes of RAM each, and what the port takes. */
+/* Connectors of IoDrvGpio, with up to 32 lines each; 32 bytes of RAM each, and what the port takes. */
 #ifndef IO_GPIO_GROUPS
 #define IO_GPIO_GROUPS 1
 #endif

@@ -231,9 +231,9 @@ static void a_board_without_a_name(void)
     begin_with_old();
     SimSetBoard("");
     io.head.board = io_add_text(&io, "");
-    check_refused(ERR_SIZE_MISMATCH, "is not as long as it says: build again.");
+    check_refused(ERR_SIZE_MISMATCH, "The I/O configuration is damaged (table 5, entry 0): build again.");
     io.head.board = io.head.data_size;
-    check_refused(ERR_SIZE_MISMATCH, "is not as long as it says: build again.");
+    check_refused(ERR_SIZE_MISMATCH, "The I/O configuration is damaged (table 5, entry 0): build again.");
     SimSetBoard(NULL);
 }
 

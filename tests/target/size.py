@@ -54,13 +54,25 @@ class Usage:
 
 
 @dataclass
+class Part:
+    """Some components together, in one configuration, and what they may take; `why`: what is between the two."""
+
+    config: str
+    components: list[str]
+    flash: int
+    ram: int
+    why: str = ""
+
+
+@dataclass
 class Budget:
     """The budget file: the compiler that its figures are of, names of variables that are the application's, goals for
-    the totals, limits of the components and of their total as [flash, RAM]; all in bytes, by configuration."""
+    the totals and for parts, limits of the components and of their total as [flash, RAM]; all in bytes."""
 
     compiler: str
     application: set[str]
     goal: dict[str, dict[str, int]]
+    part: dict[str, Part] = field(default_factory=dict)
     limit: dict[str, dict[str, list[int]]] = field(default_factory=dict)
 
 
@@ -214,10 +226,24 @@ def print_table(measured: dict[str, dict[str, Usage]]) -> None:
     print(f"{'RAM of the application':<28}" + "".join(f"{u.application:>20}" for u in sums))
 
 
+def print_parts(measured: dict[str, dict[str, Usage]], parts: dict[str, Part]) -> None:
+    """Each part beside its goal, and why it is not reached."""
+    known = {name: part for name, part in parts.items() if part.config in measured}
+    if not known:
+        return
+    print(f"\n{'parts':<36}{'configuration':>14}{'flash':>8}{'goal':>8}{'RAM':>8}{'goal':>8}")
+    for name, part in known.items():
+        used = total({c: u for c, u in measured[part.config].items() if c in part.components})
+        print(f"{name:<36}{part.config:>14}{used.flash:>8}{part.flash:>8}{used.ram:>8}{part.ram:>8}")
+        if part.why and (used.flash > part.flash or used.ram > part.ram):
+            print(f"  {part.why}")
+
+
 def read_budget(path: Path) -> Budget:
     """The budget file; see firmware/size-budget.toml."""
     data = tomllib.loads(path.read_text())
-    return Budget(data["compiler"], set(data["application"]), data["goal"], data.get("limit", {}))
+    parts = {name: Part(**part) for name, part in data.get("part", {}).items()}
+    return Budget(data["compiler"], set(data["application"]), data["goal"], parts, data.get("limit", {}))
 
 
 def with_slack(size: int) -> int:
@@ -264,6 +290,7 @@ def main() -> int:
         update(path, measured, budget, compiler)
         budget = read_budget(path)
     print_table(measured)
+    print_parts(measured, budget.part)
     complaints = [text for config, usage in measured.items() for text in exceeded(config, usage, budget, compiler)]
     goals = [text for config, usage in measured.items() for text in missed_goals(config, usage, budget)]
     if compiler != budget.compiler:

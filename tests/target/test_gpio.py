@@ -27,6 +27,8 @@ PROGRAM = program(
     "VAR held, dark, pressed, both : BOOL; END_VAR", "held := TRUE; dark := TRUE; both := pressed AND dark;"
 )
 LINES = """
+[gpio]
+name = "Board"
 [gpio.in]
 BUTTON0 = "Main.pressed"
 [gpio.out]
@@ -49,9 +51,10 @@ def build(folder: Path, lines: str, board: str | None = None, device: str = "") 
     return image
 
 
-def test_outputs_are_the_leds_of_the_board(tmp_path: Path) -> None:
+@pytest.mark.parametrize("config", ["io", "full"])
+def test_outputs_are_the_leds_of_the_board(tmp_path: Path, config: str) -> None:
     image = build(tmp_path, LINES)
-    board = Board(MACHINE, firmware("full"), tmp_path)
+    board = Board(MACHINE, firmware(config), tmp_path)
 
     def leds() -> int:
         return int.from_bytes(board.read_memory(LEDS, 4), "little")
@@ -60,13 +63,15 @@ def test_outputs_are_the_leds_of_the_board(tmp_path: Path) -> None:
         plc.flash(image)
         eventually(lambda: leds() == 3)
         assert plc.read("Main.pressed") is False
-        assert plc.io_devices()[0].state == "ok"
+        assert plc.read("Board.ok") is True
+        if config == "full":  # the small one has no services for it
+            assert plc.io_devices()[0].state == "ok"
         plc.stop()
         assert leds() == 1
         plc.start()
         eventually(lambda: leds() == 3)
         (tmp_path / "bad").mkdir()
-        with pytest.raises(DeviceError, match=r"gpio \(IoDrvGpio\): this device has no line LED7"):
+        with pytest.raises(DeviceError, match=r"Board \(IoDrvGpio\): this device has no line LED7"):
             plc.flash(build(tmp_path / "bad", LINES.replace("LED1", "LED7")))
         eventually(lambda: leds() == 3)  # what ran before runs again
         assert plc.stack().unused >= HEADROOM  # the deepest that there is

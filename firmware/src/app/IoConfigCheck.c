@@ -34,11 +34,15 @@ static const RTS_UI8 entry_size[TABLES] = {
     sizeof(IoConfigConnectorMap), sizeof(IoConfigChannelMap),
 };
 
-/* A compiler never writes such an entry: which one says enough. */
+/* A compiler never writes such a configuration: which entry says enough. Table TABLES is the head, or where it is. */
+static RTS_RESULT refuse_damaged(LOADER *l, RTS_RESULT result, RTS_UI32 table, RTS_UI32 entry)
+{
+    return refuse(l, result, "The I/O configuration is damaged (table %u, entry %u): build again.", U(table), U(entry));
+}
+
 static RTS_RESULT damaged(const IO_CHECK *c, RTS_UI32 table)
 {
-    return refuse(c->l, ERR_INVALID_REFERENCE, "The I/O configuration is damaged (table %u, entry %u): build again.",
-                  U(table), U(c->next[table] - 1));
+    return refuse_damaged(c->l, ERR_INVALID_REFERENCE, table, c->next[table] - 1u);
 }
 
 static RTS_RESULT read_next(IO_CHECK *c, RTS_UI32 table, void *entry)
@@ -232,7 +236,7 @@ static RTS_RESULT open_tables(IO_CHECK *c)
     c->data_size = head.data_size;
     if (at > end || head.data_size != end - at || head.data_size % 4 != 0 ||
         (head.board != IO_CONFIG_NOWHERE && !read_name(c, head.board, c->name)))
-        return refuse(c->l, ERR_SIZE_MISMATCH, "The I/O configuration is not as long as it says: build again.");
+        return refuse_damaged(c->l, ERR_SIZE_MISMATCH, TABLES, 0);
     if (head.board != IO_CONFIG_NOWHERE && !SysTargetIsBoard(c->name))
         return refuse(c->l, ERR_ID_MISMATCH, "The inputs and outputs are those of the board %s, this is %s.", c->name,
                       SysTargetGet()->device_name);
@@ -273,7 +277,7 @@ RTS_RESULT LoaderFindIo(LOADER *l, RTS_UI32 size)
         result = ERR_INVALID_REFERENCE;
     l->image->io.offset = place.offset;
     l->image->io.size = place.size;
-    return result == ERR_OK ? ERR_OK : refuse(l, result, "The I/O configuration is not in the code: build again.");
+    return result == ERR_OK ? ERR_OK : refuse_damaged(l, result, TABLES, 0);
 }
 
 #endif

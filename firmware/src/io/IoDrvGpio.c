@@ -28,6 +28,7 @@ typedef struct {
     RTS_UI8 out[4];   /* to be written */
     RTS_UI32 lines;   /* CRC of what they are; 0: closed */
     RTS_UI32 events;  /* handles of those that are registered for it, a bit each */
+    bool has_failed;  /* since it was opened */
 } GROUP;
 
 static GROUP groups[IO_GPIO_GROUPS];
@@ -162,6 +163,7 @@ static RTS_RESULT open_group(GROUP *group, const IoConfigConnector *connector, c
         result = add_line(group, n, bad);
     if (result == ERR_OK)
         result = SysGpioOpen((RTS_UI32)(group - groups), BytesGet32(group->out));
+    group->has_failed = result != ERR_OK;
     if (result == ERR_OK)
         IoMgrConfigNoteAlive(connector);
     else
@@ -290,6 +292,12 @@ static RTS_UI32 group_of(const IoConfigConnectorMap *map)
     return number;
 }
 
+static void note_failure(GROUP *group)
+{
+    group->has_failed = true;
+    IoMgrConfigSetDiagnosis(connector_of(group), CF_CONNECTOR_ERROR);
+}
+
 static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
 {
     for (; count > 0; count--, maps++) {
@@ -300,7 +308,7 @@ static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
         RTS_RESULT result = SysGpioRead(number, &values);
 
         if (result != ERR_OK) {
-            IoMgrConfigSetDiagnosis(connector_of(group), CF_CONNECTOR_ERROR);
+            note_failure(group);
             continue;
         }
         BytesPut32(group->in, values);
@@ -324,7 +332,7 @@ static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
         result =
             group->lines != 0 ? SysGpioWrite(number, group->outputs, BytesGet32(group->out)) : (RTS_RESULT)ERR_DEVICE;
         if (result != ERR_OK)
-            IoMgrConfigSetDiagnosis(connector_of(group), CF_CONNECTOR_ERROR);
+            note_failure(group);
     }
     return ERR_OK;
 }
@@ -332,12 +340,10 @@ static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
 /* A chip that has gone (USB) is opened again when it is back, outputs with what they should be. */
 static RTS_RESULT diagnose(const IoConfigConnector *connector)
 {
-    IO_DEVICE_STATE state;
     const char *bad;
     GROUP *group = find_group(user_of(connector));
 
-    (void)IoMgrGetState(IoMgrConfigGetIndex(connector), &state);
-    if (state.ok || group == NULL)
+    if (group == NULL || !group->has_failed)
         return ERR_OK;
     close_group(group);
     return open_group(group, connector, &bad);

@@ -1,0 +1,32 @@
+/*
+ * rts_config_size.h - sizes of the configuration with inputs and outputs: the standard one, and what the smallest I/O
+ * takes: the manager and the lines of the board. Without CmpIoMgrSrv, `plctool io status`, `scan`, `identify` and `param`
+ * have nothing to ask; programs and `plctool read` see the state of each device in its IO_DEVICE.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RTS_CONFIG_SIZE_H
+#define RTS_CONFIG_SIZE_H
+
+#define RTS_CONFIG_NAME "io"
+#define APP_CRASH_TEXT_SIZE 1
+#define APP_MAX_TASKS 3
+#define NETSERVER_MESSAGE_SIZE 944 /* two full blocks */
+#define EVENT_MAX_CALLBACKS 0
+#define SCHED_MAX_EXTERNAL_EVENTS 2 /* edges that start tasks */
+#define APP_REFUSAL_TEXT_SIZE 96
+#define COM_QUEUE_SIZE 540
+#define LOG_MAX_ENTRIES 6
+#define EXCEPT_MAX_CALLS 6
+#define RTS_IEC_UNPRIVILEGED 0 /* 1: 300 bytes of flash, 24 of RAM */
+#define RTS_MAIN_STACK_SIZE 2336
+#define LOG_TEXT_SIZE 48
+#define SRV_MAX_GROUPS 4
+#define CYCLE_MAX_PHASES 3
+#define IO_MAX_CONNECTORS 4
+
+#define BOARD_UART_COUNT 1
+#define BOARD_UART_RX_SIZE 256
+#define BOARD_UART_TX_SIZE 64
+
+#endif
