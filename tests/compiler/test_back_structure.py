@@ -9,6 +9,7 @@ import pytest
 
 from plctool.compiler import load_sources
 from plctool.compiler.build import BuildResult, build_program
+from plctool.compiler.codegen.emit import optimised
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
@@ -68,6 +69,54 @@ def test_inputs_go_as_far_as_there_are_registers() -> None:
     calls = "x(a := 1, b := 2, c := 3.0);"
     assert signature(lowered(main(calls), "aarch64-linux"), "st.Block").count("%p") == 3
     assert signature(lowered(main(calls), "cortex-m3"), "st.Block").count("%p") == 2  # an LREAL has no register there
+
+
+OPEN_BLOCK = BLOCK.replace("sum := sum + a * b;", "sum := sum + a * b; used := used + 1;")
+OPEN_BLOCK = f"VAR_GLOBAL used : DINT; END_VAR {OPEN_BLOCK}"
+
+
+def test_outputs_of_a_block_that_touches_nothing_else_are_results() -> None:
+    calls = "x(a := 1, b := 2);"
+    assert signature(lowered(main(calls)), "st.Block").startswith("internal { i32 } @st.Block(ptr nonnull %self,")
+    open_ = main(calls).replace(BLOCK, OPEN_BLOCK)
+    assert signature(lowered(open_), "st.Block").startswith(
+        "internal void @st.Block(ptr noalias nonnull readonly %ctx,"
+    )
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "sum := a / b;",  # may raise an exception
+        "p := ADR(sum); p^ := a;",
+        "inner(IN := a > 0, PT := T#1s);",
+        "FOR sum := 0 TO a DO b := b + 1; END_FOR",  # may be interrupted by the watchdog
+        "sum := LEN(name) + a;",
+    ],
+)
+def test_what_a_block_may_touch_or_raise_makes_it_an_ordinary_one(body: str) -> None:
+    block = f"""FUNCTION_BLOCK Block VAR_INPUT a, b : DINT; END_VAR VAR_OUTPUT sum : DINT; END_VAR
+    VAR p : POINTER TO DINT; inner : TON; name : STRING; END_VAR {body} END_FUNCTION_BLOCK"""
+    text = lowered(f"{block} PROGRAM Main VAR x : Block; END_VAR x(a := 1, b := 2); END_PROGRAM")
+    assert signature(text, "st.Block").startswith("internal void @st.Block(ptr noalias nonnull readonly %ctx,")
+
+
+@pytest.mark.parametrize(("block", "loads"), [(BLOCK, 1), (OPEN_BLOCK, 2)])
+def test_what_is_known_of_other_variables_holds_after_a_call(block: str, loads: int) -> None:
+    text = f"""{block} PROGRAM Main VAR x, y : Block; wanted, one, two : DINT; END_VAR
+    one := wanted; x(a := one, b := 2); y(a := 3, b := 4); two := wanted; END_PROGRAM"""
+    target = find_target("cortex-m3")
+    module, _ = optimised(lowered(text, target.name, debug=True), target, 2)
+    program = next(str(f) for f in module.functions if f.name == "st.Main")
+    assert program.count("load i32") == loads
+
+
+def test_an_output_is_what_was_last_written_to_it() -> None:
+    calls = "p := ADR(x.sum); x(a := 2, b := 3); one := x.sum; p^ := 1; two := x.sum; x(a := 1, b := 1); three := p^;"
+    text = (
+        f"{BLOCK}PROGRAM Main VAR x : Block; p : POINTER TO DINT; one, two, three : DINT; END_VAR {calls} END_PROGRAM"
+    )
+    assert run(text, "Main.one", "Main.two", "Main.three") == [8, 1, 2]
 
 
 def large_callers(blocks: int) -> str:
@@ -142,6 +191,13 @@ def code(built: BuildResult) -> int:
 def test_blocks_of_the_library_are_not_inlined_where_flash_is_small(timers: TypedProgram, target: str) -> None:
     normal, fast = (code(build_program(timers, Options(find_target(target), level))) for level in (2, 3))
     assert normal < fast / 2
+
+
+def test_small_code_has_a_body_once_unless_it_is_called_once() -> None:
+    target = find_target("cortex-m3")
+    once = "x(a := 1, b := 2);"
+    modules = [optimised(lowered(main(c), target.name, size=True), target, 2)[0] for c in (once, once * 2)]
+    assert [str(module).count("define internal") for module in modules] == [1, 2]  # st.Main, st.Block
 
 
 def test_small_code_is_smaller(timers: TypedProgram) -> None:

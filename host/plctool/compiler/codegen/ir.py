@@ -180,10 +180,12 @@ class Function:
         self.callees.append(symbol)
         self.do(f"{'tail ' if tail else ''}call void @{symbol}({', '.join(arguments)}){attributes}")
 
-    def call_value(self, result: str, symbol: str, arguments: Iterable[str], *, tail: bool = False) -> Value:
+    def call_value(
+        self, result: str, symbol: str, arguments: Iterable[str], attributes: str = "", *, tail: bool = False
+    ) -> Value:
         """Calls a function of the program for its result, of the LLVM type `result`."""
         self.callees.append(symbol)
-        return self.value(f"{'tail ' if tail else ''}call {result} @{symbol}({', '.join(arguments)})")
+        return self.value(f"{'tail ' if tail else ''}call {result} @{symbol}({', '.join(arguments)}){attributes}")
 
     def prologue(self, text: str) -> Value:
         """Writes an instruction that gives a value, before all others of the function."""

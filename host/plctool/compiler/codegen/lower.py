@@ -13,7 +13,7 @@ from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
 from plctool.compiler.codegen.partition import texts
 from plctool.compiler.codegen.sections import sections
-from plctool.compiler.codegen.signatures import CONTEXT, SELF, handed_inputs, parameter_list
+from plctool.compiler.codegen.signatures import CONTEXT, SELF, block_signatures, parameter_list, result_type
 from plctool.compiler.codegen.string_functions import string_function
 from plctool.compiler.internal import note_position
 from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
@@ -21,7 +21,7 @@ from plctool.core import lib
 from plctool.debug.bounds import BoundsCheck
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
-from plctool.iec.types import BOOL, is_scalar
+from plctool.iec.types import BOOL
 
 CODE_INIT = "code_init"
 GLOBAL_INIT = "global_init"
@@ -45,7 +45,7 @@ class Lowered:
 def lower(program: TypedProgram, options: Options) -> Lowered:
     """Lowers what the tasks of a checked program reach."""
     unit = Unit(options, program.area_sizes, program.defaults)
-    unit.handed = handed_inputs(program, options.target)
+    unit.handed, unit.closed = block_signatures(program, options.target)
     tasks = [_task_entry(unit, number, task) for number, task in enumerate(program.tasks)]
     _code_init(unit, program.globals)
     functions = {int(lib.CDL_FUNCTION_CODE_INIT): CODE_INIT}
@@ -95,9 +95,9 @@ def _task_entry(unit: Unit, number: int, task: Task) -> str:
 
 
 def _pou(unit: Unit, pou: Pou, effects: Effects, *, raises: bool) -> None:
-    result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
+    result = result_type(pou, unit.closed.get(pou))
     name = unit.symbol(pou, raises=raises)
-    signature = f"{result} @{name}({parameter_list(pou, unit.handed, raises=raises)})"
+    signature = f"{result} @{name}({parameter_list(pou, unit.handed, raises=raises, closed=unit.closed.get(pou))})"
     fn = Function(signature, unit.attributes(pou), unit.inlining(pou))
     body = Body(unit, fn, pou, effects, raises=raises)
     body.open_scope(pou.name, pou.pos)

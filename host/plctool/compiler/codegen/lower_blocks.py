@@ -9,7 +9,7 @@ from plctool.compiler.codegen.lower_arith import convert, is_real
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Frame, Ref, rule
 from plctool.compiler.codegen.lower_string import copy_literal, copy_string
 from plctool.compiler.codegen.lower_unit import value_type
-from plctool.compiler.codegen.signatures import CONTEXT, SELF, parameter_value
+from plctool.compiler.codegen.signatures import CONTEXT, SELF, parameter_value, result_type
 from plctool.compiler.typed import (
     Binary,
     BinaryOp,
@@ -36,9 +36,9 @@ _POINTER = PointerType(BOOL)  # what an instance stores for a VAR_IN_OUT
 @rule(STATEMENTS, FbCall)
 def fb_call(frame: Frame, s: FbCall) -> None:
     """A call of an instance: inputs, the body, outputs."""
-    instance = frame.ref(s.instance)
-    base = frame.address(instance)
-    instance = replace(instance, pointer=base, offset=0)
+    named = frame.ref(s.instance)
+    base = frame.address(named)
+    instance = replace(named, pointer=base, offset=0)
     arguments = _inputs(frame, s, instance)
     for variable, place in s.in_outs:
         slot = Ref(base, variable.offset, _POINTER)
@@ -50,11 +50,31 @@ def fb_call(frame: Frame, s: FbCall) -> None:
         raises = frame.returns_exceptions(s.block, s.dispatch)
         handed_on = [f"ptr {frame.raised}"] if raises else []
         symbol = frame.unit.target_of(s.block, s.dispatch, raises=raises)
-        frame.fn.call(symbol, [CONTEXT, *handed_on, f"ptr {base}", *arguments])
+        _call(frame, s.block, symbol, [*handed_on, f"ptr {base}", *arguments], (named, instance))
         if raises:
             frame.after_call(s.pos)
     for variable, place in s.outputs:
         _copy_out(frame, _member(frame, s.block, instance, variable), frame.ref(place))
+
+
+def _call(frame: Frame, block: Pou, symbol: str, arguments: list[str], instances: tuple[Ref, ...]) -> None:
+    """The call itself. `instances`: the instance, in the ways that it is reached here."""
+    closed = frame.unit.closed.get(block)
+    if closed is None or closed.has_context:
+        arguments = [CONTEXT, *arguments]
+    if closed is None:
+        frame.fn.call(symbol, arguments)
+        return
+    assert block.instance is not None
+    result, tag = result_type(block, closed), frame.unit.members_tag(block.instance)
+    if not closed.returned:
+        frame.fn.call(symbol, arguments, tag)
+        return
+    results = frame.fn.call_value(result, symbol, arguments, tag)
+    for number, variable in enumerate(closed.returned):
+        value = frame.fn.value(f"extractvalue {result} {results}, {number}")
+        for instance in instances:
+            frame.note(_member(frame, block, instance, variable), value)
 
 
 def _inputs(frame: Frame, s: FbCall, instance: Ref) -> list[str]:
@@ -106,7 +126,7 @@ def _member(frame: Frame, block: Pou, instance: Ref, variable: Variable) -> Ref:
     tag = ""
     if instance.direct and (instance.tag or instance.pointer == SELF):
         assert block.instance is not None
-        tag = frame.unit.tag((block.instance.root.name, variable.offset))
+        tag = frame.unit.member_tag(block.instance, variable.offset)
     return instance.member(variable.offset, variable.type, tag)
 
 

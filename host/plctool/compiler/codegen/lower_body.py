@@ -9,6 +9,7 @@ from plctool.compiler.codegen import (  # noqa: F401  their rules
     lower_places,
     lower_stmt,
 )
+from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower_blocks import take_inputs
 from plctool.compiler.codegen.lower_frame import NO_CAPACITY, Body, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise
@@ -22,8 +23,9 @@ from plctool.compiler.codegen.signatures import (
     parameter_capacity,
     parameter_value,
     result_in_memory,
+    result_type,
 )
-from plctool.compiler.typed import Pou, PouKind, Variable
+from plctool.compiler.typed import Pou, PouKind, Variable, VarPlace
 from plctool.iec.types import StringType, is_scalar
 
 
@@ -48,8 +50,18 @@ def write_body(frame: Body) -> None:
     if pou.result is not None and is_scalar(pou.result.type):
         fn.terminate(f"ret {value_type(pou.result.type)} {frame.load(frame.locals[pou.result])}")
     else:
-        fn.terminate("ret void")
+        fn.terminate(f"ret {_outputs(frame, pou)}")
     frame.write_raises()
+
+
+def _outputs(frame: Body, pou: Pou) -> str:
+    """What a block returns, with its type."""
+    closed = frame.unit.closed.get(pou)
+    result, whole = result_type(pou, closed), Value("poison")
+    for number, variable in enumerate(closed.returned if closed else []):
+        value = frame.load(frame.ref(VarPlace(variable, variable.type, pou.pos)))
+        whole = frame.fn.value(f"insertvalue {result} {whole}, {value_type(variable.type)} {value}, {number}")
+    return result if result == "void" else f"{result} {whole}"
 
 
 def write_calls(frame: Body, parts: list[str]) -> None:

@@ -325,6 +325,10 @@ class Frame:
             self._put(ref.member(4, DINT, ref.tag), "i32", number(0))
         self._put(ref, text, value)
 
+    def note(self, ref: Ref, value: Value) -> None:
+        """`value` is known to be at `ref`."""
+        self._memory().note_load(ref.pointer, ref.offset, value_type(ref.type), value)
+
     def _loaded(self, ref: Ref, text: str) -> Value:
         """What is in memory, without an instruction if that is known."""
         value = self._memory().value(ref.pointer, ref.offset, text)

@@ -49,7 +49,7 @@ def variable(frame: Frame, place: VarPlace) -> Ref:
         return Ref(frame.area_base(var.area), var.offset, t, tag, True, string_capacity(t))
     if var.storage is Storage.SELF:
         assert frame.pou is not None and frame.pou.instance is not None
-        tag = frame.unit.tag((frame.pou.instance.root.name, var.offset))
+        tag = frame.unit.member_tag(frame.pou.instance, var.offset)
         return Ref(SELF, var.offset, t, tag, True, string_capacity(t))
     if var.storage is Storage.REFERENCE and var not in frame.locals:
         if frame.pou is not None and frame.pou.kind is PouKind.METHOD:
@@ -61,7 +61,7 @@ def variable(frame: Frame, place: VarPlace) -> Ref:
 def _stored_reference(frame: Frame, var: Variable) -> Ref:
     """A VAR_IN_OUT of a function block: the pointer its caller stored in the instance, loaded once."""
     assert frame.pou is not None and frame.pou.instance is not None
-    tag = frame.unit.tag((frame.pou.instance.root.name, var.offset))
+    tag = frame.unit.member_tag(frame.pou.instance, var.offset)
     slot = frame.fn.prologue(f"getelementptr inbounds i8, ptr {SELF}, {frame.pointer_int} {var.offset}")
     pointer = frame.fn.prologue(f"load ptr, ptr {slot}{tag}")
     return Ref(pointer, 0, var.type, capacity=string_capacity(var.type))
@@ -70,7 +70,7 @@ def _stored_reference(frame: Frame, var: Variable) -> Ref:
 def _unsure_reference(frame: Frame, var: Variable, pos: Pos) -> Ref:
     """A VAR_IN_OUT of the block in a method, which may run before the block was called for the first time."""
     assert frame.pou is not None and frame.pou.instance is not None
-    tag = frame.unit.tag((frame.pou.instance.root.name, var.offset))
+    tag = frame.unit.member_tag(frame.pou.instance, var.offset)
     pointer = frame.load(Ref(SELF, var.offset, PointerType(var.type), tag))
     return _behind(frame, pointer, var.type, pos)
 
@@ -83,7 +83,7 @@ def member(frame: Frame, place: MemberPlace) -> Ref:
     if isinstance(base.type, StructType) and base.type.union:  # its members overlap, and so do their parts
         return replace(base.member(place.offset, place.type), direct=False)
     if base.direct and isinstance(base.type, StructType) and (base.tag or base.pointer == SELF):
-        tag = frame.unit.tag((base.type.root.name, place.offset))
+        tag = frame.unit.member_tag(base.type, place.offset)
     return base.member(place.offset, place.type, tag)
 
 

@@ -9,6 +9,7 @@ import zlib
 from dataclasses import dataclass
 from enum import Enum
 
+from plctool.compiler.codegen.closed import Closed
 from plctool.compiler.codegen.ir import Module, escape
 from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
 from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable
@@ -105,6 +106,7 @@ class Unit:
         self.exchanges = False  # tasks exclude each other by Intrinsic.EXCHANGE
         self.sections: set[Pou] = set()  # parts of POUs
         self.handed: dict[Pou, list[Variable]] = {}  # inputs that function blocks get as parameters
+        self.closed: dict[Pou, Closed] = {}  # the blocks that are closed
         self.pous: dict[tuple[Pou, bool], str] = {}  # symbol of every POU; True: returns its exceptions
         self.structs: dict[str, StructType] = {}  # types whose default initialiser is needed, by symbol
         self.helpers: set[str] = set()
@@ -122,7 +124,7 @@ class Unit:
         self.empty = module.metadata("!{}")
         tree = module.metadata('!{!"st"}')
         self._tag_root = module.metadata(f'!{{!"any", !{tree}, i64 0}}')
-        self._tags: dict[object, str] = {}
+        self._tags: dict[object, tuple[str, int]] = {}
         # An access through NULL that is not checked is left to the processor, which faults.
         base = function_attributes(self.target)
         always = base if Check.NULL in options.checks else f"{base} null_pointer_is_valid"
@@ -146,6 +148,8 @@ class Unit:
         """The attributes for LLVM about inlining a POU: the standard library is made for it, if there is room."""
         if pou.kind is PouKind.PROGRAM or self.options.debug or pou in self.sections:
             return "noinline"
+        if self.options.size and pou in self.closed and self.closed[pou].calls > 1:
+            return "noinline"  # with its inputs and outputs in registers a call is smaller than any body
         large = _LARGE_FRAME_OF_CONTROLLER if self.options.compact else _LARGE_FRAME
         if sum(variable.type.size for variable in pou.locals) > large:
             return "noinline"  # or its caller would need that room, and probe it, also when it does not call
@@ -232,12 +236,24 @@ class Unit:
 
     def tag(self, key: object) -> str:
         """Alias tag: accesses with different tags do not overlap; those without a tag may overlap all."""
-        text = self._tags.get(key)
-        if text is None:
-            node = self.module.metadata(f'!{{!"{len(self._tags)}", !{self._tag_root}, i64 0}}')
-            text = f", !tbaa !{self.module.metadata(f'!{{!{node}, !{node}, i64 0}}')}"
-            self._tags[key] = text
-        return text
+        return self._tag(key, self._tag_root)[0]
+
+    def members_tag(self, struct: StructType) -> str:
+        """The alias tag of what accesses any members of a struct or FB."""
+        return self._tag(struct.root.name, self._tag_root)[0]
+
+    def member_tag(self, struct: StructType, offset: int) -> str:
+        """The alias tag of one of them."""
+        return self._tag((struct.root.name, offset), self._tag(struct.root.name, self._tag_root)[1])[0]
+
+    def _tag(self, key: object, parent: int) -> tuple[str, int]:
+        """A tag and its node. Accesses with a tag and with one of its parents may overlap."""
+        known = self._tags.get(key)
+        if known is None:
+            node = self.module.metadata(f'!{{!"{len(self._tags)}", !{parent}, i64 0}}')
+            known = f", !tbaa !{self.module.metadata(f'!{{!{node}, !{node}, i64 0}}')}", node
+            self._tags[key] = known
+        return known
 
     def file(self, path: str) -> int:
         """The DIFile of a source file."""

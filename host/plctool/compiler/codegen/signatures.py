@@ -3,13 +3,16 @@ declares.
 
 A function block finds its inputs in its instance. Those that every call of the block gives, it is passed as parameters,
 as far as there are registers for them, and stores them itself: that is smaller and faster than to store them before
-each call and to load them in the block.
+each call and to load them in the block. The first outputs of a closed block (`closed.py`) come back as its results,
+beside their values in the instance: most are used right after the call.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
+from plctool.compiler.codegen.closed import Closed, closed_block
 from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower_arith import is_real, is_signed
 from plctool.compiler.codegen.lower_frame import RAISED
@@ -25,6 +28,7 @@ RESULT = Value("%result", fixed=True)  # where a result goes that comes back in 
 RESULT_CAPACITY = Value("%result.capacity")
 
 HandedInputs = dict[Pou, list[Variable]]
+ClosedBlocks = dict[Pou, Closed]
 
 
 def parameter_value(number: int) -> Value:
@@ -78,9 +82,11 @@ class Formal:
         return f"{self.type} {self.value}"
 
 
-def formals(pou: Pou, handed: HandedInputs, *, raises: bool = False) -> list[Formal]:
+def formals(pou: Pou, handed: HandedInputs, *, raises: bool = False, closed: Closed | None = None) -> list[Formal]:
     """The parameters of the function of a unit. `raises`: of the form that returns its exceptions."""
-    found = [Formal("ptr", Value("%ctx"), "noalias nonnull readonly")]
+    found = []
+    if closed is None or closed.has_context:
+        found.append(Formal("ptr", Value("%ctx"), "noalias nonnull readonly"))
     if raises:
         found.append(Formal("ptr", RAISED, "noalias nonnull"))
     if pou.kind in (PouKind.FUNCTION_BLOCK, PouKind.METHOD):
@@ -97,16 +103,27 @@ def formals(pou: Pou, handed: HandedInputs, *, raises: bool = False) -> list[For
     return found
 
 
-def parameter_list(pou: Pou, handed: HandedInputs, *, raises: bool = False) -> str:
+def parameter_list(pou: Pou, handed: HandedInputs, *, raises: bool = False, closed: Closed | None = None) -> str:
     """The parameters of the define line."""
-    return ", ".join(formal.definition for formal in formals(pou, handed, raises=raises))
+    return ", ".join(formal.definition for formal in formals(pou, handed, raises=raises, closed=closed))
 
 
-def handed_inputs(program: TypedProgram, target: Target) -> HandedInputs:
-    """The inputs of each function block that it is passed as parameters."""
+def block_signatures(program: TypedProgram, target: Target) -> tuple[HandedInputs, ClosedBlocks]:
+    """The inputs of each function block that it is passed as parameters, and what else closed blocks have."""
+    given, calls = _inputs_of_all_calls(program)
+    tried = {block: closed_block(block, target, calls[block]) for block, inputs in given.items() if inputs}
+    closed = {block: found for block, found in tried.items() if found is not None}
+    handed = {block: _in_registers(inputs, target, closed.get(block)) for block, inputs in given.items()}
+    return {block: inputs for block, inputs in handed.items() if inputs}, closed
+
+
+def _inputs_of_all_calls(program: TypedProgram) -> tuple[HandedInputs, Counter[Pou]]:
+    """For each function block the inputs that every call gives, none for those that only the class decides about; and
+    how many calls there are."""
     extra = (pou for pou in (program.startup, program.shutdown) if pou is not None)
     reached = dict.fromkeys([*program.pous, *program.programs.values(), *extra])  # and perhaps some that never run
     given: HandedInputs = {}
+    calls: Counter[Pou] = Counter()
     todo = list(reached)
     while todo:
         for call in walk(todo.pop().body):
@@ -116,8 +133,18 @@ def handed_inputs(program: TypedProgram, target: Target) -> HandedInputs:
                 todo += [pou for pou in called if pou not in reached]
                 reached.update(dict.fromkeys(called))
                 if isinstance(call, FbCall):
+                    calls[call.block] += 1
                     _restrict(given, call, others)
-    return {block: found for block, inputs in given.items() if (found := _in_registers(inputs, target))}
+    return given, calls
+
+
+def result_type(pou: Pou, closed: Closed | None) -> str:
+    """The LLVM type of what the function of a unit returns."""
+    if pou.result is not None and is_scalar(pou.result.type):
+        return value_type(pou.result.type)
+    if closed is None or not closed.returned:
+        return "void"
+    return f"{{ {', '.join(value_type(v.type) for v in closed.returned)} }}"
 
 
 def _restrict(given: HandedInputs, call: FbCall, others: list[Pou]) -> None:
@@ -130,11 +157,11 @@ def _restrict(given: HandedInputs, call: FbCall, others: list[Pou]) -> None:
         given[call.block] = [variable for variable in given.get(call.block, here) if variable in here]
 
 
-def _in_registers(inputs: list[Variable], target: Target) -> list[Variable]:
-    """The first inputs, as many as fit; the context and the instance take two registers for integers."""
+def _in_registers(inputs: list[Variable], target: Target, closed: Closed | None) -> list[Variable]:
+    """The first inputs, as many as fit; the context, if it is passed, and the instance take registers for integers."""
     found = []
     integers, reals = target.registers
-    left = {False: integers - 2, True: reals}
+    left = {False: integers - (2 if closed is None or closed.has_context else 1), True: reals}
     for variable in sorted(inputs, key=lambda v: v.offset):
         t, in_memory = variable.type, variable.storage is Storage.SELF
         if in_memory and is_scalar(t) and t.size <= target.pointer_size:
