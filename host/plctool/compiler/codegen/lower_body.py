@@ -10,6 +10,7 @@ from plctool.compiler.codegen import (  # noqa: F401  their rules
     lower_stmt,
 )
 from plctool.compiler.codegen.ir import Value
+from plctool.compiler.codegen.lengths import length_variable
 from plctool.compiler.codegen.lower_blocks import take_inputs
 from plctool.compiler.codegen.lower_frame import NO_CAPACITY, Body, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise
@@ -55,7 +56,10 @@ def write_body(frame: Body) -> None:
 
 
 def _outputs(frame: Body, pou: Pou) -> str:
-    """What a block returns, with its type."""
+    """What is returned besides the result of a function, with its type."""
+    length = length_variable(pou)
+    if length is not None:
+        return f"i32 {frame.load(frame.locals[length])}"
     closed = frame.unit.closed.get(pou)
     result, whole = result_type(pou, closed), Value("poison")
     for number, variable in enumerate(closed.returned if closed else []):

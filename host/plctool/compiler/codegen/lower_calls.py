@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from plctool.compiler.codegen.ir import Value, number
+from plctool.compiler.codegen.lengths import is_appending, is_measuring, length_variable
 from plctool.compiler.codegen.lower_arith import convert, is_bool, lowest_bit
-from plctool.compiler.codegen.lower_frame import Frame, Ref
+from plctool.compiler.codegen.lower_frame import Body, Frame, Ref
 from plctool.compiler.codegen.lower_places import materialised
+from plctool.compiler.codegen.lower_string import append_string
 from plctool.compiler.codegen.lower_unit import value_type
 from plctool.compiler.codegen.signatures import CONTEXT, extension, parameter_types
 from plctool.compiler.typed import (
@@ -13,16 +15,24 @@ from plctool.compiler.typed import (
     Direction,
     Dispatch,
     Expr,
+    Load,
     Parameter,
     Place,
     Pou,
+    VarPlace,
 )
 from plctool.iec.types import StringType, is_scalar
+
+_LONGEST = 32_767  # characters that LEN gives
 
 
 def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
     """Calls a function. `result`: where a string, array or struct goes; scalars are returned."""
     pou = e.function
+    if is_measuring(pou):
+        length = _known_length(frame, e.args[0])
+        if length is not None:
+            return length
     write_back: list[tuple[Ref, Ref]] = []
     arguments = [] if pou.external else [CONTEXT]
     raises = frame.returns_exceptions(pou, e.dispatch)
@@ -41,7 +51,15 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
         operands = _operands(frame, pou, parameter, argument, write_back)
         types = parameter_types(pou, parameter)
         arguments += [f"{text} {operand}" for text, operand in zip(types, operands, strict=True)]
-    value = _call_instruction(frame, pou, e.dispatch, arguments, raises=raises)
+    known = frame.lengths() if _leaves_strings(frame, e) else {}
+    length = _appended(frame, e, result, arguments)
+    value = _call_instruction(frame, pou, e.dispatch, arguments, raises=raises) if length is None else length
+    if result is not None and length_variable(pou) is not None:
+        assert value is not None
+        frame.note_length(result, value, known)
+    elif result is None or (result.direct and result.pointer.fixed):
+        written = None if result is None else (result.pointer, result.offset)
+        frame.keep_lengths({place: length for place, length in known.items() if place != written})
     if raises:
         frame.after_call(e.pos)
     for temporary, place in write_back:
@@ -51,6 +69,36 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
         else:
             frame.copy(place, temporary, place.type.size)
     return value
+
+
+def _known_length(frame: Frame, argument: Expr | Place | None) -> Value | None:
+    """What LEN gives, if that is known."""
+    place = argument.place if isinstance(argument, Load) else argument
+    if not isinstance(place, VarPlace):
+        return None
+    ref = frame.ref(place)
+    length, capacity = frame.length(ref), ref.capacity.constant
+    if length is None or capacity is None or capacity > _LONGEST:
+        return None
+    return number(length.constant) if length.constant is not None else frame.fn.value(f"trunc i32 {length} to i16")
+
+
+def _appended(frame: Frame, e: Call, result: Ref | None, arguments: list[str]) -> Value | None:
+    """Adds the second argument to a string that is the first one and the result, if its length is known. Returns the
+    new length."""
+    if not is_appending(e.function) or result is None or f"ptr {frame.address(result)}" != arguments[3]:
+        return None
+    length, capacity = frame.length(result), _result_capacity(frame, e.function, result)
+    if length is None or capacity != result.capacity:
+        return None
+    pointer, room = (Value(text.split()[1]) for text in arguments[5:7])
+    return append_string(frame, result, length, capacity, Ref(pointer, 0, result.type, capacity=room))
+
+
+def _leaves_strings(frame: Frame, e: Call) -> bool:
+    """Whether a call writes nothing but its result."""
+    inputs = all(parameter.direction is Direction.INPUT for parameter in e.function.parameters)
+    return inputs and e.dispatch is None and isinstance(frame, Body) and frame.effects.is_local(e.function)
 
 
 def _result_capacity(frame: Frame, pou: Pou, result: Ref) -> Value:
@@ -78,6 +126,8 @@ def _call_instruction(
         fn.do(text)
         return None
     symbol = unit.target_of(pou, dispatch, raises=raises)
+    if length_variable(pou) is not None:
+        return fn.call_value("i32", symbol, arguments)
     if result is not None:
         return fn.call_value(value_type(result), symbol, arguments)
     fn.call(symbol, arguments)

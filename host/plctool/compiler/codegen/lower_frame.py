@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import NULL, Function, Value, number
+from plctool.compiler.codegen.lengths import Lengths
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, Check, Unit, value_type
 from plctool.compiler.codegen.memory import Memory
 from plctool.compiler.internal import note_position
@@ -149,6 +150,7 @@ class Frame:
         self._addresses: dict[tuple[str, Value, int], Value] = {}  # by block, so that none lives longer than it must
         self._raises: dict[Handler, dict[tuple[int | None, str], str]] = {}
         self._known = Memory()
+        self._lengths = Lengths()
         self._free: dict[tuple[int, int], list[Value]] = {}
         self._busy: list[tuple[tuple[int, int], Value]] = []
         self.pointer_int = f"i{8 * unit.target.pointer_size}"
@@ -339,10 +341,32 @@ class Frame:
 
     def _put(self, ref: Ref, text: str, value: Value) -> None:
         """Stores; takes out the instruction of an earlier store that nothing reads."""
+        if not (ref.direct and ref.pointer.fixed):  # it may be a character
+            self._lengths.set({}, -1)
         line = self.fn.store(f"store {text} {value}, ptr {self.address(ref)}, align {ref.align}{ref.tag}")
         useless = self._memory().note_store(ref.pointer, ref.offset, text, value, line)
         if useless is not None:
             self.fn.remove(useless)
+
+    def length(self, ref: Ref) -> Value | None:
+        """How many characters a string has, as an i32, if that is known."""
+        return self._lengths.known(self.fn.barriers).get((ref.pointer, ref.offset))
+
+    def note_length(self, ref: Ref, length: Value, known: dict[tuple[Value, int], Value] | None = None) -> None:
+        """The string at `ref` has been written and has this length. `known`: what is still known of others."""
+        lengths = dict(known or {})
+        lengths.pop((ref.pointer, ref.offset), None)
+        if ref.tag and ref.direct and ref.pointer.fixed:  # a variable that no other one overlaps
+            lengths[ref.pointer, ref.offset] = length
+        self._lengths.set(lengths, self.fn.barriers)
+
+    def lengths(self) -> dict[tuple[Value, int], Value]:
+        """All lengths that are known."""
+        return self._lengths.known(self.fn.barriers)
+
+    def keep_lengths(self, known: dict[tuple[Value, int], Value]) -> None:
+        """They are still known."""
+        self._lengths.set(known, self.fn.barriers)
 
     def _memory(self) -> Memory:
         """What is known here."""

@@ -32,7 +32,15 @@ def copy_string(frame: Frame, target: Ref, source: Ref) -> None:
             return
     name, room = frame.unit.helper(_helper("copy", target)), f"i32 {source.capacity}"
     to = ["ptr null", f"ptr {frame.address(target)}", f"i32 {target.capacity}", "i32 0"]
-    frame.fn.call_value("i32", name, [*to, f"ptr {frame.address(source)}", room, "i32 0", room])
+    copied = frame.fn.call_value("i32", name, [*to, f"ptr {frame.address(source)}", room, "i32 0", room])
+    frame.note_length(target, copied)
+
+
+def append_string(frame: Frame, target: Ref, length: Value, capacity: Value, source: Ref) -> Value:
+    """Adds `source` to a string of the length `length`, up to `capacity`. Returns the new length."""
+    name, room = frame.unit.helper(_helper("copy", target)), f"i32 {source.capacity}"
+    to = ["ptr null", f"ptr {frame.address(target)}", f"i32 {capacity}", f"i32 {length}"]
+    return frame.fn.call_value("i32", name, [*to, f"ptr {frame.address(source)}", room, "i32 0", room])
 
 
 def copy_literal(frame: Frame, target: Ref, text: str) -> None:
@@ -46,6 +54,7 @@ def copy_literal(frame: Frame, target: Ref, text: str) -> None:
         source = replace(literal_text(frame, text, wide=wide), direct=target.direct)
         frame.copy(target, source, len(text) * _unit(target))
     _terminate(frame, target, len(text))
+    frame.note_length(target, number(len(text)))
 
 
 def literal_text(frame: Frame, text: str, *, wide: bool) -> Ref:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from plctool.compiler.codegen.closed import Closed, closed_block
 from plctool.compiler.codegen.ir import Value
+from plctool.compiler.codegen.lengths import length_variable
 from plctool.compiler.codegen.lower_arith import is_real, is_signed
 from plctool.compiler.codegen.lower_frame import RAISED
 from plctool.compiler.codegen.lower_unit import value_type
@@ -142,6 +143,8 @@ def result_type(pou: Pou, closed: Closed | None) -> str:
     """The LLVM type of what the function of a unit returns."""
     if pou.result is not None and is_scalar(pou.result.type):
         return value_type(pou.result.type)
+    if length_variable(pou) is not None:
+        return "i32"
     if closed is None or not closed.returned:
         return "void"
     return f"{{ {', '.join(value_type(v.type) for v in closed.returned)} }}"
