@@ -77,6 +77,8 @@ KEYWORDS = {
     )},
 }  # fmt: skip
 
+_LAST_IN_KINDS = _TOKEN.groupindex["PUNCT"]  # the groups up to this one are in `_Kinds`
+
 KEYWORDS |= dict.fromkeys(slips.WORDS, "MISSPELT") | dict.fromkeys(slips.REFUSED, "REFUSED")
 
 SOFT = frozenset((
@@ -109,6 +111,15 @@ _PRIORITY = re.compile(r"\s*\(\s*PRIORITY\s*:=", re.IGNORECASE)
 _DECLARED = re.compile(r"\s*(?:,|:(?!=))")
 _LABEL = re.compile(r"\s+[A-Za-z_]\w*\s*:(?!=)")
 _QUOTE = re.compile(r"\s*['\"]")
+
+
+class _Kinds(dict[str, str]):
+    """The type of a word or sign: signs are put in, words come when they are first met, as they are written."""
+
+    def __missing__(self, word: str) -> str:
+        kind = self[word] = KEYWORDS.get(word.upper(), "IDENT")
+        return kind
+
 
 Report = Callable[[int, str, str], None]  # offset, code, message
 
@@ -154,16 +165,15 @@ class Lexer:
 
     def __iter__(self) -> Iterator[Token]:
         """All tokens, last one of type $END."""
-        at = self._start
+        at, kinds = self._start, _Kinds(_PUNCTUATION)
         while True:
             for match in _TOKEN.finditer(self.text, at, self._end):
-                kind = match.lastgroup
-                assert kind is not None
-                word, pos = match[kind], match.start(kind)
-                if kind == "WORD":
-                    token = Token(KEYWORDS.get(word.upper(), "IDENT"), word, pos)
-                elif kind == "PUNCT":
-                    token = Token(_PUNCTUATION[word], word, pos)
+                group = match.lastindex or 0
+                word, pos = match[group], match.start(group)
+                if group <= _LAST_IN_KINDS:
+                    token = Token(kinds[word], word, pos)
+                elif (kind := match.lastgroup) == "NUMBER":
+                    token = Token(kind, word, pos)
                 elif kind == "SKIP":
                     continue
                 elif kind == "NESTED":
@@ -187,14 +197,15 @@ class Lexer:
                     yield Token("STRING", "''", pos)
                     break
                 else:
+                    assert kind is not None
+                    if kind == "END":
+                        self._conditions.finish()
                     token = Token({"END": "$END", "DATE": "TYPED"}.get(kind, kind), word, pos)
                 if self._pending:
                     self.attributes[pos] = {name: said for _, name, said in self._pending}
                     self.repeated[pos], self._pending = self._pending, []
-                if kind == "END":
-                    self._conditions.finish()
                 yield token
-                if kind == "END":
+                if token.type == "$END":
                     return
 
     def _skip_comment(self, mark: str, at: int) -> int:

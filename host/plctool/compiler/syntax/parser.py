@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.attributes import Attributes
-from plctool.compiler.syntax.automaton import Parser, Reducer
+from plctool.compiler.syntax.automaton import Parser, Reducer, picking, shortened
 from plctool.compiler.syntax.builder import Builder
 from plctool.compiler.syntax.lexer import (
     KEYWORDS,
@@ -29,28 +30,22 @@ from plctool.compiler.syntax.lexer import (
 )
 from plctool.compiler.syntax.plain_text import plain_text
 from plctool.compiler.syntax.syntax_errors import Recovery
-from plctool.compiler.syntax.tables import Rule, Tables, load_tables
+from plctool.compiler.syntax.tables import Rule, load_tables
 
 
 def _reducer(rule: Rule, builder: Builder) -> Reducer | None:
-    """The function that makes the value of a rule from its children; None when the only child is the value."""
+    """How the value of a rule is made from its children; None when the only child is the value."""
     parts = rule.parts
-    plain = not any(spliced or index < 0 for index, spliced in parts)
     if rule.is_list:
         return _list_reducer(rule)
+    plain = not any(spliced or index < 0 for index, spliced in parts)
+    indices = [index for index, _ in parts]
     if rule.transparent and plain and len(parts) == 1:
-        index = parts[0][0]
-        return None if rule.size == 1 else lambda children: children[index]
+        return None if rule.size == 1 else Reducer(lambda child: child, picking(indices))
     callback = getattr(builder, rule.callback)
-    if plain and len(parts) == rule.size:
-        return lambda children: callback(*children)
-    if plain and len(parts) == 1:
-        first = parts[0][0]
-        return lambda children: callback(children[first])
-    if plain and len(parts) == 2:
-        left, right = parts[0][0], parts[1][0]
-        return lambda children: callback(children[left], children[right])
-    return lambda children: callback(*_gather(children, parts))
+    if not plain:
+        return Reducer(lambda *children: callback(*_gather(children, parts)))
+    return Reducer(callback, None if len(parts) == rule.size else picking(indices))
 
 
 def _list_reducer(rule: Rule) -> Reducer:
@@ -58,17 +53,23 @@ def _list_reducer(rule: Rule) -> Reducer:
     parts = rule.parts
     if parts and parts[0] == (0, True):
         more = parts[1:]
-
-        def extend(children: list[Any]) -> list[Any]:
-            found: list[Any] = children[0]
-            found += _gather(children, more)
-            return found
-
-        return extend
-    return lambda children: _gather(children, parts)
+        if len(more) == 1 and not more[0][1]:
+            return Reducer(_with_one_more, picking([0, more[0][0]]))
+        return Reducer(lambda *children: _extended(children[0], _gather(children, more)))
+    return Reducer(lambda *children: _gather(children, parts))
 
 
-def _gather(children: list[Any], parts: tuple[tuple[int, bool], ...]) -> list[Any]:
+def _with_one_more(found: list[Any], child: Any) -> list[Any]:
+    found.append(child)
+    return found
+
+
+def _extended(found: list[Any], more: list[Any]) -> list[Any]:
+    found += more
+    return found
+
+
+def _gather(children: Sequence[Any], parts: tuple[tuple[int, bool], ...]) -> list[Any]:
     found: list[Any] = []
     for index, spliced in parts:
         if spliced:
@@ -79,9 +80,12 @@ def _gather(children: list[Any], parts: tuple[tuple[int, bool], ...]) -> list[An
 
 
 @cache
-def _machine() -> tuple[Tables, Builder, list[Reducer | None]]:
+def _machine() -> tuple[Builder, Callable[[], Parser]]:
+    """The builder, and what makes a parser for it."""
     tables, builder = load_tables(), Builder()
-    return tables, builder, [_reducer(rule, builder) for rule in tables.rules]
+    reducers = [_reducer(rule, builder) for rule in tables.rules]
+    gotos = shortened(tables, reducers)
+    return builder, lambda: Parser(tables, reducers, gotos)
 
 
 _AMBIGUOUS = SOFT | {"OP", "NOT"}
@@ -153,25 +157,23 @@ def parse_all(
 ) -> Parsed:
     """All that a text holds. `declared`: what {IF defined(pou: NAME)} finds; `tokens` takes those that have a place in
     the grammar, with the types that they have there."""
-    tables, builder, reducers = _machine()
-    parser = Parser(tables, reducers)
-    recovery = Recovery(parser, source, report)
+    builder, new_parser = _machine()
+    parser, taken = new_parser(), [] if tokens is None else tokens
+    recovery = Recovery(parser, taken, source, report)
     lexer = Lexer(source.text, recovery.report_token, start, end, declared)
     places: dict[int, str] = {}
     builder.source, builder.attributes, builder.places, builder.report = source, lexer.attributes, places, report
     builder.repeated = lexer.repeated
-    feed, text = parser.feed, plain_text(source.text, strings=True)
-    for token in lexer:
+    coming, text = iter(lexer), plain_text(source.text, strings=True)
+    while (token := next(coming, None) if recovery.skipping else parser.run(coming, taken, _AMBIGUOUS)) is not None:
         if token.type in _AMBIGUOUS:
             _decide(token, parser, recovery, text)
             if token.type == "LEFT_OUT":
                 continue
         if recovery.skipping and not recovery.resume(token):
             continue
-        if feed(token) or (_is_name_after_all(token, parser, text) and feed(token)):
-            recovery.accept(token)
-            if tokens is not None:
-                tokens.append(token)
+        if parser.feed(token) or (_is_name_after_all(token, parser, text) and parser.feed(token)):
+            taken.append(token)
         else:
             recovery.handle(token)
     result = parser.values[0] if len(parser.values) == 1 else []

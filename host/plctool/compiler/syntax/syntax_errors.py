@@ -73,23 +73,23 @@ Stack = list[int]
 class Recovery:
     """Repairs the state of one parser. `skipping` is set while text is thrown away."""
 
-    def __init__(self, parser: Parser, source: Source, report: Report) -> None:
+    def __init__(self, parser: Parser, taken: list[Token], source: Source, report: Report) -> None:
+        """`taken`: the tokens that were fine up to now."""
         self._parser = parser
         self._tables = parser.tables
         self._source = source
         self._report = report
         self.skipping = False
-        self.previous: Token | None = None
-        self._last: tuple[Token, ...] = ()
-        self._accepted = _APART  # tokens since the last error
+        self._taken = taken
+        self._quiet_up_to = 0  # an error before so many tokens were taken is a consequence of the last one
         self._quiet = False
         self._skip_to = ""  # the word or sign that ends what is refused
         self._dropped: list[str] = []  # openings that were thrown away, whose ends are still to come
 
     def handle(self, token: Token) -> None:
         """Reports that `token` does not fit, and repairs what can be repaired."""
-        self._quiet = self._accepted < _APART
-        self._accepted = 0
+        self._quiet = len(self._taken) < self._quiet_up_to
+        self._note_error()
         if self._parted_end(token):
             return
         self._reduce()
@@ -105,7 +105,7 @@ class Recovery:
     def report_token(self, offset: int, code: str, message: str) -> None:
         """Reports a fault of the text; what does not fit right after it is a consequence."""
         self._report(offset, code, message)
-        self._accepted = 0
+        self._note_error()
 
     def report_misspelt(self, token: Token, kind: str) -> None:
         """Reports a keyword that is spelled wrongly; `kind` is the terminal it stands for."""
@@ -124,25 +124,32 @@ class Recovery:
         refusal = slips.REFUSED[token.text.upper()]
         self._leave_out(token, refusal.message, refusal.end)
 
-    def accept(self, token: Token) -> None:
-        """Notes a token that was fine."""
-        self._last = (self.previous, token) if self.previous else (token,)
-        self.previous = token
-        self._accepted += 1
-
     def resume(self, token: Token) -> bool:
         """While skipping: whether to go on with `token`. A semicolon ends what is skipped and belongs to it."""
         if self._skip_to and token.type != END:
             if token.text.upper() == self._skip_to:
-                self._skip_to, self.skipping, self._accepted = "", False, _APART
+                self._skip_to, self.skipping, self._quiet_up_to = "", False, 0
             return False
         if token.type != "_SEMI" and token.type not in _SYNC:
             return False
         if self._shift(self._parser.states, token.type) is not None:
             self.skipping = False
-            self._accepted = _APART
+            self._quiet_up_to = 0
             return True
         return self._drop(None if token.type == "_SEMI" else token.type) and token.type != "_SEMI"
+
+    @property
+    def _earlier(self) -> Token | None:
+        """The first of the last two tokens that were fine, or the only one."""
+        return next(iter(self._taken[-2:]), None)
+
+    @property
+    def _previous(self) -> Token | None:
+        """The last token that was fine."""
+        return self._taken[-1] if self._taken else None
+
+    def _note_error(self) -> None:
+        self._quiet_up_to = len(self._taken) + _APART
 
     # ---- repairs ----
 
@@ -160,7 +167,7 @@ class Recovery:
             if kind == "_ASSIGN" and token.type not in _VALUES:
                 continue
             if self._shift(stack, kind, token.type) is not None:
-                if kind == "_SEMI" and self.previous is not None and self.previous.type == "RETURN":
+                if kind == "_SEMI" and self._previous is not None and self._previous.type == "RETURN":
                     message = _RETURN
                 self._say(self._gap(token), message.format(item=self._item_words(stack), next=_shown(token)))
                 self._parser.feed(Token(kind, text, self._gap(token)))
@@ -191,7 +198,7 @@ class Recovery:
             self._parser.values.pop()
             if kind == "_SEMI":
                 before = self._source.text[: name.pos].rstrip()
-                instruction = self.previous is not None and self._last[0].text.upper() in _INSTRUCTIONS
+                instruction = self._earlier is not None and self._earlier.text.upper() in _INSTRUCTIONS
                 hint = "; Instruction List is not supported, write Structured Text" if instruction else ""
                 self._say(len(before), f"expected ; after the {self._item_words(stack)}{hint}")
             else:
@@ -237,7 +244,7 @@ class Recovery:
 
     def _parted_end(self, token: Token) -> bool:
         """`END IF` for END_IF."""
-        previous, name = self.previous, token.text.upper()
+        previous, name = self._previous, token.text.upper()
         if previous is None or previous.text.upper() != "END" or f"END_{name}" not in KEYWORDS:
             return False
         if not self._parser.values or self._parser.values[-1] is not previous:
@@ -256,7 +263,7 @@ class Recovery:
         where = {"stmt": "body", "var_decl": "declaration"}.get(item or "", "")
         if where == "declaration" and not self._declarations_end_later(token):
             where = ""
-        begin = self._last[0].pos if self._last else token.pos
+        begin = (self._earlier or token).pos
         found = hint(self._source.text, begin, token.pos, where)
         if found is not None:
             self._say(*found)
@@ -328,7 +335,7 @@ class Recovery:
                 states[:] = after
                 values[depth - 1 :] = [None]
                 self.skipping = False
-                self._accepted = _APART
+                self._quiet_up_to = 0
                 return True
         return False
 
@@ -369,14 +376,14 @@ class Recovery:
         return next(reversed(self._openers()), None)
 
     def _gap(self, token: Token) -> int:
-        return self.previous.end if self.previous else token.pos
+        return self._previous.end if self._previous else token.pos
 
     def _known_slip(self, token: Token, stack: Stack) -> str:
         """What to say of a mistake that is made often; "" when it is another one."""
         if self._shift(stack, "NUMBER") is not None:
             listed = "a list of values is for declarations; assign the elements one by one, or copy a constant"
             return listed if token.type == "_LSQB" else ""
-        if self.previous is not None and self.previous.type == "RETURN":
+        if self._previous is not None and self._previous.type == "RETURN":
             return _RETURN
         if self._item(stack) != "stmt":
             return ""
