@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import TypeVar
+from operator import attrgetter
+from typing import Any, TypeVar
 
 from plctool.compiler.typed import (
     AddressOf,
@@ -35,22 +36,27 @@ from plctool.iec.types import alignment_at
 
 T = TypeVar("T")
 _WALKED = frozenset(Node.__subclasses__()) - {Const, Exit, Continue}  # without those no question is about
+_ONE_CHILD = {kind: attrgetter(*kind.children) for kind in _WALKED if len(kind.children) == 1}
+_CHILDREN = {kind: attrgetter(*kind.children) for kind in _WALKED if len(kind.children) > 1}
 
 
 def walk(root: object) -> Iterator[Node]:
     """Every node of statements or expressions below `root` (a node, or lists and tuples of them), but constants, EXIT
     and CONTINUE."""
-    stack = [root]
+    stack: list[Any] = [root]
     while stack:
         node = stack.pop()
         kind = type(node)
         if kind is list or kind is tuple:
-            stack.extend(node)  # type: ignore[arg-type]
-        elif kind in _WALKED:
-            assert isinstance(node, Node)
+            stack += node
+        elif kind in _ONE_CHILD:
             yield node
-            for name in node.children:
-                stack.append(getattr(node, name))
+            stack.append(_ONE_CHILD[kind](node))
+        elif kind in _CHILDREN:
+            yield node
+            stack += _CHILDREN[kind](node)
+        elif kind in _WALKED:
+            yield node
 
 
 def rewrite(root: T, change: Callable[[Node], Node | None]) -> T:
