@@ -121,11 +121,11 @@ def profile(path: Path) -> Stages:
     with stages.stage("lowering"):
         lowered = lower(checked.program, options)
     objects = []
-    for text in lowered.texts:
+    for part in lowered.parts:
         with stages.stage("LLVM: reading"):
-            llvm.parse_assembly(text, llvm.create_context())
+            llvm.parse_assembly(part.text, llvm.create_context())
         with stages.stage("LLVM: optimising"):
-            module, machine = optimised(text, target, options.opt_level, large=len(lowered.texts) > 1)
+            module, machine = optimised(part, target, options.opt_level)
         with stages.stage("LLVM: code"):
             objects.append(machine.emit_object(module))
     stages.seconds["LLVM: optimising"] -= stages.seconds["LLVM: reading"]

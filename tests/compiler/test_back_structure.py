@@ -12,6 +12,7 @@ from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.emit import optimised
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.partition import Part
 from plctool.compiler.front import check_sources
 from plctool.compiler.source import Source
 from plctool.compiler.typed import TypedProgram
@@ -33,8 +34,12 @@ def checked(text: str) -> TypedProgram:
     return result.program
 
 
+def parts(text: str, target: str = "x86_64-linux", **options: object) -> list[Part]:
+    return lower(checked(text), Options(find_target(target), **options)).parts  # type: ignore[arg-type]
+
+
 def lowered(text: str, target: str = "x86_64-linux", **options: object) -> str:
-    return "\n".join(lower(checked(text), Options(find_target(target), **options)).texts)  # type: ignore[arg-type]
+    return "\n".join(part.text for part in parts(text, target, **options))
 
 
 def signature(text: str, symbol: str) -> str:
@@ -154,6 +159,47 @@ def test_a_long_body_becomes_several_functions() -> None:
     text = long_body("m := m + 1;")
     assert len(re.findall(r"^define internal void @st\.Main", lowered(text), re.M)) > 3
     assert run(text, "Main.m") == run(text.replace("n := n + n * 3 - 1;", "n := n * 4 - 1;"), "Main.m")
+
+
+DIVIDED = "a[{i}] := a[{j}] * {k} + a[{i}] / {k};"
+
+
+def much(statement: str) -> str:
+    """A program of 5000 statements, which is too large to be compiled as one."""
+    body = "\n".join(statement.format(i=n % 50, j=n * 7 % 50, k=n * 13 % 99 + 2) for n in range(5000))
+    return f"PROGRAM Main VAR a : ARRAY[0..49] OF DINT := [50(3)]; k : INT; END_VAR\n{body}\nEND_PROGRAM"
+
+
+def test_long_runs_of_a_large_program_are_parts_of_their_own() -> None:
+    found = [part.plain for part in parts(much(DIVIDED))]
+    assert found.count(True) == 2
+    assert found.count(False) == 1  # what calls them, and initial values
+
+
+BRANCH, LOOP = "IF a[{j}] > {k} THEN a[{i}] := {k}; END_IF", "FOR k := 0 TO 9 DO a[k] := {j}; END_FOR"
+
+
+@pytest.mark.parametrize("statement", [BRANCH, LOOP])
+def test_branches_and_loops_of_a_large_program_have_all_passes(statement: str) -> None:
+    found = parts(much(statement + ";"))
+    assert len(found) > 1
+    assert not any(part.plain for part in found)
+
+
+def test_a_small_program_is_one_part_with_all_passes() -> None:
+    assert [(part.large, part.plain) for part in parts(long_body("m := m + 1;", 10))] == [(False, False)]
+
+
+def test_parts_with_fewer_passes_give_the_same_results() -> None:
+    program = checked(much(DIVIDED))
+    found = []
+    for level in (0, 2):
+        built = build_program(program, Options(find_target("x86_64-linux"), opt_level=level))
+        with Simulator(built.image, built.symbols) as plc:
+            plc.run_cycles(2)
+            found.append([plc.read(f"Main.a[{i}]") for i in range(50)])
+    assert found[0] == found[1]
+    assert len(set(found[0])) > 20
 
 
 def test_a_long_body_with_return_stays_one_function() -> None:

@@ -7,6 +7,7 @@ from functools import cache
 
 import llvmlite.binding as llvm
 
+from plctool.compiler.codegen.partition import Part
 from plctool.image.targets import Target
 
 
@@ -27,65 +28,79 @@ def target_machine(target: Target, opt_level: int) -> llvm.TargetMachine:
     )
 
 
-def optimised(
-    text: str, target: Target, opt_level: int, *, large: bool = False
-) -> tuple[llvm.ModuleRef, llvm.TargetMachine]:
+def optimised(part: Part, target: Target, opt_level: int) -> tuple[llvm.ModuleRef, llvm.TargetMachine]:
     """The module after LLVM's standard pipeline of the level. Of a large program's level 2, what pays in code that is
-    long and has few loops: level 1, and dead stores. It takes half the time, and the code is as fast and smaller."""
+    long and has few loops: level 1, and dead stores. It takes half the time, and the code is as fast and smaller.
+    What is plain needs still less."""
     machine = target_machine(target, opt_level)
-    module = llvm.parse_assembly(text, llvm.create_context())
+    module = llvm.parse_assembly(part.text, llvm.create_context())
     module.verify()
-    shorter = large and opt_level == 2
+    shorter = part.large and opt_level == 2
     options = llvm.create_pipeline_tuning_options(speed_level=1 if shorter else opt_level)
     options.loop_vectorization = opt_level >= 2 and not shorter
     options.slp_vectorization = opt_level >= 3  # slow, and seldom of use for what programs of controllers do
     builder = llvm.create_pass_builder(machine, options)
-    builder.getModulePassManager().run(module, builder)
+    if shorter and part.plain:
+        _simplify(module, builder)
+    else:
+        builder.getModulePassManager().run(module, builder)
     if shorter:
         _remove_dead_stores(module, builder)
     return module, machine
 
 
+def _simplify(module: llvm.ModuleRef, builder: llvm.PassBuilder) -> None:
+    manager = llvm.create_new_function_pass_manager()
+    manager.add_sroa_pass()
+    manager.add_simplify_cfg_pass()
+    manager.add_instruction_combine_pass()
+    manager.add_simplify_cfg_pass()
+    _run(manager, module, builder)
+
+
 def _remove_dead_stores(module: llvm.ModuleRef, builder: llvm.PassBuilder) -> None:
     manager = llvm.create_new_function_pass_manager()
     manager.add_dead_store_elimination_pass()
+    _run(manager, module, builder)
+
+
+def _run(manager: llvm.FunctionPassManager, module: llvm.ModuleRef, builder: llvm.PassBuilder) -> None:
     for function in module.functions:
         if not function.is_declaration:
             manager.run(function, builder)
 
 
-def emit_object(text: str, target: Target, opt_level: int, *, large: bool = False) -> bytes:
+def emit_object(part: Part, target: Target, opt_level: int) -> bytes:
     """The ELF object of a module. A module that LLVM refuses is a bug of the lowering and raises RuntimeError."""
-    module, machine = optimised(text, target, opt_level, large=large)
+    module, machine = optimised(part, target, opt_level)
     data: bytes = machine.emit_object(module)
     return data
 
 
-def emit_objects(texts: list[str], target: Target, opt_level: int) -> list[bytes]:
-    """The objects of the modules of a program, several if it is large: side by side in processes of their own where
+def emit_objects(parts: list[Part], target: Target, opt_level: int) -> list[bytes]:
+    """The objects of the parts of a program, several if it is large: side by side in processes of their own where
     the system can fork; the result is the same either way."""
-    large = len(texts) > 1
-    if not large or not hasattr(os, "fork") or (os.cpu_count() or 1) < 2:
-        return [emit_object(text, target, opt_level, large=large) for text in texts]
+    if len(parts) < 2 or not hasattr(os, "fork") or (os.cpu_count() or 1) < 2:
+        return [emit_object(part, target, opt_level) for part in parts]
     _initialise()
-    children = [_Child(text, target, opt_level) for text in texts[1:]]
-    objects = [emit_object(texts[0], target, opt_level, large=True)]
-    for text, child in zip(texts[1:], children, strict=True):
-        objects.append(child.result() or emit_object(text, target, opt_level, large=True))
+    children = [_Child(part, target, opt_level) for part in parts[1:]]
+    objects = [emit_object(parts[0], target, opt_level)]
+    for part, child in zip(parts[1:], children, strict=True):
+        objects.append(child.result() or emit_object(part, target, opt_level))
     return objects
 
 
 class _Child:
     """A process that emits one of several objects. A process, because llvmlite lets one thread at a time into LLVM."""
 
-    def __init__(self, text: str, target: Target, opt_level: int) -> None:
+    def __init__(self, part: Part, target: Target, opt_level: int) -> None:
         read, write = os.pipe()
         self._pid = os.fork()
         if self._pid == 0:
             status = 1
             try:
                 with open(write, "wb") as pipe:
-                    pipe.write(emit_object(text, target, opt_level, large=True))
+                    pipe.write(emit_object(part, target, opt_level))
                 status = 0
             finally:
                 os._exit(status)

@@ -11,17 +11,43 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class Value:
-    """An operand: `text` is what stands in the IR. `constant`: the integer it is, when it is one. `fixed`: a pointer
-    that holds in the whole function to memory that is known to be there, so that sums with it stay inside."""
+class Value(str):
+    """An operand, as it stands in the IR."""
 
-    text: str
-    constant: int | None = None
-    fixed: bool = False
+    __slots__ = ()
 
-    def __str__(self) -> str:
-        return self.text
+    @property
+    def constant(self) -> int | None:
+        """The integer it is, when it is one."""
+        return None
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it is a pointer that holds in the whole function to memory that is known to be there, so that sums
+        with it stay inside."""
+        return False
+
+
+class Number(Value):
+    """An integer."""
+
+    __slots__ = ()
+
+    @property
+    def constant(self) -> int:
+        """The integer."""
+        return int(self)
+
+
+class FixedPointer(Value):
+    """A pointer that holds in the whole function."""
+
+    __slots__ = ()
+
+    @property
+    def fixed(self) -> bool:
+        """It is one."""
+        return True
 
 
 _USES_MEMORY = ("load ", "call ", "tail call ", "cmpxchg ", "atomicrmw ")
@@ -125,6 +151,9 @@ class Function:
         self._phis: dict[str, int] = {}  # the index of the line, by name
         self._dead = False
         self.block = "entry"
+        self.blocks = 1
+        self.loops = False  # there is a branch back
+        self._begun: set[str] = set()
         self.barriers = 0  # grows with all that ends a block or may use memory, but `load` and `store`
         self.scope = -1  # its DISubprogram
         self.debug = ""  # e.g. ', !dbg !7', added to every instruction
@@ -167,13 +196,13 @@ class Function:
         those that are not known yet."""
         assert not self.debug, "a phi has no line"
         result = self.value(f"phi {llvm_type} ")
-        self._phis[result.text] = len(self._lines) - 1
+        self._phis[result] = len(self._lines) - 1
         self._lines[-1] += ", ".join(f"[ {value}, %{block} ]" for value, block in incoming)
         return result
 
     def add_incoming(self, phi: Value, value: Value, block: str) -> None:
         """What a phi is after `block`."""
-        self._lines[self._phis[phi.text]] += f", [ {value}, %{block} ]"
+        self._lines[self._phis[phi]] += f", [ {value}, %{block} ]"
 
     def call(self, symbol: str, arguments: Iterable[str], attributes: str = "", *, tail: bool = False) -> None:
         """Calls a function of the program for its effect. `arguments` with their types."""
@@ -199,14 +228,14 @@ class Function:
         self._count += 1
         name = f"%m{self._count}"
         self._allocas.append(f"  {name} = alloca [{size} x i8], align {align}")
-        return Value(name, fixed=True)
+        return FixedPointer(name)
 
     def slot(self, llvm_type: str) -> Value:
         """A scalar on the stack, which LLVM turns into registers. Returns the pointer."""
         self._count += 1
         name = f"%s{self._count}"
         self._allocas.append(f"  {name} = alloca {llvm_type}")
-        return Value(name, fixed=True)
+        return FixedPointer(name)
 
     # ---- blocks ----
 
@@ -220,7 +249,9 @@ class Function:
             self._lines.append(f"  br label %{label}{self.debug}")
         self.barriers += 1
         self._lines.append(f"{label}:")
+        self._begun.add(label)
         self.block = label
+        self.blocks += 1
         self._dead = False
 
     def terminate(self, text: str) -> None:
@@ -228,9 +259,11 @@ class Function:
         self._dead = True
 
     def branch(self, label: str) -> None:
+        self.loops = self.loops or label in self._begun
         self.terminate(f"br label %{label}")
 
     def branch_if(self, condition: Value, then: str, otherwise: str) -> None:
+        self.loops = self.loops or then in self._begun or otherwise in self._begun
         self.terminate(f"br i1 {condition}, label %{then}, label %{otherwise}")
 
     def begin_detached(self, label: str) -> None:
@@ -264,7 +297,7 @@ class Definition:
 
 def number(value: int) -> Value:
     """An integer."""
-    return Value(str(value), value)
+    return Number(value)
 
 
 def bytes_literal(data: bytes) -> str:

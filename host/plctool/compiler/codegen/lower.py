@@ -11,7 +11,7 @@ from plctool.compiler.codegen.lower_classes import write_dispatcher
 from plctool.compiler.codegen.lower_frame import TAGGED_AREAS, Body, Frame, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
-from plctool.compiler.codegen.partition import texts
+from plctool.compiler.codegen.partition import Part, parts
 from plctool.compiler.codegen.sections import sections
 from plctool.compiler.codegen.signatures import CONTEXT, SELF, block_signatures, parameter_list, result_type
 from plctool.compiler.codegen.string_functions import string_function
@@ -30,11 +30,11 @@ GLOBAL_EXIT = "global_exit"
 
 @dataclass(frozen=True)
 class Lowered:
-    """LLVM IR, in parts to be compiled each by itself, and what an image of it needs. `tasks`: entry symbols
+    """LLVM IR, in parts, and what an image of it needs. `tasks`: entry symbols
     in the order of the program's tasks; `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `pous`: by
     symbol, all that are part of it; `imports`: in the order of their slots; `bounds`: what is checked."""
 
-    texts: list[str]
+    parts: list[Part]
     tasks: list[str]
     functions: dict[int, str]
     pous: dict[str, Pou]
@@ -80,7 +80,7 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     for name in sorted(unit.helpers):
         unit.module.add_helper(string_function(name, unit.target, unit.strings))
     pous = {name: pou for (pou, _), name in unit.pous.items()}
-    return Lowered(texts(unit.module), tasks, functions, pous, unit.imports, [*dict.fromkeys(unit.bounds)])
+    return Lowered(parts(unit.module), tasks, functions, pous, unit.imports, [*dict.fromkeys(unit.bounds)])
 
 
 def _task_entry(unit: Unit, number: int, task: Task) -> str:
@@ -101,9 +101,9 @@ def _pou(unit: Unit, pou: Pou, effects: Effects, *, raises: bool) -> None:
     fn = Function(signature, unit.attributes(pou), unit.inlining(pou))
     body = Body(unit, fn, pou, effects, raises=raises)
     body.open_scope(pou.name, pou.pos)
-    parts = [pou] if pou in unit.sections else sections(pou)
-    if len(parts) > 1:
-        write_calls(body, [unit.section(part, raises=raises) for part in parts])
+    cut = [pou] if pou in unit.sections else sections(pou)
+    if len(cut) > 1:
+        write_calls(body, [unit.section(part, raises=raises) for part in cut])
     else:
         write_body(body)
     body.write_given_up(result)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from plctool.compiler.analysis import Effects
-from plctool.compiler.codegen.ir import NULL, Function, Value, number
+from plctool.compiler.codegen.ir import NULL, FixedPointer, Function, Value, number
 from plctool.compiler.codegen.lengths import Lengths
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, Check, Unit, value_type
 from plctool.compiler.codegen.memory import Memory
@@ -29,10 +29,10 @@ Written = TypeVar("Written")
 
 
 NO_CAPACITY = Value("")  # of what is not a string
-RAISED = Value("%raised", fixed=True)  # where a function leaves the number of an exception that it returns
+RAISED = FixedPointer("%raised")  # where a function leaves the number of an exception that it returns
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen, which takes longer: there is one for every access
 class Ref:
     """An address in the generated code: `pointer` plus `offset` bytes, holding a `type`.
 
@@ -200,7 +200,7 @@ class Frame:
             size = metadata(f"!{{i64 {max(self.unit.area_sizes.get(area, 0), 1)}}}")
             facts = f", !nonnull !{self.unit.empty}, !align !{metadata('!{i64 8}')}, !dereferenceable !{size}"
             offset = self.unit.area_offset + area.value * self.unit.target.pointer_size
-            base = replace(self.context_load(offset, "ptr", facts), fixed=True)
+            base = FixedPointer(self.context_load(offset, "ptr", facts))
             self._bases[area] = base
         return base
 

@@ -8,25 +8,57 @@ more than proportional time for large functions.
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 
-from plctool.compiler.codegen.ir import Definition, Module
+from plctool.compiler.codegen.ir import Definition, Function, Module
 
 _SMALL = 20  # instructions of a function that is inlined anywhere
 _LARGE = 10_000  # instructions up to which a function may grow
 _WHOLE = 20_000  # instructions of a module (about 5000 lines of ST) that is optimised as one
+_FEW = 5_000  # instructions for which several parts do not pay
+_LONG_RUN = 50  # instructions between branches, on average: `memory.py` has left little for LLVM to find
 
 
-def texts(module: Module) -> list[str]:
-    """The parts of a module, an even number of them when there are several. A part has copies of functions of others
-    that may be inlined."""
+@dataclass(frozen=True)
+class Part:
+    """What is compiled by itself. `large`: part of a large module; `plain`: long runs of instructions, without loops
+    and without calls that could be inlined."""
+
+    text: str
+    large: bool = False
+    plain: bool = False
+
+
+def parts(module: Module) -> list[Part]:
+    """The parts of a module: one, or an even number of the same size, of plain functions and of others. A part has
+    copies of functions of others that may be inlined."""
     functions = module.functions
     calls = {name: Counter(c for c in d.function.callees if c in functions) for name, d in functions.items()}
     _limit_growth(functions, calls)
-    total = sum(d.function.size for d in functions.values())
-    if total <= _WHOLE:
-        return [module.text(d.function.definition(d.linkage) for d in functions.values())]
-    parts = _cut(functions, total // (2 * (1 + total // (2 * _WHOLE))))
-    return [module.text(_part(names, functions, calls)) for names in parts]
+    if _size(functions) <= _WHOLE:
+        return [Part(module.text(d.function.definition(d.linkage) for d in functions.values()))]
+    plain = {name: d for name, d in functions.items() if _is_plain(d.function, functions)}
+    if _size(plain) < _FEW:
+        plain = {}
+    found = []
+    for some in (plain, {name: d for name, d in functions.items() if name not in plain}):
+        for names in _cut(some):
+            text = module.text(_part(names, functions, calls))
+            found.append(Part(text, large=True, plain=bool(plain) and some is plain))
+    return found
+
+
+def _size(functions: dict[str, Definition]) -> int:
+    return sum(d.function.size for d in functions.values())
+
+
+def _is_plain(function: Function, functions: dict[str, Definition]) -> bool:
+    """Whether LLVM's passes for loops, branches and inlining have nothing to do in a function."""
+    return (
+        not function.loops
+        and function.size >= _LONG_RUN * function.blocks
+        and all(c in functions and functions[c].function.inlining == "noinline" for c in function.callees)
+    )
 
 
 def _limit_growth(functions: dict[str, Definition], calls: dict[str, Counter[str]]) -> None:
@@ -51,17 +83,19 @@ def _limit_growth(functions: dict[str, Definition], calls: dict[str, Counter[str
         grown(name)
 
 
-def _cut(functions: dict[str, Definition], part_size: int) -> list[list[str]]:
-    """Names of functions, in parts of at least this many instructions, but for the last."""
-    parts: list[list[str]] = []
+def _cut(functions: dict[str, Definition]) -> list[list[str]]:
+    """Names of functions, in an even number of parts of about the same size that are not too large; one for few."""
+    total = _size(functions)
+    part_size = total if total < _FEW else total // (2 * (1 + total // (2 * _WHOLE)))
+    found: list[list[str]] = []
     size = part_size
     for name, definition in functions.items():
         if size >= part_size:
-            parts.append([])
+            found.append([])
             size = 0
-        parts[-1].append(name)
+        found[-1].append(name)
         size += definition.function.size
-    return parts
+    return found
 
 
 def _part(own: list[str], functions: dict[str, Definition], calls: dict[str, Counter[str]]) -> list[str]:

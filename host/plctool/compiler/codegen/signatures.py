@@ -13,7 +13,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from plctool.compiler.codegen.closed import Closed, closed_block
-from plctool.compiler.codegen.ir import Value
+from plctool.compiler.codegen.ir import FixedPointer, Value
 from plctool.compiler.codegen.lengths import length_variable
 from plctool.compiler.codegen.lower_arith import is_real, is_signed
 from plctool.compiler.codegen.lower_frame import RAISED
@@ -24,8 +24,8 @@ from plctool.iec.types import StringType, Type, is_scalar
 from plctool.image.targets import Target
 
 CONTEXT = "ptr %ctx"  # the argument that hands the context on
-SELF = Value("%self", fixed=True)  # the instance
-RESULT = Value("%result", fixed=True)  # where a result goes that comes back in memory
+SELF = FixedPointer("%self")  # the instance
+RESULT = FixedPointer("%result")  # where a result goes that comes back in memory
 RESULT_CAPACITY = Value("%result.capacity")
 
 HandedInputs = dict[Pou, list[Variable]]
@@ -34,7 +34,7 @@ ClosedBlocks = dict[Pou, Closed]
 
 def parameter_value(number: int) -> Value:
     """Parameter `number` of those that the program declares."""
-    return Value(f"%p{number}", fixed=True)
+    return FixedPointer(f"%p{number}")
 
 
 def parameter_capacity(number: int) -> Value:
