@@ -343,6 +343,22 @@ static void a_new_flash_of_the_same_size_is_erased_everywhere(void)
     }
 }
 
+static void a_new_flash_of_a_child_process_is_its_own(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+    pid_t child;
+
+    CHECK_EQUAL(flash->program(0, ones, sizeof ones), ERR_OK);
+    child = fork();
+    if (child == 0) {
+        flash = blank(1, 0xFF);
+        _exit(flash->program(4096, ones, sizeof ones) == ERR_OK && flash->mapped[0] == 0xFF ? 0 : 1);
+    }
+    (void)waitpid(child, NULL, 0);
+    CHECK_EQUAL(flash->mapped[0], 1);
+    CHECK_EQUAL(flash->mapped[4096], 0xFF);
+}
+
 int main(void)
 {
     RUN(only_possible_geometries_are_accepted);
@@ -363,5 +379,6 @@ int main(void)
     RUN(what_is_loaded_counts_as_programmed);
     RUN(a_new_flash_of_the_same_size_is_erased_everywhere);
     RUN(cells_survive_the_process_and_are_not_written_by_stores);
+    RUN(a_new_flash_of_a_child_process_is_its_own);
     return test_result();
 }

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/types.h>
 #include <unistd.h>
 
 #include "Sim.h"
@@ -33,6 +34,7 @@ typedef struct {
     RTS_UI8 *programmed;
     RTS_UI8 *touched; /* pages that may not be as they were made */
     RTS_UI32 size;
+    pid_t owner; /* the process that made them */
 } CELLS;
 
 /* When something happens, as values of the counters; 0: never. */
@@ -300,6 +302,7 @@ static bool allocate_cells(CELLS *cells, RTS_UI32 size)
     if (file < 0)
         return false;
     cells->size = size;
+    cells->owner = getpid();
     cells->programmed = map_shared(-1, size);
     cells->touched = map_shared(-1, pages_of(size));
     if (ftruncate(file, (off_t)size) == 0) {
@@ -322,10 +325,17 @@ static void set_functions(void)
     chip.flash.sync = flash_sync;
 }
 
-/* Makes the cells as new: those that there are, where something happened to them, if only that is another one. */
+/* Whether a new flash can have the cells that there are; those of the parent process are the parent's. */
+static bool can_renew_cells(RTS_UI32 size, RTS_UI8 erased)
+{
+    return chip.cells.data != NULL && chip.cells.size == size && chip.flash.erased == erased &&
+           chip.cells.owner == getpid();
+}
+
+/* Makes the cells as new; those that there are, where something happened to them, if possible. */
 static bool renew_cells(RTS_UI32 size, RTS_UI8 erased)
 {
-    if (chip.cells.data == NULL || chip.cells.size != size || chip.flash.erased != erased) {
+    if (!can_renew_cells(size, erased)) {
         free_cells(&chip.cells);
         if (!allocate_cells(&chip.cells, size))
             return false;
