@@ -234,6 +234,8 @@ MISTAKES = [
         "unit 0 is all devices of the line",
     ),
     (device("word_1").replace("address = 40001", "address = 40001\nwire = 0"), "write address or wire, not both"),
+    (device("word_1").replace("address = 40001", "address = 0"), "they are 40001 to 49999, and wire = 0 is the first"),
+    (device("word_1").replace("address = 40001\n", ""), "needs address: write for example address = 40001"),
     (server('40001 = "Main.real_1", 40002 = "Main.word_1"'), "are at the same addresses of the holding registers"),
     (server('30001 = "Main.word_1"'), "30001 is not the address of holding registers"),
     (server('"40001.3" = "Main.word_1"'), "a bit of a register is for a BOOL"),

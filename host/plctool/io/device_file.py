@@ -251,7 +251,7 @@ def _channel(entry: Entry, output: bool, mistakes: Mistakes) -> ModuleChannel | 
         mistakes.error(entry.pos, f'{entry.key} needs a table: {entry.key} = {{ type = "INT", parameter = 1 }}')
         return None
     t = _type(inner)
-    parameter, bit = inner.number("parameter", 0, MAX_ID, required=True), inner.number("bit", 0, 0xFFFF, 0)
+    parameter, bit = inner.number("parameter", 0, MAX_ID, required=0), inner.number("bit", 0, 0xFFFF, 0)
     text = _one_line(inner, "text")
     inner.close()
     if t is None or parameter is None or bit is None:
@@ -279,7 +279,7 @@ def _parameter(entry: Entry, mistakes: Mistakes) -> ModuleParameter | None:
     if not isinstance(inner, Table):
         mistakes.error(entry.pos, f'{entry.key} needs a table: {entry.key} = {{ id = 1, type = "UINT" }}')
         return None
-    number = inner.number("id", 0, MAX_ID, required=True)
+    number = inner.number("id", 0, MAX_ID, required=0)
     t = _type(inner)
     low, high = inner.raw("low"), inner.raw("high")
     words = inner.table("choices")

@@ -91,10 +91,10 @@ class Table:
         return default if found is None else found
 
     def number(
-        self, key: str, low: int, high: int, default: int | None = None, *, required: bool = False, unit: str = ""
+        self, key: str, low: int, high: int, default: int | None = None, *, required: int | None = None, unit: str = ""
     ) -> int | None:
-        """An integer from `low` to `high`."""
-        found = self._value(key, int, default, str(low) if required else "")
+        """An integer from `low` to `high`. `required`: an example; without a value that is a mistake."""
+        found = self._value(key, int, default, "" if required is None else str(required))
         if key in self._values and found is not None and not low <= found <= high:
             unit = f" {unit}" if unit else ""
             self.error(f"{key} is {found}{unit}; it can be {low} to {high}{unit}", key)

@@ -20,6 +20,7 @@ from plctool.io.modbus.registers import (
     Order,
     cannot_have,
     element_size,
+    first_reference,
     fits_coils,
     place,
     registers_of,
@@ -336,7 +337,7 @@ def _read_device(table: Table, line: ModbusLine) -> Connector:
     serial = line.char_us is not None
     device = read_connector(ModbusDevice, table, DRIVER, parent=line)
     line.devices.append(device)
-    unit = table.number("unit", 0, MAX_UNIT if serial else 255, None if serial else 255, required=serial)
+    unit = table.number("unit", 0, MAX_UNIT if serial else 255, None if serial else 255, required=1 if serial else None)
     to_all = serial and unit == 0
     default_us = _BROADCAST_US if to_all else _TIMEOUT_US
     timeout_us = table.duration_us("timeout", 1000, _MAX_TIMEOUT_US, default_us) or default_us
@@ -380,7 +381,7 @@ def _read_function(table: Table, kind: str) -> Function | None:
     if known == [_READ_WRITE]:
         code = table.number("function", 1, 127, _READ_WRITE)
     else:
-        code = table.number("function", 1, 127, None, required=True)
+        code = table.number("function", 1, 127, None, required=3)
     if code is None or code in known:
         return FUNCTIONS.get(code or 0)
     verb = "read and write at a time" if kind == "read_write" else kind
@@ -433,7 +434,8 @@ def _read_address(table: Table, function: Function | None) -> int | None:
         if "address" in table:
             table.error("write address or wire, not both", "wire")
         return wire
-    address = table.number("address", 1, 465536, None, required=True)
+    example = first_reference(function.table) if function else 40001
+    address = table.number("address", 0, 465536, None, required=example)  # 0 is mentioned with the others of no table
     if address is None or function is None:
         return None
     found = wire_address(address, function.table)

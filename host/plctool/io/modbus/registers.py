@@ -37,10 +37,15 @@ def place_of_reference(reference: int) -> tuple[int, int] | None:
     return next(((table, at) for table in tables if (at := wire_address(reference, table)) is not None), None)
 
 
+def first_reference(table: int) -> int:
+    """The reference of the first one of a table, in its short form."""
+    return _PREFIX[table] * 10000 + 1
+
+
 def wrong_reference(text: str, table: int) -> str:
     """What to say about a reference that is not one of this table."""
-    prefix = _PREFIX[table]
-    first, last = (1, LAST_ADDRESS + 1) if prefix == 0 else (prefix * 10000 + 1, prefix * 10000 + 9999)
+    first = first_reference(table)
+    last = LAST_ADDRESS + 1 if first == 1 else first + 9998
     return (
         f"{text} is not the address of {TABLE_NAMES[table]}: they are {first} to {last}, and wire = 0 is the first one"
     )
