@@ -111,7 +111,7 @@ def test_what_is_known_of_other_variables_holds_after_a_call(block: str, loads: 
     text = f"""{block} PROGRAM Main VAR x, y : Block; wanted, one, two : DINT; END_VAR
     one := wanted; x(a := one, b := 2); y(a := 3, b := 4); two := wanted; END_PROGRAM"""
     target = find_target("cortex-m3")
-    module, _ = optimised(lowered(text, target.name, debug=True), target, 2)
+    module, _ = optimised(Part(lowered(text, target.name, debug=True)), target, 2)
     program = next(str(f) for f in module.functions if f.name == "st.Main")
     assert program.count("load i32") == loads
 
@@ -242,7 +242,7 @@ def test_blocks_of_the_library_are_not_inlined_where_flash_is_small(timers: Type
 def test_small_code_has_a_body_once_unless_it_is_called_once() -> None:
     target = find_target("cortex-m3")
     once = "x(a := 1, b := 2);"
-    modules = [optimised(lowered(main(c), target.name, size=True), target, 2)[0] for c in (once, once * 2)]
+    modules = [optimised(Part(lowered(main(c), target.name, size=True)), target, 2)[0] for c in (once, once * 2)]
     assert [str(module).count("define internal") for module in modules] == [1, 2]  # st.Main, st.Block
 
 

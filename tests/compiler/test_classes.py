@@ -50,7 +50,7 @@ def checked(text: str) -> TypedProgram:
 
 
 def code(text: str) -> str:
-    return "\n".join(lower(checked(text), Options(find_target("x86_64-linux"))).texts)
+    return "\n".join(part.text for part in lower(checked(text), Options(find_target("x86_64-linux"))).parts)
 
 
 def test_call_is_direct_when_only_one_class_has_instances() -> None:

@@ -136,7 +136,7 @@ def test_a_string_that_is_longer_than_a_result_is_cut(tmp_path: Path) -> None:
 def lowered(body: str) -> str:
     checked = check_sources([Source("main.st", f"PROGRAM Main VAR s : STRING; n : INT; END_VAR {body} END_PROGRAM")])
     assert checked.program, checked.diagnostics
-    return "".join(lower(checked.program, Options(find_target("cortex-m3"))).texts)
+    return "".join(part.text for part in lower(checked.program, Options(find_target("cortex-m3"))).parts)
 
 
 def test_known_strings_are_not_looked_through_for_their_ends() -> None:

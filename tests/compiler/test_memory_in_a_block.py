@@ -130,6 +130,6 @@ def test_what_is_written(body: str, loads: int, stores: int) -> None:
     other = "FUNCTION F\nEND_FUNCTION\n"
     checked = program(main("a, b, c : DINT; p : POINTER TO DINT;", body, other))
     lowered = lower(checked, Options(find_target("cortex-m3"), checks=frozenset()))
-    text = next(t for t in re.split(r"\ndefine ", lowered.texts[0]) if "@st.Main(" in t.split("\n", 1)[0])
+    text = next(t for t in re.split(r"\ndefine ", lowered.parts[0].text) if "@st.Main(" in t.split("\n", 1)[0])
     assert len(re.findall(r" = load (?!.*invariant)", text)) == loads
     assert len(re.findall(r"^  store ", text, re.MULTILINE)) == stores

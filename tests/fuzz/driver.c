@@ -379,6 +379,8 @@ static void run_mutations(void)
 
 /* ---- watching, in the parent ---- */
 
+enum { NO_INPUTS = 2 }; /* exit status */
+
 /* The child's status; it is killed when it stays with one input for too long. */
 static int wait_for(pid_t child)
 {
@@ -401,6 +403,10 @@ static int report(int status, const char *program)
 {
     const char *kind = WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL ? "hang" : "crash";
 
+    if (WIFEXITED(status) && WEXITSTATUS(status) == NO_INPUTS) {
+        fprintf(stderr, "there are no first inputs\n");
+        return NO_INPUTS;
+    }
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
         printf("%lu inputs, %u of them reach something of their own\n", shared->tried, shared->pool);
         return 0;
@@ -410,17 +416,18 @@ static int report(int status, const char *program)
     return 1;
 }
 
+/* A target may start threads when it makes its first inputs: where it is forked after that, they may have had locks of
+ * the memory. */
 static int fuzz(const char *program)
 {
     pid_t child;
 
-    if (pool_count == 0) {
-        fprintf(stderr, "there are no first inputs\n");
-        return 2;
-    }
     (void)fflush(stdout);
     child = fork();
     if (child == 0) {
+        add_first_inputs();
+        if (pool_count == 0)
+            _exit(NO_INPUTS);
         run_pool();
         shared->pool = pool_count;
         run_mutations();
@@ -475,6 +482,5 @@ int main(int argc, char **argv)
     }
     if (optind < argc)
         return run_files(argc - optind, argv + optind);
-    add_first_inputs();
     return fuzz(argv[0]);
 }
