@@ -79,7 +79,7 @@ def same(actual: Value, term: Term) -> bool:
         a = rounded(NOT_FINITE.get(actual) or float(actual), term.type)
         b = term.value
         return (math.isnan(a) and math.isnan(b)) or (a == b and math.copysign(1, a) == math.copysign(1, b))
-    return type(actual) is type(term.value) and actual == term.value
+    return isinstance(actual, bool) == isinstance(term.value, bool) and actual == term.value
 
 
 def wrap(value: int, name: str) -> int:

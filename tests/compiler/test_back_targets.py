@@ -13,9 +13,9 @@ from elftools.elf.elffile import ELFFile
 from plctool.compiler import Level, compile_sources
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.emit import emit_object
-from plctool.compiler.codegen.partition import Part
 from plctool.compiler.codegen.link import link
 from plctool.compiler.codegen.memory_functions import MEMORY_FUNCTIONS, memory_object
+from plctool.compiler.codegen.partition import Part
 from plctool.compiler.codegen.relocations import OutOfReach, stub
 from plctool.compiler.typed import (
     Assign,

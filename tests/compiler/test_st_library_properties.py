@@ -152,7 +152,7 @@ def any_duration_text(draw: st.DrawFn, known: Declarations) -> Term:
     """Durations are read as the text the language uses."""
     name, whole = draw(st.sampled_from([("TIME", "DINT"), ("LTIME", "LINT")]))
     value = draw(numbers(whole) | st.integers(-1000, 1000).map(lambda n: n * 1000))
-    text = format_time(value, ELEMENTARY[name])
+    text = str(format_time(value, ELEMENTARY[name]))
     if draw(st.booleans()):
         return Term(f"STRING_TO_{name}('{text}')", name, text)
     a = known.variable(whole, f"{whole}#{value}", value)
@@ -388,7 +388,7 @@ def any_difference(draw: st.DrawFn, known: Declarations) -> Term:
     wide = "LTIME" if name[0] == "L" else "TIME"
     value = wrap((x - y) // UNIT[wide], "LINT" if wide == "LTIME" else "DINT")
     function = draw(st.sampled_from(["{a} - {b}", f"SUB_{name}_{name}({{a}}, {{b}})"]))
-    return Term(function.format(a=a, b=b), wide, format_time(value, ELEMENTARY[wide]))
+    return Term(function.format(a=a, b=b), wide, str(format_time(value, ELEMENTARY[wide])))
 
 
 def any_calendar_day(draw: st.DrawFn, known: Declarations) -> Term:
