@@ -412,3 +412,9 @@ def test_external_variable_of_several_lists_is_an_error() -> None:
 def test_external_variable_may_be_one_of_the_same_namespace() -> None:
     text = "NAMESPACE N VAR_GLOBAL x : INT; END_VAR\nFUNCTION_BLOCK F VAR_EXTERNAL x : INT; END_VAR x := 1;\n"
     assert messages(text + "END_FUNCTION_BLOCK END_NAMESPACE") == []
+
+
+@pytest.mark.parametrize("name", ["größe", "Ström2", "_δ", "温度"])
+def test_name_may_have_letters_of_any_language(name: str) -> None:
+    text = f"PROGRAM Main VAR {name} : INT; END_VAR {name.upper()} := {name} + 1; END_PROGRAM"
+    assert messages(text) == []

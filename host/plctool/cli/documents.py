@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -477,6 +476,7 @@ def flash_several(
     progress: Callable[[str, int, int], None] = lambda node, done, total: None,
 ) -> tuple[Document, list[PlcError]]:
     """Brings an image onto several controllers at once. Returns also what went wrong; the document has it by node."""
+    from concurrent.futures import ThreadPoolExecutor
 
     ended = Event()  # by Ctrl-C
 
@@ -614,6 +614,7 @@ def scan(link: Link, gateway: bool | None, tool: str) -> Document:
 def scan_all(links: Sequence[Link], gateway: bool | None, tool: str) -> Document:
     """The controllers that answer on any of the links, which are asked at the same time, each with its link. Raises
     LinkError when there are none, with the reason of each link."""
+    from concurrent.futures import ThreadPoolExecutor
 
     def ask(link: Link) -> list[Document] | LinkError:
         try:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from plctool.errors import did_you_mean
 
@@ -41,12 +42,6 @@ _NAMES = {
     "OSCAT": "OSCAT* DCF77 SUN_TIME CALENDAR* REAL_TO_STRF FT_* CTRL_* IP_* NETWORK_BUFFER* HTTP_GET",
 }
 """Names of the field's libraries; * stands for any ending."""
-
-_LIBRARIES = [
-    (library, re.compile("|".join(names.replace("*", r"\w*").split()), re.IGNORECASE))
-    for library, names in _NAMES.items()
-]
-
 
 _DECLARED = re.compile(
     r"\b(?:PROGRAM|FUNCTION_BLOCK|FUNCTION|INTERFACE|CLASS|TYPE|METHOD|PROPERTY|ACTION|NAMESPACE)"
@@ -91,11 +86,19 @@ def missing_names(uses: Iterable[Use]) -> list[Missing]:
     return sorted(found.values(), key=lambda m: (not m.library, -by_library[m.library], m.library, -m.count, m.name))
 
 
+@cache
+def _libraries() -> list[tuple[str, re.Pattern[str]]]:
+    return [
+        (library, re.compile("|".join(names.replace("*", r"\w*").split()), re.IGNORECASE))
+        for library, names in _NAMES.items()
+    ]
+
+
 def library_of(name: str) -> str:
     """The library that seems to have a name; "" when none is known. Of a qualified name the first part says it, else
     the last one."""
     parts = name.split(".")
-    found = (library for part in (parts[0], parts[-1]) for library, pattern in _LIBRARIES if pattern.fullmatch(part))
+    found = (library for part in (parts[0], parts[-1]) for library, pattern in _libraries() if pattern.fullmatch(part))
     return next(found, "")
 
 

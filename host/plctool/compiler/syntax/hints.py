@@ -36,14 +36,10 @@ class _Hint:
     """`pattern` is looked for around an error, from the line of the last good word on. `at`: the group the error has to
     stand in; `where`: in a body, in a declaration, or both ("")."""
 
-    pattern: re.Pattern[str]
+    pattern: str
     message: str | Callable[[re.Match[str]], str]
     at: str = ""
     where: str = ""
-
-
-def _hint(pattern: str, message: str | Callable[[re.Match[str]], str], at: str = "", where: str = "") -> _Hint:
-    return _Hint(re.compile(pattern, re.IGNORECASE | re.MULTILINE), message, at, where)
 
 
 def _count(match: re.Match[str]) -> str:
@@ -69,84 +65,84 @@ def _located(match: re.Match[str]) -> str:
 
 
 _HINTS = (
-    _hint(r"(?P<here><-)", "an assignment is written :=, not <-", "here"),
-    _hint(r":=[^;]*?(?P<here>\bIF\b[^;]*\bELSE\b)", slips.CHOICE, "here", "body"),
-    _hint(r"(?:^|;)[ \t]*(?P<here>REM[ \t][^\n]*\n?\s*)", "a comment is written // or (* *)", "here"),
-    _hint(r"(?P<name>[\w.]+)\s*(?:<>|[<>]=?|=)\s*[\w.]+\s+(?P<word>AND|OR|XOR)\s+(?P<here>(?P<sign><>|[<>]=?|=)\s*"
+    _Hint(r"(?P<here><-)", "an assignment is written :=, not <-", "here"),
+    _Hint(r":=[^;]*?(?P<here>\bIF\b[^;]*\bELSE\b)", slips.CHOICE, "here", "body"),
+    _Hint(r"(?:^|;)[ \t]*(?P<here>REM[ \t][^\n]*\n?\s*)", "a comment is written // or (* *)", "here"),
+    _Hint(r"(?P<name>[\w.]+)\s*(?:<>|[<>]=?|=)\s*[\w.]+\s+(?P<word>AND|OR|XOR)\s+(?P<here>(?P<sign><>|[<>]=?|=)\s*"
           r"(?P<value>[\w.]+))", "{word} joins two comparisons: ... {word} {name} {sign} {value}", "here", "body"),
-    _hint(rf"{_NAME}\(\s*\w+\s*:=[^();]+(?P<here>;\s*)\w+\s*:=[^();]*\)", "inputs are separated by commas", "here"),
-    _hint(rf"(?P<here>\bCALL\s+(?P<name>{_NAME}))", "there is no CALL; write {name}(...)", "here", "body"),
-    _hint(r"\bFOR\b[^;]*?:=[^;]*?(?P<here>,)", _LOOP, "here"),
-    _hint(r"(?P<here>\bSTEP\s+(?P<value>[-\w.]+))", "the step of a loop is written BY {value}", "here", "body"),
-    _hint(r"(?P<here>\bDOWNTO\s+(?P<value>[-\w.]+))", "a loop that counts down is written TO {value} BY -1", "here"),
-    _hint(r"(?:^|;)[ \t]*(?P<here>DO\b)", _REPEAT, "here"),
-    _hint(r"\bWHILE\b[^;]*?(?P<here>END_REPEAT)", _REPEAT, "here"),
-    _hint(r"\bELSE\s*(?P<here>:)(?!=)", "ELSE has no colon", "here", "body"),
-    _hint(r"^\s*(?P<here>(?:[<>]=?)\s*[-\w]+\s*):", _LABEL, "here", "body"),
-    _hint(r"^\s*(?P<low>[-\w]+)\s+(?P<here>TO)\s+(?P<high>[-\w]+)\s*:", _RANGE, "here", "body"),
-    _hint(rf"\b(?P<name>LEN|ABS|SQRT|SIN|COS|TAN|LN|LOG|EXP|TRUNC|ADR|SIZEOF)\s+(?P<here>(?P<value>{_NAME}))",
+    _Hint(rf"{_NAME}\(\s*\w+\s*:=[^();]+(?P<here>;\s*)\w+\s*:=[^();]*\)", "inputs are separated by commas", "here"),
+    _Hint(rf"(?P<here>\bCALL\s+(?P<name>{_NAME}))", "there is no CALL; write {name}(...)", "here", "body"),
+    _Hint(r"\bFOR\b[^;]*?:=[^;]*?(?P<here>,)", _LOOP, "here"),
+    _Hint(r"(?P<here>\bSTEP\s+(?P<value>[-\w.]+))", "the step of a loop is written BY {value}", "here", "body"),
+    _Hint(r"(?P<here>\bDOWNTO\s+(?P<value>[-\w.]+))", "a loop that counts down is written TO {value} BY -1", "here"),
+    _Hint(r"(?:^|;)[ \t]*(?P<here>DO\b)", _REPEAT, "here"),
+    _Hint(r"\bWHILE\b[^;]*?(?P<here>END_REPEAT)", _REPEAT, "here"),
+    _Hint(r"\bELSE\s*(?P<here>:)(?!=)", "ELSE has no colon", "here", "body"),
+    _Hint(r"^\s*(?P<here>(?:[<>]=?)\s*[-\w]+\s*):", _LABEL, "here", "body"),
+    _Hint(r"^\s*(?P<low>[-\w]+)\s+(?P<here>TO)\s+(?P<high>[-\w]+)\s*:", _RANGE, "here", "body"),
+    _Hint(rf"\b(?P<name>LEN|ABS|SQRT|SIN|COS|TAN|LN|LOG|EXP|TRUNC|ADR|SIZEOF)\s+(?P<here>(?P<value>{_NAME}))",
           "a function is called with parentheses: {name}({value})", "here", "body"),
-    _hint(r"(?P<name>[\w.]+)\s*(?P<here><\s?<|>\s?>)\s*(?P<value>\w+)",
+    _Hint(r"(?P<name>[\w.]+)\s*(?P<here><\s?<|>\s?>)\s*(?P<value>\w+)",
           lambda m: f"a shift is written {'SHL' if '<' in m['here'] else 'SHR'}({m['name']}, {m['value']})", "here"),
-    _hint(r":=[^;/]*\w\s*(?P<here>//\s*[\w.]+\s*;[^\n]*\n\s*)",
+    _Hint(r":=[^;/]*\w\s*(?P<here>//\s*[\w.]+\s*;[^\n]*\n\s*)",
           "// begins a comment; a division is written /", "here", "body"),
-    _hint(r"(?:^|;)[ \t]*(?P<here>THEN\b)", "THEN without an IF", "here"),
-    _hint(rf"(?:^|;)[ \t]*(?P<here>(?:LET|CONST)\s+(?P<name>{_NAME})\s*)",
+    _Hint(r"(?:^|;)[ \t]*(?P<here>THEN\b)", "THEN without an IF", "here"),
+    _Hint(rf"(?:^|;)[ \t]*(?P<here>(?:LET|CONST)\s+(?P<name>{_NAME})\s*)",
           "variables are declared in VAR ... END_VAR before the statements: {name} : INT;", "here", "body"),
-    _hint(rf"^\s*(?P<here>(?P<name>{_NAME})\s*:=\s*(?P<value>[^;]*))",
+    _Hint(rf"^\s*(?P<here>(?P<name>{_NAME})\s*:=\s*(?P<value>[^;]*))",
           "a variable is declared with its type: {name} : INT := {value};", "here", "declaration"),
-    _hint(r"\bARRAY\s*\[\s*(?P<here>(?P<low>\w+)\s*-\s*(?P<high>\w+)\s*\])",
+    _Hint(r"\bARRAY\s*\[\s*(?P<here>(?P<low>\w+)\s*-\s*(?P<high>\w+)\s*\])",
           "the bounds of an array are written {low}..{high}", "here"),
-    _hint(r"\bARRAY\s*(?P<here>\(\s*(?P<low>[-\w]+)\s*\.\.\s*(?P<high>[-\w]+)\s*\))",
+    _Hint(r"\bARRAY\s*(?P<here>\(\s*(?P<low>[-\w]+)\s*\.\.\s*(?P<high>[-\w]+)\s*\))",
           "the bounds of an array stand in brackets: ARRAY[{low}..{high}]", "here"),
-    _hint(r"\bARRAY\s+(?P<here>OF)\b", "an array has its first and its last index in brackets: ARRAY[0..9] OF ...",
+    _Hint(r"\bARRAY\s+(?P<here>OF)\b", "an array has its first and its last index in brackets: ARRAY[0..9] OF ...",
           "here"),
-    _hint(rf"^\s*(?P<name>{_NAME})\s*(?P<here>\[(?P<count>\d+)\]\s*):\s*(?P<type>\w+)", _array, "here", "declaration"),
-    _hint(rf":\s*\w+\s*(?P<here>,)\s*{_NAME}\s*:", "a declaration ends with ;, not with a comma", "here",
+    _Hint(rf"^\s*(?P<name>{_NAME})\s*(?P<here>\[(?P<count>\d+)\]\s*):\s*(?P<type>\w+)", _array, "here", "declaration"),
+    _Hint(rf":\s*\w+\s*(?P<here>,)\s*{_NAME}\s*:", "a declaration ends with ;, not with a comma", "here",
           "declaration"),
-    _hint(rf":\s*(?:ARRAY\s*\[[^\]]*\]\s*OF\s+)?(?:{_NAME}\.)*{_NAME}\s*(?P<here><)", slips.GENERIC, "here",
+    _Hint(rf":\s*(?:ARRAY\s*\[[^\]]*\]\s*OF\s+)?(?:{_NAME}\.)*{_NAME}\s*(?P<here><)", slips.GENERIC, "here",
           "declaration"),
-    _hint(rf":\s*(?P<here>\*\s*(?P<name>{_NAME}))", _POINTER, "here", "declaration"),
-    _hint(rf":\s*(?P<name>{_NAME})\s*(?P<here>\*)", _POINTER, "here", "declaration"),
-    _hint(r":\s*(?P<here>CONST(?:ANT)?\s+\w+[^;]*)", _CONSTANT, "here", "declaration"),
-    _hint(r"^\s*(?P<here>CONST(?:ANT)?\s+\w+\s*)(?=:)", _CONSTANT, "here", "declaration"),
-    _hint(rf"^\s*(?!VAR)(?P<a>{_NAME})(?P<here>-|[ \t]+)(?P<b>{_NAME})\s*:(?!=)",
+    _Hint(rf":\s*(?P<here>\*\s*(?P<name>{_NAME}))", _POINTER, "here", "declaration"),
+    _Hint(rf":\s*(?P<name>{_NAME})\s*(?P<here>\*)", _POINTER, "here", "declaration"),
+    _Hint(r":\s*(?P<here>CONST(?:ANT)?\s+\w+[^;]*)", _CONSTANT, "here", "declaration"),
+    _Hint(r"^\s*(?P<here>CONST(?:ANT)?\s+\w+\s*)(?=:)", _CONSTANT, "here", "declaration"),
+    _Hint(rf"^\s*(?!VAR)(?P<a>{_NAME})(?P<here>-|[ \t]+)(?P<b>{_NAME})\s*:(?!=)",
           "a name has no blank and no -: {a}_{b}", "", "declaration"),
-    _hint(r"(?P<name>\w+)\s+REF\s*=\s*(?P<value>[\w.\[\]]+)\s*[,)]",
+    _Hint(r"(?P<name>\w+)\s+REF\s*=\s*(?P<value>[\w.\[\]]+)\s*[,)]",
           "an input that is a reference is given with :=, as others are: {name} := {value}", "", "body"),
-    _hint(r"\bARRAY\s*\[\s*(?P<count>\d+)\s*\]", _count),
-    _hint(r":=\s*(?P<here>\{(?P<values>[^{};']*)\}\s*)", _list, "here"),
-    _hint(r"\b(?:IF|ELSIF|WHILE|UNTIL)\b[^;]*?(?P<here>:=)", "a comparison is written =; := assigns", "here"),
-    _hint(r"[^'\s(,=](?P<here>'(?='))", "a quote within a string is written $'", "here"),
-    _hint(r"\bFOR\s*\(.*", _LOOP),
-    _hint(r"\bFOR\s+(?:EACH\s+)?\w+\s+IN\b", _LOOP),
-    _hint(r"\bSWITCH\b[^;]*", _CHOICE),
-    _hint(r"\bCASE\s+\w+\s*:(?!=)", _CHOICE),
-    _hint(r"\bBEGIN\s+\w+\s*", "there is no BEGIN; the statements follow END_VAR"),
-    _hint(r"\bGOTO\s+(?P<name>\w+)\s*", "a jump is written JMP {name}; and its label {name}:"),
-    _hint(rf"(?<![\w.])(?P<name>{_NAME})\s*:\s+(?P<here>=)", "an assignment is written {name} := ..., without a blank",
+    _Hint(r"\bARRAY\s*\[\s*(?P<count>\d+)\s*\]", _count),
+    _Hint(r":=\s*(?P<here>\{(?P<values>[^{};']*)\}\s*)", _list, "here"),
+    _Hint(r"\b(?:IF|ELSIF|WHILE|UNTIL)\b[^;]*?(?P<here>:=)", "a comparison is written =; := assigns", "here"),
+    _Hint(r"[^'\s(,=](?P<here>'(?='))", "a quote within a string is written $'", "here"),
+    _Hint(r"\bFOR\s*\(.*", _LOOP),
+    _Hint(r"\bFOR\s+(?:EACH\s+)?\w+\s+IN\b", _LOOP),
+    _Hint(r"\bSWITCH\b[^;]*", _CHOICE),
+    _Hint(r"\bCASE\s+\w+\s*:(?!=)", _CHOICE),
+    _Hint(r"\bBEGIN\s+\w+\s*", "there is no BEGIN; the statements follow END_VAR"),
+    _Hint(r"\bGOTO\s+(?P<name>\w+)\s*", "a jump is written JMP {name}; and its label {name}:"),
+    _Hint(rf"(?<![\w.])(?P<name>{_NAME})\s*:\s+(?P<here>=)", "an assignment is written {name} := ..., without a blank",
           "here", "body"),
-    _hint(rf"(?:^|;)[ \t]*(?P<name>{_NAME})\s*:\s+(?P<here>[-+\d'(])", "an assignment is written {name} := ...", "here",
+    _Hint(rf"(?:^|;)[ \t]*(?P<name>{_NAME})\s*:\s+(?P<here>[-+\d'(])", "an assignment is written {name} := ...", "here",
           "body"),
-    _hint(r":\s*(?P<here>(?:unsigned|signed|long|short)\s+\w+)",
+    _Hint(r":\s*(?P<here>(?:unsigned|signed|long|short)\s+\w+)",
           "there is no unsigned; write UINT, UDINT ... for a type without negative numbers", "here", "declaration"),
-    _hint(_TYPE_FIRST, _typed(_IN_VARIABLES), "here", "declaration"),
-    _hint(_TYPE_FIRST, _typed(_IN_BODY), "here", "body"),
-    _hint(rf"(?<![\w.])(?P<name>[A-Za-z_]\w*)\s*:(?!=)\s*{_TYPE}", _typed(_IN_BODY), "", "body"),
-    _hint(r"(?<![\w.])(?P<name>[A-Za-z_]\w*)\s*:(?!=)\s*(?P<type>[A-Za-z_]\w*)\s*;", _typed(_IN_BODY), "", "body"),
-    _hint(rf"\(\s*{_TYPE}\s*\)\s*(?P<name>\w+)",
+    _Hint(_TYPE_FIRST, _typed(_IN_VARIABLES), "here", "declaration"),
+    _Hint(_TYPE_FIRST, _typed(_IN_BODY), "here", "body"),
+    _Hint(rf"(?<![\w.])(?P<name>[A-Za-z_]\w*)\s*:(?!=)\s*{_TYPE}", _typed(_IN_BODY), "", "body"),
+    _Hint(r"(?<![\w.])(?P<name>[A-Za-z_]\w*)\s*:(?!=)\s*(?P<type>[A-Za-z_]\w*)\s*;", _typed(_IN_BODY), "", "body"),
+    _Hint(rf"\(\s*{_TYPE}\s*\)\s*(?P<name>\w+)",
           lambda m: f"a conversion is written TO_{m['type'].upper()}({m['name']}), not ({m['type']})"),
-    _hint(r"\w\s*(?P<here>\^\s*(?:\d+|\w+(?=\s*;)))",
+    _Hint(r"\w\s*(?P<here>\^\s*(?:\d+|\w+(?=\s*;)))",
           lambda m: f"a power is written a ** {m['here'][1:].strip()}; ^ follows a pointer", "here"),
-    _hint(r"(?<![\w.,])(?P<whole>\d+),(?P<part>\d+)(?![\w,])", "a real number is written with a point: {whole}.{part}"),
-    _hint(r"(?<![\w\])^.])\.(?P<part>\d+)", "a number begins with a digit: 0.{part}"),
-    _hint(rf"(?<![\w#.])(?P<number>\d+(?:\.\d+)?){_UNIT}",
+    _Hint(r"(?<![\w.,])(?P<whole>\d+),(?P<part>\d+)(?![\w,])", "a real number is written with a point: {whole}.{part}"),
+    _Hint(r"(?<![\w\])^.])\.(?P<part>\d+)", "a number begins with a digit: 0.{part}"),
+    _Hint(rf"(?<![\w#.])(?P<number>\d+(?:\.\d+)?){_UNIT}",
           "a duration is written T#{number}{unit}, not {number}{unit}"),
-    _hint(r"(?<![\w)\]^])\*\s*(?P<name>[A-Za-z_]\w*)", "what {name} points to is written {name}^"),
-    _hint(r"&\s*(?P<name>[A-Za-z_]\w*)", "the address of {name} is written ADR({name})"),
-    _hint(r"(?P<name>\w+)\s*:(?!=)\s*(?P<type>\w+(?:\s*\[[^\]]*\])?\s+)AT\s+(?P<place>%[\w.*]+)", _located),
-    _hint(r"\b(?P<word>REFERENCE|POINTER)_TO\s+\w+\s*", "{word}_TO is written {word} TO"),
-    _hint(r"(?:^|;)[ \t]*(?P<here>--.*)", "a comment is written // or (* *)", "here"),
+    _Hint(r"(?<![\w)\]^])\*\s*(?P<name>[A-Za-z_]\w*)", "what {name} points to is written {name}^"),
+    _Hint(r"&\s*(?P<name>[A-Za-z_]\w*)", "the address of {name} is written ADR({name})"),
+    _Hint(r"(?P<name>\w+)\s*:(?!=)\s*(?P<type>\w+(?:\s*\[[^\]]*\])?\s+)AT\s+(?P<place>%[\w.*]+)", _located),
+    _Hint(r"\b(?P<word>REFERENCE|POINTER)_TO\s+\w+\s*", "{word}_TO is written {word} TO"),
+    _Hint(r"(?:^|;)[ \t]*(?P<here>--.*)", "a comment is written // or (* *)", "here"),
 )  # fmt: skip
 
 
@@ -160,7 +156,7 @@ def hint(text: str, begin: int, pos: int, where: str) -> tuple[int, str] | None:
     for known in _HINTS:
         if known.where not in ("", where):
             continue
-        for match in known.pattern.finditer(window):
+        for match in re.finditer(known.pattern, window, re.IGNORECASE | re.MULTILINE):
             if match.start(known.at or 0) <= column <= match.end(known.at or 0):
                 said = known.message
                 message = said(match) if callable(said) else said.format(**match.groupdict())

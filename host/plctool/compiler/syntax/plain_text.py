@@ -8,8 +8,8 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-NAME = r"[A-Za-z_\xC0-\uFFFF][\w\xC0-\uFFFF]*+"
-"""The pattern of a name, for patterns with re.ASCII."""
+NAME = r"(?u:[^\W\d]\w*+)"
+"""The pattern of a name, for patterns with re.ASCII: letters and digits of any language."""
 
 FLAT_COMMENT = r"//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/"
 """The pattern of a comment with none in it."""
