@@ -29,7 +29,11 @@ _TOKEN = re.compile(
   | (?P<PRAGMA>\{[^{}]*\})
   | (?P<FOREIGN>\{\{.*?\}\})
   | (?P<NESTED>\(\*|/\*)
-  | (?P<SLIP>==|&&|!=|\|\|?|!|~|%(?=[\s\d(])|\d\w+)
+  | (?P<SLIP>==|&&|!=|\|\|?|!|~|%(?=[\s\d(])|\d\w+|["""
+    + "".join(slips.TYPESET)
+    + "]|"
+    + slips.QUOTED
+    + r""")
   | (?P<BAD>\S)
   | (?P<END>\Z)
   )""",
@@ -105,7 +109,7 @@ _STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quote
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
 _NAMED_ARGUMENT = re.compile(r"\s*\(\s*[A-Za-z_]\w*\s*(?::=|=>)", re.ASCII)
 _PART_FOLLOWS = re.compile(r"\s*[:.,^\[]")
-_NAME = re.compile(r"\s+[A-Za-z_\xC0-\uFFFF]")
+_NAME = re.compile(r"\s+[^\W\d]")
 _ADDRESS = re.compile(r"\s*%")
 _PRIORITY = re.compile(r"\s*\(\s*PRIORITY\s*:=", re.IGNORECASE)
 _DECLARED = re.compile(r"\s*(?:,|:(?!=))")
@@ -253,6 +257,9 @@ class Lexer:
         """What was meant by a sign or number of another language."""
         if text in slips.SIGNS:
             kind, meant, message = slips.SIGNS[text]
+        elif not text[0].isalnum():
+            kind, meant = "STRING", f"'{text[1:-1]}'"
+            message = f"a string is written with straight quotes: {meant}"
         elif _DURATION.fullmatch(text):
             before = self.text[max(0, pos - 20) : pos]
             whole = before[len(before.rstrip("0123456789.")) :]

@@ -7,6 +7,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+TYPESET = {
+    "≤": ("OP", "<=", "less or equal is written <=, not ≤"),
+    "≥": ("OP", ">=", "greater or equal is written >=, not ≥"),
+    "≠": ("OP", "<>", "unequal is written <>, not ≠"),
+    "×": ("OP", "*", "a product is written *, not ×"),
+    "·": ("OP", "*", "a product is written *, not ·"),
+    "÷": ("OP", "/", "a division is written /, not ÷"),
+    **dict.fromkeys("−–—", ("SIGN", "-", "minus is the - of the keyboard; this is a longer dash")),
+}
+"""Signs of text processors: the terminal and text they stand for, and what to say."""
+
+QUOTED = """[“”„‘’‚][^“”„‘’‚'"$\\n]*[“”‘’]"""
+"""The pattern of a string between their quotes."""
+
 SIGNS = {
     "==": ("EQ", "=", "a comparison is written =, an assignment :=; there is no =="),
     "!=": ("OP", "<>", "unequal is written <>, not !="),
@@ -16,8 +30,9 @@ SIGNS = {
     "!": ("NOT", "NOT", "not is written NOT, not !"),
     "~": ("NOT", "NOT", "not is written NOT, not ~"),
     "%": ("OP", "MOD", "a remainder is written MOD, not %"),
+    **TYPESET,
 }
-"""Operators of other languages: the terminal and text they stand for, and what to say."""
+"""Operators of other languages, and these, alike."""
 
 CHOICE = "a choice between two values is written SEL(condition, value_if_false, value_if_true)"
 CHARACTERS = {"#": "a comment is written // or (* *)", "?": CHOICE}
