@@ -446,6 +446,27 @@ def test_a_reader_that_goes_away_is_no_error(image: Path) -> None:
     assert done.returncode == 141
 
 
+@pytest.mark.parametrize("command", ["info", "check", "check --json"])
+def test_output_without_room_is_said_in_a_sentence(command: str, image: Path) -> None:
+    file = image if command == "info" else image.with_name("wrong.st")
+    if not file.exists():
+        file.write_text("PROGRAM Main x := 1; END_PROGRAM")
+    words = [sys.executable, "-m", "plctool", *command.split(), str(file)]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.stderr == "plctool: The output cannot be written: No space left on device.\n"
+    assert done.returncode == 2
+
+
+@pytest.mark.parametrize(("closed", "word", "status"), [(">&-", "app", 0), ("2>&-", "app", 0), ("2>&-", "no", 2)])
+def test_output_may_be_closed(closed: str, word: str, status: int, tmp_path: Path) -> None:
+    (tmp_path / "app.st").write_text("PROGRAM Main VAR x : INT; END_VAR x := 1; END_PROGRAM")
+    words = ["sh", "-c", f"exec {sys.executable} -m plctool build {word}.st {closed}"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == status
+    assert "Traceback" not in done.stderr and "cannot" not in done.stdout
+
+
 def test_tables_align_numbers_right() -> None:
     rows = [{"name": "a", "n": 5}, {"name": "long", "n": 1234}]
     assert output.table(rows, ["name", "n"]) == "name     n\na        5\nlong  1234"

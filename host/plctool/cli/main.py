@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import os
 import sys
@@ -616,9 +617,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except BrokenPipeError:
-        # The reader of the output has closed it; nothing may be written any more, not even at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _close_output()
         return EXIT_BROKEN_PIPE
+    except OSError as error:
+        _close_output()
+        return _report(UsageError(f"The output cannot be written: {error.strerror}.", "output"), as_json=False)
+
+
+def _close_output() -> None:
+    """The reader of the output has closed it, or there is no room: nothing more may be written, not even at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _run_reported(words: Sequence[str], as_json: bool) -> int:
@@ -633,6 +641,10 @@ def _run_reported(words: Sequence[str], as_json: bool) -> int:
     except BrokenPipeError:
         raise
     except OSError as error:
-        return _internal_error(error, as_json) if error.filename is None else _report(path_error(error), as_json)
+        if error.filename is not None:
+            return _report(path_error(error), as_json)
+        if error.errno in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+            raise  # only the output has no name
+        return _internal_error(error, as_json)
     except Exception as error:
         return _internal_error(error, as_json)
