@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from plctool.compiler.codegen.lower_frame import STATEMENTS, VALUES
+from plctool.compiler.diagnostics import MAX_OF_KIND
 from plctool.compiler.semantics.checker import EXPRESSION_RULES, STATEMENT_RULES
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Assign, Binary
@@ -37,6 +38,21 @@ def test_check_and_build_show_warnings_unless_they_are_turned_off(tool: Any) -> 
     assert tool("check", "main.st", "--json", *off).json["diagnostics"] == []
     assert [d["code"] for d in tool("build", "main.st", "--json").json["warnings"]] == ["unused", "unreachable"]
     assert tool("build", "main.st", *off).err == ""
+
+
+@pytest.mark.parametrize("command", ["check", "build"])
+def test_the_first_of_many_warnings_of_a_kind_are_shown_and_the_rest_is_counted(
+    tool: Any, scratch: Path, command: str
+) -> None:
+    unused = "".join(f"v{n} : INT;\n" for n in range(MAX_OF_KIND + 30))
+    (scratch / "main.st").write_text(f"PROGRAM Main VAR x : INT;\n{unused}END_VAR\nx := 1; RETURN; x := 2; END_PROGRAM")
+    done = tool(command, "main.st")
+    said = done.out + done.err
+    assert said.count("is never used") == MAX_OF_KIND
+    assert f"{MAX_OF_KIND} of {MAX_OF_KIND + 30} warnings 'unused' are shown; --json shows all." in said
+    assert "this statement is never reached" in said
+    warnings = tool(command, "main.st", "--json").json["warnings" if command == "build" else "diagnostics"]
+    assert len(warnings) == MAX_OF_KIND + 31
 
 
 @pytest.mark.parametrize("command", ["check", "build", "test"])

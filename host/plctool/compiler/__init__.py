@@ -129,7 +129,7 @@ def compile_sources(
     """
     from plctool.compiler.build import build_program
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
-    from plctool.compiler.diagnostics import render
+    from plctool.compiler.diagnostics import render_all
     from plctool.compiler.fit import board_meant, check_program_fits
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
@@ -173,4 +173,4 @@ def compile_sources(
     if limits:
         check_program_fits(built.needs, options.target, known, None if description is None else description.device)
     found = checked.diagnostics
-    return replace(built, warnings=found, rendered_warnings=[render(d, shown) for d in found])
+    return replace(built, warnings=found, rendered_warnings=render_all(found, shown))

@@ -23,6 +23,7 @@ Severity = Literal["error", "warning"]
 MAX_ERRORS = 20  # what follows is seldom news
 MAX_MISSING = 10  # places of unknown names that are shown each; of more there is a table
 MAX_OF_LIBRARY = 2  # places of names of one known library that are shown each; of more there is one line
+MAX_OF_KIND = 20  # warnings of one kind that are shown each; the rest is counted
 MAX_MESSAGE = 300  # characters; names may be of any length
 _UNCOUNTED = frozenset(("language",))  # errors that hide no others
 MAX_LINE = 160  # characters of a source line that are shown with a finding
@@ -159,11 +160,28 @@ def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> 
     hidden = {id(d) for d in listed}
     if listed:  # what is never used may be used with what is missing, and would push the table out of sight
         hidden |= {id(d) for d in diagnostics if d.severity == "warning" and d.code == "unused"}
-    texts = [render(d, () if d.code in _UNCOUNTED else sources) for d in diagnostics if id(d) not in hidden]
+    shown, counts = _few_of_each_kind([d for d in diagnostics if id(d) not in hidden])
+    texts = [render(d, () if d.code in _UNCOUNTED else sources) for d in shown]
+    texts += [
+        f"{MAX_OF_KIND} of {count} warnings '{kind}' are shown; --json shows all."
+        for kind, count in counts.items()
+        if count > MAX_OF_KIND
+    ]
     texts += missing_names_text(listed) if listed else []
     if sum(d.severity == "error" and d.code not in _UNCOUNTED and not d.missing for d in diagnostics) >= MAX_ERRORS:
         texts.append(f"There may be more than these {MAX_ERRORS} errors; correct some and check again.")
     return texts
+
+
+def _few_of_each_kind(diagnostics: Sequence[Diagnostic]) -> tuple[list[Diagnostic], Counter[str]]:
+    """All errors and the first warnings of each kind, and how many there are of each."""
+    shown, counts = [], Counter[str]()
+    for d in diagnostics:
+        if d.severity == "warning":
+            counts[d.code] += 1
+        if d.severity == "error" or counts[d.code] <= MAX_OF_KIND:
+            shown.append(d)
+    return shown, counts
 
 
 def _listed(missing: Sequence[Diagnostic]) -> list[Diagnostic]:
