@@ -65,6 +65,7 @@ BENCHED := $(filter build build-cm3 build-cm4f,$(BUILDS))
 
 bench: $(BENCHED:%=%/build.ninja)
 	set -e; for build in $(BENCHED); do $(MESON) compile -C $$build; done
+	$(MESON) compile -C build can_share
 	PYTHONPATH=host:build/host PLCRT=build/firmware/port/linux/plcrt $(BIN)/python bench/run.py $(ARGS)
 
 size: build-cm3/build.ninja $(RISC_V:%=%/build.ninja)
