@@ -8,7 +8,9 @@
 
 #define APP_MAX_TASKS 16
 #define APP_MAX_IMPORTS 128
+#ifndef APP_DATA_SIZE /* less for the C tests in QEMU, which takes long to clear it at each start */
 #define APP_DATA_SIZE (1024 * 1024)
+#endif
 #define APP_RETAIN_SIZE (64 * 1024)
 #define APP_INPUT_SIZE 4096
 #define APP_OUTPUT_SIZE 4096
