@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-PATIENCE = 10.0  # s
+PATIENCE = 60.0  # s
 TCP_MAGIC = bytes.fromhex("000117E8")
 
 

@@ -28,13 +28,14 @@ from plctool.link.session import Session
 from plctool.link.transport import NO_PLACES
 from plctool.testing.plcrt import Plcrt, find_plcrt, find_worker
 
+PATIENCE = 60  # for what is bound to happen [s]
 IDLE_SHARE = 0.05  # of one processor; 0.005 is usual, but machines under load count otherwise
 
 
 def run_plcrt(*options: str, prepare: Callable[[], object] | None = None) -> subprocess.CompletedProcess[str]:
     """plcrt with options that make it end by itself; `prepare` runs in its process before it."""
     return subprocess.run(
-        [find_plcrt(), *options], capture_output=True, text=True, timeout=20, check=False, preexec_fn=prepare
+        [find_plcrt(), *options], capture_output=True, text=True, timeout=PATIENCE, check=False, preexec_fn=prepare
     )
 
 
@@ -154,7 +155,7 @@ def test_a_closed_standard_output_is_not_replaced_by_the_flash_file(tmp_path, ev
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
         process.terminate()
-        assert process.wait(20) == 0
+        assert process.wait(PATIENCE) == 0
     assert b"serial" not in flash.read_bytes()
 
 
@@ -223,7 +224,7 @@ def test_it_ends_when_asked_to_though_the_signal_was_blocked_before_it_started(t
         assert process.stdout.readline()
         process.terminate()
         try:
-            assert process.wait(20) == 0
+            assert process.wait(PATIENCE) == 0
         finally:
             process.kill()
 
@@ -235,7 +236,7 @@ def test_its_exit_status_says_that_retain_variables_were_not_saved(tool, plcrt, 
     if failed_before:
         eventually(lambda: "Retain variables cannot" in tool("log", "--port", plcrt.port).out)
     plcrt.process.terminate()
-    _, said = plcrt.process.communicate(timeout=20)
+    _, said = plcrt.process.communicate(timeout=PATIENCE)
     assert plcrt.process.returncode == 1
     assert "Retain variables cannot be saved" in said
 
@@ -257,7 +258,7 @@ def test_it_goes_on_when_its_output_is_not_read(tmp_path, eventually):
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
         process.terminate()
-        assert process.wait(20) == 0
+        assert process.wait(PATIENCE) == 0
 
 
 def test_two_do_not_share_a_flash_file(plcrt):
@@ -345,7 +346,7 @@ def test_it_runs_without_any_line(tmp_path, eventually):
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
         process.terminate()
-        assert process.wait(20) == 0
+        assert process.wait(PATIENCE) == 0
         assert process.stdout.read() == ""
 
 
@@ -403,5 +404,5 @@ def test_it_serves_a_serial_device_by_its_path(tmp_path):
             assert read_identity(Session(connection)).device_name == "plcrt"
         os.close(theirs)
         process.terminate()
-        assert process.wait(20) == 0
+        assert process.wait(PATIENCE) == 0
         assert process.stdout.read() == ""

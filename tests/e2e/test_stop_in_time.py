@@ -15,7 +15,7 @@ def plcrt(ordinary_plcrt):
 
 LONG = "WATCHDOG := T#30m, SENSITIVITY := 1000"
 # How much longer than the promised second a command may take on a machine under load, start of Python included [s].
-PATIENCE = 10
+PATIENCE = 30
 
 LOOPS = """VAR_GLOBAL
     go, run : BOOL;

@@ -16,6 +16,7 @@ from plctool.link.services import read_identity, read_status
 from plctool.link.session import Session
 from plctool.testing.plcrt import Plcrt, find_plcrt
 
+PATIENCE = 60  # for what is bound to happen [s]
 DEADLY = [signal.SIGSEGV, signal.SIGBUS, signal.SIGILL, signal.SIGFPE, signal.SIGTRAP, signal.SIGABRT, signal.SIGSYS]
 OUTSIDE = signal.SIGKILL
 
@@ -114,7 +115,7 @@ def test_an_interrupt_of_the_terminal_reaches_both_and_ends_them_in_order(tmp_pa
 
 def test_a_worker_that_is_asked_to_end_ends_plcrt(plcrt):
     os.kill(plcrt.worker, signal.SIGTERM)
-    assert plcrt.process.wait(20) == 0
+    assert plcrt.process.wait(PATIENCE) == 0
 
 
 def test_a_second_signal_ends_both_at_once(plcrt):
@@ -124,7 +125,7 @@ def test_a_second_signal_ends_both_at_once(plcrt):
     with pytest.raises(subprocess.TimeoutExpired):
         plcrt.process.wait(0.3)
     plcrt.process.terminate()
-    assert plcrt.process.wait(20) == -signal.SIGTERM
+    assert plcrt.process.wait(PATIENCE) == -signal.SIGTERM
     assert not runs(worker)
 
 
@@ -150,7 +151,7 @@ def test_a_controller_that_dies_again_and_again_without_a_program_is_given_up(pl
             worker = plcrt.worker
             os.kill(worker, signal.SIGABRT)
             deaths += 1
-    _, said = plcrt.process.communicate(timeout=20)
+    _, said = plcrt.process.communicate(timeout=PATIENCE)
     assert plcrt.process.returncode == 1 and 3 <= deaths <= 10
     assert "times in a row without a program (signal SIGABRT)" in said
 
@@ -170,7 +171,7 @@ def test_it_ends_while_it_waits_to_start_the_next(plcrt, eventually):
             os.kill(worker, signal.SIGABRT)
             deaths += 1
     plcrt.process.terminate()
-    assert plcrt.process.wait(20) in (0, 1)
+    assert plcrt.process.wait(PATIENCE) in (0, 1)
 
 
 def test_it_runs_where_ended_children_are_ignored(tmp_path):
@@ -180,7 +181,7 @@ def test_it_runs_where_ended_children_are_ignored(tmp_path):
     with subprocess.Popen(command, stdout=subprocess.PIPE, preexec_fn=ignore) as process:
         assert process.stdout.readline()
         process.terminate()
-        assert process.wait(20) == 0
+        assert process.wait(PATIENCE) == 0
 
 
 def test_without_a_supervisor_it_is_one_process(tmp_path):
@@ -206,6 +207,6 @@ def test_a_serial_device_is_opened_again_by_the_next_worker(tmp_path, eventually
         eventually(lambda: plcrt.worker not in (None, worker))
         eventually(lambda: opened(plcrt.worker))
         process.terminate()
-        assert process.wait(20) == 0
+        assert process.wait(PATIENCE) == 0
     os.close(ours)
     os.close(theirs)

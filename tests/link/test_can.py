@@ -17,7 +17,7 @@ from plctool.link.channel import ChannelLost
 
 BASE = 0x1F400000
 ALL = 255
-PATIENCE = 10.0  # for what is bound to come [s]
+PATIENCE = 60.0  # for what is bound to come [s]
 
 
 class Wire:

@@ -24,7 +24,7 @@ from plctool.testing.children import ends_with_us
 FLASH_SIZE = 16 * 1024 * 1024  # of the file; after the file area it has the serial number in its last 4 KiB
 EEPROM_SIZE = 64 * 1024
 FACTORY_OFFSET = FLASH_SIZE - 4096
-START_TIMEOUT = 10.0
+START_TIMEOUT = 60.0  # machines under load are slow [s]
 LOCALHOST = "127.0.0.1"
 
 

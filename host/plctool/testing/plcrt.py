@@ -12,6 +12,8 @@ from pathlib import Path
 from plctool.errors import UsageError
 from plctool.testing.children import ends_with_us
 
+END_TIMEOUT = 30.0  # plcrt kills after 9 s what does not end when it is asked to [s]
+
 
 def find_plcrt() -> str:
     """The path of plcrt: $PLCRT, beside this Python, or on the PATH."""
@@ -83,7 +85,7 @@ class Plcrt:
         if self.process is None:
             return 0
         self.process.send_signal(how)
-        status = self.process.wait(timeout=10)
+        status = self.process.wait(timeout=END_TIMEOUT)
         Path(self.port).unlink(missing_ok=True)  # left if it was killed; its terminal may become that of another one
         for stream in (self.process.stdout, self.process.stderr):
             if stream:
