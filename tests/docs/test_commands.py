@@ -15,13 +15,13 @@ import re
 import shlex
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
 
 from plctool.testing.children import ends_with_us
 from plctool.testing.plcrt import find_plcrt
@@ -83,8 +83,7 @@ class Reader:
     def _copy_examples(self) -> None:
         """With a port that is free here."""
         shutil.copytree(ROOT / "examples", self.folder / "examples", ignore=shutil.ignore_patterns("__pycache__"))
-        with socket.create_server(("127.0.0.1", 0)) as found:
-            port = found.getsockname()[1]
+        port = free_port()
         for file in (self.folder / "examples" / "tanks" / name for name in ("tanks.io.toml", "plant_server.py")):
             text = file.read_text()
             assert SHOWN_MODBUS_PORT in text
@@ -117,7 +116,7 @@ class Reader:
     def stop_runtime(self) -> None:
         if self.runtime:
             self.runtime.send_signal(signal.SIGTERM)
-            assert self.runtime.wait(timeout=10) == 0
+            assert self.runtime.wait(timeout=60) == 0
             assert self.runtime.stdout
             self.runtime.stdout.close()
             self.runtime = None

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import select
-import socket
 import threading
 import time
 import tty
@@ -26,14 +25,6 @@ def eventually(question: Callable[[], Any]) -> Any:
         assert time.monotonic() < end, "did not happen in time"
         time.sleep(0.01)
     return answer
-
-
-def free_port() -> int:
-    """A TCP port that nothing listens at now."""
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        port: int = found.getsockname()[1]
-        return port
 
 
 class Wire:

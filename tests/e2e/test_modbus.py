@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from modbus_support import Devices, Wire, eventually, free_port
+from free_ports import free_port
+from modbus_support import Devices, Wire, eventually
 from pymodbus.client import ModbusTcpClient
 
 import plctool

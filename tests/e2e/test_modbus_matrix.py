@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
 from modbus_clients import CLIENTS, Client, Place, Refused
 from modbus_servers import SERVERS, TABLE_OF, TRAP, WORDS, PymodbusServer, Server, first_words
-from modbus_support import Wire, eventually, free_port
+from modbus_support import Wire, eventually
 
 import plctool
 from plctool.compiler import compile_sources

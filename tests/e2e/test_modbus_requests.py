@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from modbus_support import Devices, Wire, eventually, free_port
+from free_ports import free_port
+from modbus_support import Devices, Wire, eventually
 
 import plctool
 from plctool.compiler import compile_sources
