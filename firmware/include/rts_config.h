@@ -365,6 +365,12 @@
 #define CAN_RESTART_MS 500
 #endif
 
+/* How long the bus has to be on until a trouble with it is over: one that goes off again and again is two entries of the
+ * log, not two each time [ms]. */
+#ifndef CAN_STEADY_MS
+#define CAN_STEADY_MS 60000
+#endif
+
 /* The longest packet that a serial line takes, bytes: BLK_MAX_SIZE, or more, for clients that ask whether it is
  * (docs/protocol.md): the fewer packets a download is, the less of the line they take. */
 #ifndef COM_PACKET_SIZE

@@ -142,7 +142,10 @@ void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const c
     RTS_UNUSED(component);
     RTS_UNUSED(log_class);
     RTS_UNUSED(error);
-    RTS_UNUSED(format);
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(fakes.log_text, sizeof(fakes.log_text), format, arguments);
+    va_end(arguments);
     fakes.log_added++;
 }
 

@@ -31,7 +31,8 @@ typedef struct {
     RTS_UI32 line_write_limit; /* bytes one call of SysComWrite takes */
     RTS_RESULT line_open_result;
     RTS_UI32 log_added;
-    bool no_generator; /* of random numbers */
+    char log_text[120]; /* of the newest one */
+    bool no_generator;  /* of random numbers */
 
     APP_STATUS status;
 #if EXCEPT_MAX_CALLS > 0

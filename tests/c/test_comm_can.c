@@ -451,6 +451,34 @@ static void the_device_comes_back_from_bus_off(void)
     can_end();
 }
 
+/* The log is short. */
+static void a_bus_that_goes_off_again_and_again_is_two_entries_of_the_log(void)
+{
+    enum { TIMES = 20 };
+    CLIENT client;
+
+    can_start(500 * KBIT, 0);
+    CAN_TOOL *tool = can_tool(200);
+    CHECK(can_connect(&client, tool));
+    RTS_UI32 logged = fakes.log_added;
+    for (int i = 0; i < TIMES; i++) {
+        SimCanDestroy(SIM_CAN_DEVICE, 32);
+        (void)can_connect(&client, tool);
+        can_pass(CAN_STEADY_MS / 2);
+    }
+    CHECK_EQUAL(BlkDrvCanGetCounters()->bus_off, TIMES);
+    CHECK_EQUAL(fakes.log_added, logged + 1);
+    can_pass(CAN_STEADY_MS);
+    CHECK_EQUAL(fakes.log_added, logged + 2);
+    CHECK(strcmp(fakes.log_text, "CAN: the bus is back (times off: 20)") == 0);
+    can_pass(2 * CAN_STEADY_MS);
+    CHECK_EQUAL(fakes.log_added, logged + 2);
+    SimCanDestroy(SIM_CAN_DEVICE, 32);
+    (void)can_connect(&client, tool);
+    CHECK_EQUAL(fakes.log_added, logged + 3); /* another trouble */
+    can_end();
+}
+
 static void a_device_without_a_number_takes_no_part(void)
 {
     can_start(500 * KBIT, 0);
@@ -503,6 +531,7 @@ int main(void)
     RUN(lost_frames_cost_time_but_no_data);
     RUN(destroyed_frames_are_not_even_noticed);
     RUN(the_device_comes_back_from_bus_off);
+    RUN(a_bus_that_goes_off_again_and_again_is_two_entries_of_the_log);
     RUN(a_device_without_a_number_takes_no_part);
     RUN(an_address_that_cannot_be_is_refused);
     return test_result();

@@ -58,11 +58,12 @@ typedef struct {
 } SCAN_REQUEST;
 
 static struct {
-    bool open;
-    bool off; /* the bus; `off_ms` since when */
-    bool told_same_node;
-    bool fd;
-    RTS_UI32 off_ms;
+    bool open : 1;
+    bool off : 1; /* the bus; `changed_ms` since when, or when it was started again */
+    bool told_same_node : 1;
+    bool fd : 1;
+    RTS_UI16 times_off; /* in this trouble; 0: none, 0xFFFF: as often or more */
+    RTS_UI32 changed_ms;
     CAN_ADDRESS own;
     BLK_DRV driver;
     SCAN_REQUEST scan[SCANS];
@@ -361,6 +362,23 @@ static void forget_packets(void)
     memset(can.tx, 0, sizeof(can.tx));
 }
 
+/* A trouble lasts until the bus has been on for a while, and is two entries of the log, however often it goes off. */
+static void go_off(void)
+{
+    COMM_COUNT(counters.bus_off);
+    if (can.times_off == 0)
+        LogAdd(CMPID_CmpBlkDrvCan, LOG_WARNING, ERR_DEVICE, "CAN: bus off; check the bit rate and the cable");
+    if (can.times_off < 0xFFFF)
+        can.times_off++;
+    forget_packets();
+}
+
+static void end_trouble(void)
+{
+    LogAdd(CMPID_CmpBlkDrvCan, LOG_INFO, ERR_OK, "CAN: the bus is back (times off: %u)", (unsigned)can.times_off);
+    can.times_off = 0;
+}
+
 /* The controller tries again after a while; if the bus is still bad, it goes off again. */
 static void watch_bus(RTS_UI32 now_ms)
 {
@@ -368,16 +386,16 @@ static void watch_bus(RTS_UI32 now_ms)
 
     SysCanGetState(CONTROLLER, &state);
     bool off = state.bus == CAN_BUS_OFF;
-    if (off && !can.off) {
-        COMM_COUNT(counters.bus_off);
-        LogAdd(CMPID_CmpBlkDrvCan, LOG_WARNING, ERR_DEVICE, "CAN: bus off; check the bit rate and the cable");
-        forget_packets();
-        can.off_ms = now_ms;
-    } else if (off && now_ms - can.off_ms >= CAN_RESTART_MS) {
-        can.off_ms = now_ms;
+    RTS_UI32 since_ms = now_ms - can.changed_ms;
+    if (off != can.off) {
+        can.changed_ms = now_ms;
+        if (off)
+            go_off();
+    } else if (off && since_ms >= CAN_RESTART_MS) {
+        can.changed_ms = now_ms;
         SysCanRestart(CONTROLLER);
-    } else if (!off && can.off) {
-        LogAdd(CMPID_CmpBlkDrvCan, LOG_INFO, ERR_OK, "CAN: the bus is back");
+    } else if (!off && can.times_off != 0 && since_ms >= CAN_STEADY_MS) {
+        end_trouble();
     }
     can.off = off;
 }
