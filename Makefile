@@ -4,7 +4,7 @@
 # make wheel  dist/*.whl for this kind of Linux and every Python from 3.11 on, tried in those that are here
 # make size   flash and RAM of the bare-metal runtime, per component
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
-# make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500")
+# make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each (ARGS="--only tcp,lines --seed 7")
 #
@@ -86,9 +86,10 @@ attack: $(ATTACKED)/build.ninja
 	ninja -C $(ATTACKED) under_attack
 	$(BIN)/python tests/attack/run.py $(ARGS)
 
-soak: build/build.ninja
-	ninja -C build under_attack
-	$(BIN)/python tests/soak/soak.py $(ARGS)
+soak: $(ATTACKED)/build.ninja
+	$(MESON) configure $(ATTACKED) -Dhost=true
+	ninja -C $(ATTACKED) under_attack
+	$(BIN)/python tests/soak/run.py $(ARGS)
 
 habits: build/build.ninja
 	@ninja --quiet -C build under_attack

@@ -16,45 +16,12 @@ and the line that replays it is printed.
 
 from __future__ import annotations
 
-import argparse
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
+sys.path.insert(0, str(HERE.parent))
 
+from builds import become  # noqa: E402
 
-def environment(build: Path, sanitized: bool) -> dict[str, str]:
-    """What the campaigns find the modules and the runtime of a build folder by. A sanitized module needs the libraries
-    of the sanitizers before all others."""
-    env = os.environ | {
-        "PYTHONPATH": f"{ROOT / 'host'}:{build / 'host'}",
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "PLCRT": str(build / "firmware/port/linux/plcrt"),
-        "PLCTOOL_GATEWAY": "off",
-    }
-    if sanitized:
-        names = ("libasan.so", "libubsan.so")
-        found = [subprocess.check_output(["cc", f"-print-file-name={name}"], text=True).strip() for name in names]
-        env |= {"LD_PRELOAD": " ".join(found), "ASAN_OPTIONS": "detect_leaks=0", "UBSAN_OPTIONS": "halt_on_error=1"}
-    return env
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(add_help=False)
-    parser.add_argument("--build", type=Path, default=None)
-    parser.add_argument("--sanitized", action="store_true")
-    args, _ = parser.parse_known_args()
-    build = args.build or ROOT / ("build-sanitized" if args.sanitized else "build")
-    if not list((build / "host").glob("_plccore.*.so")):
-        sys.exit(f"{build} has no module for Python; `make attack{' ARGS=--sanitized' * args.sanitized}` builds it.")
-    developers = ROOT / ".venv/bin/python"
-    python = str(developers) if developers.exists() else sys.executable
-    command = [python, str(HERE / "attack.py"), *sys.argv[1:]]
-    os.execve(python, command, environment(build.resolve(), args.sanitized))
-
-
-if __name__ == "__main__":
-    main()
+become(HERE / "attack.py", "attack")

@@ -1,14 +1,16 @@
 """Soak: for a long time clients do what tools do, and what they should not: on every line of one plcrt at once, and in
 virtual time.
 
-    soak.py                  10 000 channels on each line: serial, CAN, TCP, UDP
-    soak.py --channels 100   fewer
-    soak.py --seed 5         other turns
+    tests/soak/run.py                  10 000 channels on each line: serial, CAN, TCP, UDP
+    tests/soak/run.py --channels 100   fewer
+    tests/soak/run.py --seed 5         other turns
+    tests/soak/run.py --sanitized      with what is in build-sanitized instead of build
 
 A turn is a channel and what is done with it: variables are written and read back, a long message is echoed, a download
 is begun, replies are not fetched. Some clients vanish in the middle of that, without closing, and there is noise
 between the frames. Prints what was done, and exits 1 if the program is not as it was, a client was shut out for longer
-than PATIENCE, the memory or the open files of the controller have grown, or a cycle is missing in virtual time.
+than PATIENCE, the memory (without sanitizers) or the open files of the controller have grown, a cycle is missing in
+virtual time, or a sanitizer has found something.
 """
 
 from __future__ import annotations
@@ -28,22 +30,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-ROOT = Path(__file__).resolve().parents[2]
-os.environ.setdefault("PLCRT", str(ROOT / "build/firmware/port/linux/plcrt"))
-os.environ["PLCTOOL_GATEWAY"] = "off"
-sys.path[:0] = [str(ROOT / "host"), str(ROOT / "build" / "host")]
-
-from plctool.compiler import compile_sources  # noqa: E402
-from plctool.core import lib  # noqa: E402
-from plctool.device import Plc, connect  # noqa: E402
-from plctool.errors import LinkError, PlcError  # noqa: E402
-from plctool.link import services  # noqa: E402
-from plctool.link.connection import Connection  # noqa: E402
-from plctool.link.session import Session  # noqa: E402
-from plctool.link.transports import open_transport, parse_link  # noqa: E402
-from plctool.sim import Simulator  # noqa: E402
-from plctool.testing.can_hub import CanHub  # noqa: E402
-from plctool.testing.plcrt import Plcrt  # noqa: E402
+from plctool.compiler import compile_sources
+from plctool.core import lib
+from plctool.device import Plc, connect
+from plctool.errors import LinkError, PlcError
+from plctool.link import services
+from plctool.link.connection import Connection
+from plctool.link.session import Session
+from plctool.link.transports import open_transport, parse_link
+from plctool.sim import Simulator
+from plctool.testing.can_hub import CanHub
+from plctool.testing.plcrt import Plcrt
 
 KINDS = ("serial", "can", "tcp", "udp")
 PATIENCE = 30.0  # a client that is shut out for longer has been locked out [s]
@@ -54,6 +51,7 @@ MAX_GROWTH = 64  # KiB: pages of stacks that are used for the first time
 IN_USE = "invalid-state"  # code of a download while another client has one
 ECHO = 3000  # bytes: several packages
 INTERVAL_NS = 5_000_000  # of the task
+REPORTS = "sanitizer"  # files of that name and the number of a process
 
 # A variable for each line. `damaged`: cycles that found something else than what was left.
 PROGRAM = """
@@ -120,13 +118,14 @@ class Line:
     channels: int = 0
     done: Counter[str] = field(default_factory=Counter)
     refused: Counter[str] = field(default_factory=Counter)
-    longest: float = 0.0  # turn, with all tries [s]
+    longest: tuple[float, str] = 0.0, ""  # turn, with all tries [s], and what it was
     waiting_since: float | None = None  # for a place [s of time.monotonic]
 
     def __str__(self) -> str:
         done = ", ".join(f"{count} {name}" for name, count in sorted(self.done.items()))
         refused = ", ".join(f"{count} {code}" for code, count in sorted(self.refused.items())) or "none"
-        return f"{self.channels} channels: {done}; refused: {refused}; longest {self.longest:.1f} s"
+        seconds, name = self.longest
+        return f"{self.channels} channels: {done}; refused: {refused}; longest {seconds:.1f} s ({name})"
 
     def turn(self) -> None:
         """One channel and what is done with it. It is tried until there is a place for it: clients that have vanished
@@ -139,7 +138,7 @@ class Line:
                 raise PlcError(f"there was no place for longer than {PATIENCE} s", "soak")
             time.sleep(random.uniform(0.01, 0.1))  # not of the seed: how often depends on the machine
         self.done[name] += 1
-        self.longest = max(self.longest, time.monotonic() - begin)
+        self.longest = max(self.longest, (time.monotonic() - begin, name))
 
     def _try(self, action: Callable[[Line, Connection], None]) -> bool:
         """False if there was no place, or the channel was given away before the login."""
@@ -346,9 +345,11 @@ class Soak:
                 use, since = now, time.monotonic()
         return now
 
-    def check_use(self, before: Use, after: Use) -> None:
+    def check_use(self, before: Use, after: Use, sanitized: bool) -> None:
+        """Sanitizers take memory themselves."""
         print(f"before: {before}\nafter:  {after}")
-        if after.data > before.data or after.resident > before.resident + MAX_GROWTH or after.files > before.files:
+        more_memory = after.data > before.data or after.resident > before.resident + MAX_GROWTH
+        if after.files > before.files or (more_memory and not sanitized):
             raise PlcError("the controller uses more than before", "soak")
 
     def check_program(self, image: Path) -> tuple[int, int]:
@@ -383,7 +384,17 @@ def lines_of(plcrt: Plcrt, hub: CanHub, folder: Path, seed: int) -> list[Line]:
     ]
 
 
-def soak(folder: Path, channels: int, seed: int) -> list[str]:
+def report_to(folder: Path) -> None:
+    """The sanitizers of processes that start from now on write to files."""
+    for name in ("ASAN_OPTIONS", "UBSAN_OPTIONS"):
+        os.environ[name] = f"{os.environ.get(name, '')}:log_path={folder / REPORTS}"
+
+
+def reports_in(folder: Path) -> list[str]:
+    return [path.read_text(errors="replace") for path in sorted(folder.glob(f"{REPORTS}.*"))]
+
+
+def soak(folder: Path, channels: int, seed: int, sanitized: bool) -> list[str]:
     """What went wrong."""
     image = build(folder, "soak", PROGRAM)
     address = f"127.{random.randint(1, 250)}.{random.randint(1, 250)}.{random.randint(1, 250)}"  # its ports are fixed
@@ -398,7 +409,7 @@ def soak(folder: Path, channels: int, seed: int) -> list[str]:
         try:
             before = soaked.run(max(WARM_UP, channels // 10))
             after = soaked.run(channels)
-            soaked.check_use(before, after)
+            soaked.check_use(before, after, sanitized)
             cycles, delay = soaked.check_program(image)
             seconds = time.monotonic() - begin
             print(f"{cycles} cycles of 5 ms in {seconds:.0f} s, delayed by {delay} us at most")
@@ -439,10 +450,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--channels", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--sanitized", action="store_true", help="what is in build-sanitized")
+    parser.add_argument("--build", help="what is in this folder")
     args = parser.parse_args()
-    with TemporaryDirectory() as folder:
-        errors = virtual(Path(folder), args.channels, args.seed)
-        errors += soak(Path(folder), args.channels, args.seed)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        report_to(folder)
+        errors = virtual(folder, args.channels, args.seed)
+        errors += soak(folder, args.channels, args.seed, args.sanitized) + reports_in(folder)
     print("\n".join(errors) or "nothing was lost")
     return 1 if errors else 0
 
