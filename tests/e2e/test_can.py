@@ -21,6 +21,7 @@ import pytest
 import plctool
 from plctool.cli.main import main
 from plctool.errors import LinkError, PlcError
+from plctool.image.file import image_crc
 from plctool.link import services
 from plctool.link.canbus import CanTransport, PythonCanBus, open_bus
 from plctool.link.connection import Choice, Connection
@@ -253,6 +254,58 @@ def test_an_adapter_belongs_to_one_tool(hub: CanHub, tool: Any) -> None:
         assert (done.status, done.err.count("\n")) == (3, 1)
         assert "another program uses it" in done.err
         assert plc.identity().node_name == "press"
+
+
+def big_program(tool: Any, first: int) -> Path:
+    """Its values are no loop that fills, and no run that packs well."""
+    values = ", ".join(str(first + i * i % 65521 * 7) for i in range(8000))
+    text = f"PROGRAM Main VAR a : ARRAY[0..7999] OF DINT := [{values}]; n : DINT; END_VAR n := n + a[0]; END_PROGRAM"
+    return tool.build(f"big{first}", text)
+
+
+@pytest.fixture
+def lossy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[CanHub]:
+    """A hub that may lose frames, with a device on its second adapter. Messages are short, so that a download has many,
+    of which four have one reply."""
+    monkeypatch.setattr("plctool.link.channel.WANTED_BUFFER", 2048)
+    with CanHub(2) as hub, Plcrt(tmp_path / "lossy.flash", "--can", f"slcan:{hub.paths[1]}"):
+        yield hub
+
+
+def test_a_download_whose_frames_get_lost_arrives_whole(lossy: CanHub, tool: Any) -> None:
+    image = big_program(tool, 3)
+    with plctool.connect(link_of(lossy, 0, 1)) as plc:
+        plc.identity()
+        lossy.lose_one_in = 300
+        assert plc.flash(image).state == "run"
+        lossy.lose_one_in = 0
+        assert plc.status().image_crc == image_crc(image.read_bytes())
+        assert [plc.read(f"Main.a[{i}]") for i in (0, 7999)] == [3, 3 + 7999**2 % 65521 * 7]
+    assert lossy.lost > 0
+
+
+def test_a_bus_that_dies_during_a_download_leaves_the_previous_program(
+    lossy: CanHub, tool: Any, counter: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("plctool.link.services._TRANSFER_PATIENCE", 1.0)
+    monkeypatch.setattr("plctool.link.connection._OPEN_PATIENCE", 2.0)  # the device waits 1 s for flow control
+    image = big_program(tool, 4)
+
+    def die_halfway(done: int, total: int) -> None:
+        if done > total // 2:
+            lossy.lose_one_in = 1
+
+    with plctool.connect(link_of(lossy, 0, 1)) as plc:
+        plc.flash(counter)
+        with pytest.raises(LinkError, match=r"No device answers|does not answer any more"):
+            plc.flash(image, progress=die_halfway)
+        lossy.lose_one_in = 0
+        status = plc.status()
+        assert (status.state, status.image_crc) == ("run", image_crc(counter.read_bytes()))
+        arrived: list[int] = []
+        assert plc.flash(image, progress=lambda done, total: arrived.append(done)).state == "run"
+        assert arrived[0] > image.stat().st_size // 2  # it goes on where it was
+        assert plc.read("Main.a[0]") == 4
 
 
 class _Adapter:

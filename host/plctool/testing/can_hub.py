@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import selectors
 import threading
 import tty
@@ -24,12 +25,15 @@ class _Adapter:
 
 
 class CanHub:
-    """Context manager; `paths` are the adapters. `frames` counts what was carried."""
+    """Context manager; `paths` are the adapters. `frames` counts what was carried; one frame in `lose_one_in` is lost,
+    for all that would hear it, at random moments; 0: none."""
 
-    def __init__(self, adapters: int) -> None:
+    def __init__(self, adapters: int, seed: int = 1) -> None:
         self._adapters = [_open() for _ in range(adapters)]
         self.paths = [adapter.path for adapter in self._adapters]
-        self.frames = 0
+        self.frames = self.lost = 0
+        self.lose_one_in = 0
+        self._random = random.Random(seed)
         self._selector = selectors.DefaultSelector()
         self._wake, self._end = os.pipe()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -66,12 +70,17 @@ class CanHub:
         with suppress(BlockingIOError):
             adapter.received += os.read(adapter.master, _READ)
         *lines, rest = adapter.received.split(b"\r")
-        frames = [line + b"\r" for line in lines if line[:1] and line[:1] in _FRAMES]
+        frames = [line + b"\r" for line in lines if line[:1] and line[:1] in _FRAMES and not self._loses()]
         adapter.received = rest
         self.frames += len(frames)
         for other in self._adapters:
             if other is not adapter and frames:
                 self._give(other, b"".join(frames))
+
+    def _loses(self) -> bool:
+        lost = self.lose_one_in != 0 and self._random.randrange(self.lose_one_in) == 0
+        self.lost += lost
+        return lost
 
     def _give(self, adapter: _Adapter, data: bytes) -> None:
         if len(adapter.backlog) < _LARGEST_BACKLOG:
