@@ -7,7 +7,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Prints a line for each kind of bus, longest message and longest packet: its name, these lengths, bytes, seconds, and
- * the share of what ISO-TP carries at best: packets of the largest size, one after the other, of which all bytes count.
+ * bytes per second at best: of ISO-TP alone, packets of the largest size, one after the other, of which all bytes count;
+ * and with the heads of router, channel, message and elements in them.
  */
 #include <stdio.h>
 #include <string.h>
@@ -20,7 +21,6 @@
 enum {
     IMAGE = 16000,
     KBIT = 1000,
-    HEADS = 44,           /* of the message and its elements */
     UNIT = 16,            /* pieces are multiples of it */
     ACKNOWLEDGEMENTS = 4, /* at most, before a reply */
     UNDER_WAY = 6,        /* messages */
@@ -29,10 +29,11 @@ enum {
 
 static RTS_UI8 image[IMAGE];
 
-static void send_piece(CLIENT *client, RTS_UI32 offset, RTS_UI32 size, bool may_wait)
+static RTS_UI8 message[NETSERVER_MESSAGE_SIZE];
+
+static RTS_UI32 make_message(const CLIENT *client, RTS_UI32 offset, RTS_UI32 size, bool may_wait)
 {
     static RTS_UI8 content[NETSERVER_MESSAGE_SIZE];
-    static RTS_UI8 message[NETSERVER_MESSAGE_SIZE];
     CDL_POSITION position;
     BTAG_WRITER writer;
 
@@ -43,15 +44,18 @@ static void send_piece(CLIENT *client, RTS_UI32 offset, RTS_UI32 size, bool may_
     BTagWriterInit(&writer, content, sizeof(content));
     BTagWrite(&writer, TAG_CDL_POSITION, BTAG_ALIGN_0, &position, sizeof(position));
     BTagWrite(&writer, TAG_CDL_DATA, BTAG_ALIGN_0, image + offset, size);
-    client_send_message(
-        client, message,
-        client_message(client, SG_APPLICATION, SRV_APP_DOWNLOAD_COMPACT, content, writer.size, message));
+    return client_message(client, SG_APPLICATION, SRV_APP_DOWNLOAD_COMPACT, content, writer.size, message);
+}
+
+/* Bytes of a message besides those of the image. */
+static RTS_UI32 heads(const CLIENT *client)
+{
+    return make_message(client, 0, UNIT, false) - UNIT;
 }
 
 /* What the device has by now, as its next reply says; 0 when there is none. Acknowledgements may come before it. */
 static RTS_UI32 take_reply(CLIENT *client)
 {
-    static RTS_UI8 message[NETSERVER_MESSAGE_SIZE];
     REPLY reply;
     RTS_UI32 size = 0;
 
@@ -63,14 +67,26 @@ static RTS_UI32 take_reply(CLIENT *client)
     return reply_number(&reply, TAG_CDL_NEXT);
 }
 
-/* Bytes of the image in a message of `longest` bytes at most that fills its packets. */
+enum { PREFIX = CHANNEL_FIRST_SIZE - sizeof(CHANNEL_DATA) }; /* of a message in its first block */
+
+/* Bytes of a message in a block. */
+static RTS_UI32 block_room(const CLIENT *client)
+{
+    return client_room(client) - (RTS_UI32)sizeof(CHANNEL_DATA);
+}
+
+/* Bytes of a message of `longest` bytes at most that fills its packets. */
+static RTS_UI32 filling(const CLIENT *client, RTS_UI32 longest)
+{
+    RTS_UI32 filled = (longest + PREFIX) / block_room(client) * block_room(client);
+
+    return filled == 0 ? longest : filled - PREFIX;
+}
+
+/* Bytes of the image in it. */
 static RTS_UI32 piece_of(const CLIENT *client, RTS_UI32 longest)
 {
-    enum { PREFIX = CHANNEL_FIRST_SIZE - sizeof(CHANNEL_DATA) };
-    RTS_UI32 room = client_room(client) - (RTS_UI32)sizeof(CHANNEL_DATA);
-    RTS_UI32 filled = (longest + PREFIX) / room * room;
-
-    return ((filled == 0 ? longest : filled - PREFIX) - HEADS) / UNIT * UNIT;
+    return (filling(client, longest) - heads(client)) / UNIT * UNIT;
 }
 
 /* Each FOR_ALL pieces have one reply, and so has the last one. */
@@ -89,7 +105,9 @@ static bool send_image(CLIENT *client, RTS_UI32 longest)
     for (RTS_UI32 sent = 0; sent < pieces || replied < pieces;) {
         RTS_UI32 left = IMAGE - sent * piece;
         if (sent < pieces && sent - replied < UNDER_WAY) {
-            send_piece(client, sent * piece, left < piece ? left : piece, !has_reply(sent, pieces));
+            client_send_message(
+                client, message,
+                make_message(client, sent * piece, left < piece ? left : piece, !has_reply(sent, pieces)));
             sent++;
             continue;
         }
@@ -112,8 +130,8 @@ static double frame_seconds(RTS_UI32 size, bool fd)
     return (double)SimCanFrameNs(&frame) / 1e9;
 }
 
-/* Seconds a byte takes at best: a first frame, one of flow control, all others full. */
-static double best(RTS_UI32 size, bool fd)
+/* Seconds a packet takes at best: a first frame, one of flow control, all others full. */
+static double packet_seconds(RTS_UI32 size, bool fd)
 {
     RTS_UI32 full = fd ? CAN_FD_SIZE : CAN_CLASSIC_SIZE;
     RTS_UI32 left = size - (full - 2);
@@ -121,7 +139,21 @@ static double best(RTS_UI32 size, bool fd)
 
     for (; left > full - 1; left -= full - 1)
         packet += frame_seconds(full, fd);
-    return (packet + frame_seconds(1 + left, fd)) / size;
+    return packet + frame_seconds(1 + left, fd);
+}
+
+/* Bytes of the image per second when messages of `longest` bytes at most follow each other, each in as few packets as it
+ * needs, and nothing is sent back. */
+static double framed_rate(const CLIENT *client, RTS_UI32 longest, bool fd)
+{
+    RTS_UI32 size = filling(client, longest);
+    double seconds = 0;
+
+    for (RTS_UI32 left = PREFIX + size, part; left != 0; left -= part) {
+        part = left < block_room(client) ? left : block_room(client);
+        seconds += packet_seconds(CLIENT_HEADER_SIZE + (RTS_UI32)sizeof(CHANNEL_DATA) + part, fd);
+    }
+    return (size - heads(client)) / seconds;
 }
 
 static bool measure(const char *name, RTS_UI32 longest, RTS_UI32 packet, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
@@ -138,8 +170,8 @@ static bool measure(const char *name, RTS_UI32 longest, RTS_UI32 packet, RTS_UI3
     double seconds = (double)(SimCanNow() - start) / 1e9;
     RTS_UI32 size = packet > BLK_MAX_SIZE ? packet : BLK_MAX_SIZE;
     done = done && client_room(&client) == size - CLIENT_HEADER_SIZE;
-    printf("%s\t%u\t%u\t%d\t%.4f\t%.4f\n", name, (unsigned)longest, (unsigned)size, IMAGE, seconds,
-           IMAGE * best(size, data_bit_rate != 0) / seconds);
+    printf("%s\t%u\t%u\t%d\t%.4f\t%.0f\t%.0f\n", name, (unsigned)longest, (unsigned)size, IMAGE, seconds,
+           size / packet_seconds(size, data_bit_rate != 0), framed_rate(&client, longest, data_bit_rate != 0));
     can_end();
     return done;
 }
