@@ -76,14 +76,14 @@ class Replies(Connection):
     is_slow = False
     is_bus = False
 
-    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
+    def exchange(self, message: bytes, patience: float = PATIENCE, *, more: bool = False) -> bytes:
         asked = l7.decode(message)
         content = next(self._contents, None)
         if content is None:
             raise LinkError("The device is gone.", "timeout")
         return l7.encode(l7.Message(asked.group | lib.L7_REPLY, asked.service, asked.session, content))
 
-    def stream(self, messages: Iterable[bytes], *rest: object) -> Iterator[bytes]:  # type: ignore[override]
+    def stream(self, messages: Iterable[bytes], *rest: object, **options: object) -> Iterator[bytes]:  # type: ignore[override]
         return map(self.exchange, messages)
 
 

@@ -10,11 +10,12 @@ import tempfile
 from collections.abc import Callable, Generator, Iterable
 from itertools import chain, zip_longest
 from pathlib import Path
+from typing import Any
 
 from plctool.compiler import compile_sources
 from plctool.device import Plc
 from plctool.image.file import parse_image
-from plctool.link.connection import PATIENCE, Connection
+from plctool.link.connection import Connection
 from plctool.link.sim import SimTransport
 from plctool.sim import Simulator
 
@@ -211,10 +212,8 @@ class Recorder(Connection):
         self.plc: Plc | None = None
         self._crc = crc.to_bytes(4, "little")
 
-    def stream(
-        self, messages: Iterable[bytes], patience: float = PATIENCE, check: Callable[[], None] = lambda: None
-    ) -> Generator[bytes, None, None]:
-        return super().stream(map(self._keep, messages), patience, check)
+    def stream(self, messages: Iterable[bytes], *rest: Any, **options: Any) -> Generator[bytes, None, None]:
+        return super().stream(map(self._keep, messages), *rest, **options)
 
     def _keep(self, message: bytes) -> bytes:
         head, session, content = message[:8], message[8:12], message[L7_SIZE:]

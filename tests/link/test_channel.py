@@ -12,7 +12,9 @@ from fake_device import FakeDevice, FakeLine, damage
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
+from plctool.core import lib
 from plctool.errors import LinkError
+from plctool.link import router
 from plctool.link.channel import Channel, ChannelLost, ErrorRate, Line, RoundTrip, State
 from plctool.link.connection import Connection
 
@@ -368,6 +370,58 @@ def test_lost_open_requests_are_repeated() -> None:
     assert connection.exchange(b"ab") == b"ba"
 
 
+# ---- round trips ----
+
+
+class Listened(FakeLine):
+    """Keeps what is sent: service and first byte of each packet."""
+
+    def __init__(self, device: FakeDevice) -> None:
+        self.heard: list[tuple[int, int]] = []
+        super().__init__(device)
+
+    def send(self, *packets: bytes) -> None:
+        for data in packets:
+            packet = router.decode(data)
+            assert packet
+            self.heard.append((packet.service, packet.payload[0]))
+        super().send(*packets)
+
+
+OPEN, DATA, ACK = (
+    (lib.ROUTER_SVC_CHANNEL, kind) for kind in (lib.CHANNEL_PKG_OPEN_REQ, lib.CHANNEL_PKG_DATA, lib.CHANNEL_PKG_ACK)
+)
+
+
+def test_the_one_device_of_a_line_is_not_asked_for_its_address() -> None:
+    line = Listened(FakeDevice(reverse))
+    assert connect(line).exchange(b"who?") == b"?ohw"
+    assert line.heard == [OPEN, DATA, ACK]
+
+
+def test_a_line_that_may_have_several_devices_is_asked_who_is_there() -> None:
+    line = Listened(FakeDevice(reverse))
+    line.peer_words = 0
+    connect(line)
+    assert [service for service, _ in line.heard] == [lib.ROUTER_SVC_NAME_REQUEST, lib.ROUTER_SVC_CHANNEL]
+
+
+def test_the_next_request_acknowledges_a_reply_where_one_follows() -> None:
+    line = Listened(FakeDevice(reverse))
+    connection = connect(line)
+    assert connection.exchange(b"first", more=True) == b"tsrif"
+    assert connection.exchange(b"second", more=True) == b"dnoces"
+    assert connection.exchange(b"last") == b"tsal"
+    assert line.heard == [OPEN, DATA, DATA, DATA, ACK]
+
+
+def test_a_reply_that_comes_again_because_none_followed_changes_nothing() -> None:
+    connection = connect(FakeLine(FakeDevice(reverse)))
+    assert connection.exchange(b"first", more=True) == b"tsrif"
+    connection.wait(3.0)
+    assert connection.exchange(b"second") == b"dnoces"
+
+
 # ---- failures ----
 
 
@@ -388,7 +442,7 @@ def test_a_cut_line_is_noticed() -> None:
     with pytest.raises(ChannelLost) as caught:
         connection.exchange(b"anybody?", patience=4.0)
     assert caught.value.code == "timeout"
-    assert 4 <= line.now() - begin < 6
+    assert 3.99 < line.now() - begin < 6
 
 
 def test_an_unplugged_adapter_is_noticed_at_once() -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from small_app import RETURN, make_application
 
 from plctool.core import ffi, lib
+from plctool.device import Plc
 from plctool.errors import DeviceError, LinkError
 from plctool.link import services
 from plctool.link.connection import Connection
@@ -131,6 +132,17 @@ def test_19_of_20_bytes_on_the_line_are_of_the_image() -> None:
     begin = line.now()
     services.download(session, image)
     assert len(image) / (line.now() - begin) / line.byte_rate > 0.95
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the application's code is for x86-64")
+def test_a_small_image_has_two_thirds_of_the_line_from_the_first_request_until_it_runs() -> None:
+    image, _ = make_application(code_size=2300)
+    assert 2400 < len(image) < 2600
+    line = SimSerial()
+    line.is_slow = False
+    with Plc(Connection(line)) as plc:
+        assert plc.flash(image).state == "run"
+        assert len(image) / line.now() / line.byte_rate > 0.67
 
 
 def test_large_messages_use_nine_tenths_of_the_line_both_ways() -> None:

@@ -258,13 +258,14 @@ class GatewayConnection:
         """The next request needs `open` first."""
         self._generation = None
 
-    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
-        """Sends a request and returns the reply. Raises ChannelLost when the channel is gone or the gateway ended."""
+    def exchange(self, message: bytes, patience: float = PATIENCE, *, more: bool = False) -> bytes:
+        """Sends a request and returns the reply. Raises ChannelLost when the channel is gone or the gateway ended.
+        `more` is of no use: another tool may come between."""
         number = self._ask(Kind.EXCHANGE, Request(self._channel(), patience, message).encode())
         return self._reply(self._answer(number, patience)).message
 
     def stream(
-        self, messages: Iterable[bytes], patience: float = PATIENCE, *, sharing: bool = False
+        self, messages: Iterable[bytes], patience: float = PATIENCE, *, sharing: bool = False, more: bool = False
     ) -> Iterator[bytes]:
         """Sends requests, the next ones already while the device works, and yields the replies; see Connection."""
         assert not sharing

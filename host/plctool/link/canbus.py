@@ -241,6 +241,7 @@ class CanTransport:
         self.is_slow = True
         self.is_bus = True
         self.point_to_point = False
+        self.peer_words = 0
         self.node = node
         self._places: dict[bytes, str] = {}
         self.places: Mapping[bytes, str] = MappingProxyType(self._places)

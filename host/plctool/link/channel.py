@@ -155,6 +155,7 @@ class Channel:
         self.buffer_size = 0  # longest message the device takes, bytes
         self.outstanding = 0  # requests without reply
         self.replies: deque[bytes] = deque()
+        self.more_follows = False  # a request, soon after the last reply, which it acknowledges
         self._line = line
         self._address_words = address_words
         self._request_id = request_id
@@ -467,7 +468,8 @@ class Channel:
         return True
 
     def _finish_reply(self) -> None:
-        """Delivers the reply when it is complete. A request under way acknowledges it, otherwise we do at once."""
+        """Delivers the reply when it is complete. A request under way or to come acknowledges it, otherwise we do at
+        once."""
         assert self._expected
         length, crc = self._expected
         if len(self._incoming) < length:
@@ -481,7 +483,8 @@ class Channel:
         self._round_trip.progress()
         if not self.outstanding:
             self._timer = math.inf
-            self._acknowledge()
+            if not self.more_follows:
+                self._acknowledge()
 
     def _answered(self) -> None:
         """The oldest request is done with."""

@@ -95,9 +95,9 @@ class MessageLink(Protocol):
         """Whether a reply takes the time of what is sent, so that one reply should do for several requests."""
 
     def open(self) -> None: ...
-    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes: ...
+    def exchange(self, message: bytes, patience: float = PATIENCE, *, more: bool = False) -> bytes: ...
     def stream(
-        self, messages: Iterable[bytes], patience: float = PATIENCE, *, sharing: bool = False
+        self, messages: Iterable[bytes], patience: float = PATIENCE, *, sharing: bool = False, more: bool = False
     ) -> Iterator[bytes]: ...
     def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[names.Node]: ...
     def now(self) -> float:
@@ -152,10 +152,12 @@ class Connection:
         return self.transport.is_bus
 
     def open(self) -> None:
-        """Opens a new channel, after a name request on the first time. Raises LinkError if no device answers."""
-        if self._peer is None:
+        """Opens a new channel. The first time it asks for the device's address before, unless there is one device
+        only, whose response has it. Raises LinkError if no device answers."""
+        if self._peer is None and (self._choice is not None or not self.transport.peer_words):
             self._peer = self._find(self._choice).address
-        header = router.header_size(self._peer, self.transport.local_address)
+        peer = self._peer or bytes(2 * self.transport.peer_words)
+        header = router.header_size(peer, self.transport.local_address)
         line = Line(
             self.transport.max_packet - header,
             header + self.transport.packet_overhead,
@@ -163,7 +165,7 @@ class Connection:
             self.transport.long_packet,
             header,
         )
-        words = (len(self._peer) + len(self.transport.local_address)) // 2
+        words = (len(peer) + len(self.transport.local_address)) // 2
         end = self.transport.now() + _BUSY_PATIENCE
         while (channel := self._open_channel(line, words, last=self.transport.now() >= end)) is None:
             self.wait(_BUSY_PAUSE)
@@ -176,6 +178,8 @@ class Connection:
         try:
             self._run(channel, lambda: channel.state is State.OPEN, _OPEN_PATIENCE)
         except ChannelLost:
+            if self._peer is None:
+                raise no_answer(self.name) from None
             self._peer = None  # there may be another device by now
             raise
         except LinkError as error:
@@ -207,12 +211,12 @@ class Connection:
             found |= {node.address: node for node in self.scan(_ALL_REPLIED)}
         return list(found.values())
 
-    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
-        """Sends a request and returns the reply. `patience`: seconds of silence that are borne.
+    def exchange(self, message: bytes, patience: float = PATIENCE, *, more: bool = False) -> bytes:
+        """Sends a request and returns the reply. `patience`: seconds of silence that are borne. `more`: as in `stream`.
 
         Raises ChannelLost when the channel is gone; `open` gives a new one.
         """
-        (reply,) = self.stream([message], patience)
+        (reply,) = self.stream([message], patience, more=more)
         return reply
 
     def stream(
@@ -222,17 +226,19 @@ class Connection:
         check: Callable[[], None] = lambda: None,
         *,
         sharing: bool = False,
+        more: bool = False,
     ) -> Generator[bytes, None, None]:
         """Sends requests, the next one already while the device works on the previous one, and yields the replies.
 
         On a bad line there may be fewer replies than requests, but never none to the last one. `sharing`: in the
-        requests the device was asked to leave replies out, so more may be under way. When the stream is left
-        before its end the channel is closed, so that the device gets no more of it. `check` is called again and again
-        meanwhile; what it raises ends the stream.
+        requests the device was asked to leave replies out, so more may be under way. `more`: another request follows at
+        once, and acknowledges the last reply. When the stream is left before its end the channel is closed, so that the
+        device gets no more of it. `check` is called again and again meanwhile; what it raises ends the stream.
         """
         if self._channel is None:
             raise ChannelLost("There is no connection to the device.", "closed")
         channel, requests = self._channel, iter(messages)
+        channel.more_follows = more
         most = MAX_SHARING if sharing else MAX_REQUESTS
         try:
             while True:
@@ -311,17 +317,19 @@ class Connection:
         packet = self._receive(0.0 if sent else max(0.0, min(channel.deadline(), give_up) - now))
         if packet and packet.service == lib.ROUTER_SVC_CHANNEL and self._is_from_peer(packet):
             channel.receive(packet.payload, self.transport.now())
+            if self._peer is None and channel.state is State.OPEN:
+                self._peer = packet.sender
 
     def _send_some(self, channel: Channel) -> bool:
         """Sends the packages that are due, up to _AT_ONCE. False if there were none."""
         packages = iter(lambda: channel.next_package(self.transport.now()), None)
-        packets = [self._packet(lib.ROUTER_SVC_CHANNEL, self._peer, package) for package in islice(packages, _AT_ONCE)]
+        peer = self._peer or router.BROADCAST
+        packets = [self._packet(lib.ROUTER_SVC_CHANNEL, peer, package) for package in islice(packages, _AT_ONCE)]
         if packets:
             self.transport.send(*packets)
         return bool(packets)
 
-    def _packet(self, service: int, receiver: bytes | None, payload: bytes) -> bytes:
-        assert receiver is not None
+    def _packet(self, service: int, receiver: bytes, payload: bytes) -> bytes:
         return router.encode(router.Packet(service, receiver, self.transport.local_address, payload))
 
     def _receive(self, timeout: float) -> router.Packet | None:
@@ -334,4 +342,6 @@ class Connection:
         return self.transport.point_to_point or packet.receiver in (router.BROADCAST, self.transport.local_address)
 
     def _is_from_peer(self, packet: router.Packet) -> bool:
+        if self._peer is None:
+            return len(packet.sender) == 2 * self.transport.peer_words
         return self.transport.point_to_point or packet.sender == self._peer

@@ -297,6 +297,7 @@ class ModbusTransport:
         self.is_slow = bus.byte_rate < math.inf
         self.is_bus = False  # each request has its reply
         self.point_to_point = False
+        self.peer_words = 1
         self.places = NO_PLACES
         self._bus = bus
         self._decoder = simplecom.Decoder()

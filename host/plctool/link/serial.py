@@ -31,6 +31,7 @@ class SerialTransport:
         self.long_packet = simplecom.LONG_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
         self.point_to_point = False
+        self.peer_words = 1
         self.places = NO_PLACES
         real = is_real_line(url) if paced is None else paced
         self.byte_rate = baud / BITS_PER_BYTE / (1 + 1 / _ESCAPE_SHARE) if real else math.inf

@@ -338,7 +338,7 @@ class Prepared:
 def prepare_download(session: Session, image: bytes) -> tuple[Status, Prepared]:
     """The status, and what `download` of this image asks first, in one go."""
     requests = [_READ_STATUS, _question(image)]
-    status, answer = session.recover(lambda: session.call_each(requests))
+    status, answer = session.recover(lambda: session.call_each(requests, more=True))
     return _status_of(status), _prepared(answer)
 
 
@@ -421,7 +421,8 @@ class _Transfer:
         self._session.ensure()
         request = self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, b"")
         connection = self._session.connection
-        for reply in connection.stream(self._messages(start_at), _TRANSFER_PATIENCE, sharing=connection.is_bus):
+        messages = self._messages(start_at)
+        for reply in connection.stream(messages, _TRANSFER_PATIENCE, sharing=connection.is_bus, more=True):
             self._take(_arrived(l7.decode_reply(reply, request)))
         if self.arrived != len(self._image):
             raise DeviceError(f"The device took {self.arrived} of {len(self._image)} bytes; try again.", "incomplete")

@@ -64,22 +64,31 @@ class Session:
         self._application: Application | None = None
 
     def call(
-        self, group: int, service: int, tags: Iterable[bintag.Tag] = (), patience: float = PATIENCE
+        self,
+        group: int,
+        service: int,
+        tags: Iterable[bintag.Tag] = (),
+        patience: float = PATIENCE,
+        *,
+        more: bool = False,
     ) -> bintag.Tags:
-        """One request and its reply. Raises ChannelLost when the channel is gone, DeviceError when refused."""
+        """One request and its reply. Raises ChannelLost when the channel is gone, DeviceError when refused. `more`: as
+        in Connection.stream."""
         try:
-            reply = self._exchange(self.message(group, service, bintag.encode(tags)), patience)
+            reply = self._exchange(self.message(group, service, bintag.encode(tags)), patience, more)
         except DeviceError as error:
             self._check_login(error)
             raise
         self._check_application_login(group, reply)
         return reply
 
-    def call_each(self, requests: Sequence[Request], patience: float = PATIENCE) -> list[bintag.Tags]:
+    def call_each(
+        self, requests: Sequence[Request], patience: float = PATIENCE, *, more: bool = False
+    ) -> list[bintag.Tags]:
         """The replies to requests that are sent without waiting. Raises as `call`, also ChannelLost when a reply was
-        lost; whether the device took the requests is not known then."""
+        lost; whether the device took the requests is not known then. `more`: as in Connection.stream."""
         messages = [self.message(r.group, r.service, bintag.encode(r.tags)) for r in requests]
-        replies = list(self.connection.stream(map(l7.encode, messages), patience))
+        replies = list(self.connection.stream(map(l7.encode, messages), patience, more=more))
         if len(replies) < len(requests):
             raise ChannelLost("A reply of the device was lost; try again.", "timeout")
         try:
@@ -165,8 +174,8 @@ class Session:
                     raise
         raise AssertionError("the last try returns or raises")
 
-    def _exchange(self, request: l7.Message, patience: float = PATIENCE) -> bintag.Tags:
-        return l7.decode_reply(self.connection.exchange(l7.encode(request), patience), request)
+    def _exchange(self, request: l7.Message, patience: float, more: bool) -> bintag.Tags:
+        return l7.decode_reply(self.connection.exchange(l7.encode(request), patience, more=more), request)
 
     def _login(self) -> int:
         """Logs in, with the password if the device has one. Returns the session id. Raises DeviceError without
@@ -208,11 +217,12 @@ class Session:
         """The result of a login, and the elements with it."""
         content = bintag.encode([bintag.u32(lib.TAG_DEV_CRYPT_TYPE, crypt_type), *tags])
         request = l7.Message(lib.SG_DEVICE, lib.SRV_DEV_LOGIN, lib.L7_SESSION_INITIAL, content)
-        reply = self._exchange(request).container(lib.TAG_DEV_LOGIN_REPLY)
+        reply = self._exchange(request, PATIENCE, more=True).container(lib.TAG_DEV_LOGIN_REPLY)
         return reply.u16(lib.TAG_DEV_LOGIN_RESULT), reply
 
     def _login_application(self) -> Application:
-        tags = self.call(lib.SG_APPLICATION, lib.SRV_APP_LOGIN, [bintag.text(lib.TAG_APP_LOGIN_NAME, _APPLICATION)])
+        name = bintag.text(lib.TAG_APP_LOGIN_NAME, _APPLICATION)
+        tags = self.call(lib.SG_APPLICATION, lib.SRV_APP_LOGIN, [name], more=True)
         content = tags.container(lib.TAG_APP_DESCRIPTOR).bytes(lib.TAG_APP_OPTION, _LOGIN_REPLY.size)
         login = _LOGIN_REPLY.unpack(content)
         if login.result == lib.ERR_APP_NOT_EXIST:

@@ -23,6 +23,7 @@ class SimTransport:
     is_slow = False
     is_bus = False
     point_to_point = False
+    peer_words = 0
     places = NO_PLACES
 
     def fileno(self) -> int | None:

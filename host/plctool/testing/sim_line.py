@@ -23,6 +23,7 @@ class SimSerial:
     long_packet = simplecom.LONG_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     point_to_point = False
+    peer_words = 1
     places = NO_PLACES
     is_slow = True
     is_bus = False
