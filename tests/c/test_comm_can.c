@@ -386,7 +386,7 @@ static void another_device_with_our_number_is_noticed(void)
     RTS_UI32 logged = fakes.log_added;
     CAN_TOOL *other = can_tool(DEVICE_NODE);
     for (int i = 0; i < 3; i++)
-        scan(other, CAN_TO_ALL, 0, 1);
+        can_frame(other, 200, "\x03xyz", 4); /* as devices do: to a tool */
     can_pass(10);
     CHECK_EQUAL(BlkDrvCanGetCounters()->same_node, 3);
     CHECK_EQUAL(fakes.log_added, logged + 1);

@@ -12,7 +12,7 @@ import sys
 import threading
 import tty
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -166,6 +166,24 @@ def test_buses_with_other_identifiers_do_not_hear_each_other(tmp_path: Path, too
             assert [d["node_name"] for d in tool.ok("scan", *line)["devices"]] == [name]
             assert tool.ok("flash", *line, "--node", "5", str(counter))["state"] == "run"
             assert tool.ok("status", *line, "--node", name)["state"] == "run"
+
+
+def test_two_devices_with_one_number_say_so_and_are_both_listed(tmp_path: Path, tool: Any) -> None:
+    with CanHub(3) as hub, ExitStack() as stack:
+        ports = []
+        for name, path in zip(("left", "right"), hub.paths[1:], strict=True):
+            options = ("--can", f"slcan:{path}", "--node", "9", "--name", name)
+            ports.append(stack.enter_context(Plcrt(tmp_path / f"{name}.flash", *options)).port)
+        seen: set[str] = set()
+        for _ in range(20):  # replies at the same moment damage each other
+            with suppress(json.JSONDecodeError):
+                seen |= {d["node_name"] for d in json.loads(tool("scan", *options_of(hub, 0), "--json").out)["devices"]}
+            if len(seen) == 2:
+                break
+        assert seen == {"left", "right"}
+        for port in ports:
+            with plctool.connect(f"serial:{port}") as plc:
+                assert "CAN: another device has the node number 9" in [entry.text for entry in plc.log()]
 
 
 def test_one_tool_flashes_while_another_one_watches(

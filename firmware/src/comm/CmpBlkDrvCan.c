@@ -25,7 +25,7 @@ enum {
     CONTROLLER = 0,
     READ_MAX = 64, /* frames per cycle, so that a busy bus does not stop the rest of the runtime */
     SCANS = 2,     /* requests that wait for their moment */
-    FILTERS = 2,
+    FILTERS = 3,
     ROUTER_HEADER_MAX = sizeof(ROUTER_HEADER) + 4 * ROUTER_MAX_ADDRESS + 2,
     /* A packet with the largest message of the channel in one block. No packet is larger, in either direction. */
     MESSAGE_MAX = ROUTER_HEADER_MAX + CHANNEL_FIRST_SIZE + NETSERVER_MESSAGE_SIZE,
@@ -249,10 +249,12 @@ static void take_frame(const CAN_FRAME *frame, RTS_UI32 now_ms)
     RTS_UI32 base = frame->id & ~(RTS_UI32)(CAN_ADDRESS_MASK << CAN_TARGET_SHIFT | CAN_ADDRESS_MASK);
     RTS_UI8 wanted = frame->flags & (CAN_FLAG_EXTENDED | CAN_FLAG_REMOTE);
 
-    if (wanted != CAN_FLAG_EXTENDED || base != can.own.base || (target != can.own.node && target != CAN_TO_ALL))
+    if (wanted != CAN_FLAG_EXTENDED || base != can.own.base)
         return;
     if (source == can.own.node)
         notice_same_node();
+    if (target != can.own.node && target != CAN_TO_ALL)
+        return;
     if (source < CAN_TOOL_MIN || source > CAN_TOOL_MAX || frame->size == 0)
         return;
     if (frame->data[0] == CAN_FRAME_SCAN)
@@ -418,10 +420,11 @@ static void cycle(void)
 
 static RTS_RESULT open_controller(void)
 {
-    const RTS_UI32 mask = 0x1FFFFFFF & ~(RTS_UI32)CAN_ADDRESS_MASK;
+    const RTS_UI32 to = CAN_BASE_MASK | (RTS_UI32)CAN_ADDRESS_MASK << CAN_TARGET_SHIFT;
     const CAN_FILTER filters[FILTERS] = {
-        {can.own.base | can.own.node << CAN_TARGET_SHIFT, mask, true},
-        {can.own.base | (RTS_UI32)CAN_TO_ALL << CAN_TARGET_SHIFT, mask, true},
+        {can.own.base | can.own.node << CAN_TARGET_SHIFT, to, true},
+        {can.own.base | (RTS_UI32)CAN_TO_ALL << CAN_TARGET_SHIFT, to, true},
+        {can.own.base | can.own.node, CAN_BASE_MASK | CAN_ADDRESS_MASK, true}, /* of another device with this number */
     };
     RTS_RESULT result = SysCanOpen(CONTROLLER, 0, 0);
 

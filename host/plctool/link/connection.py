@@ -257,7 +257,7 @@ class Connection:
     def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[names.Node]:
         """Devices that answer a broadcast name request within `seconds`; stops early when `enough` have answered."""
         request_id = secrets.randbits(32)
-        found: dict[bytes, names.Node] = {}
+        found: list[names.Node] = []  # two may have one address by mistake
         now = self.transport.now()
         end, ask_at = now + seconds, now
         while now < end and not (enough and len(found) >= enough):
@@ -269,9 +269,10 @@ class Connection:
             if packet and packet.service == lib.ROUTER_SVC_NAME_RESPONSE:
                 node = names.decode_reply(packet.payload, request_id, packet.sender)
                 if node:
-                    found[node.address] = replace(node, place=self.transport.places.get(node.address, ""))
+                    node = replace(node, place=self.transport.places.get(node.address, ""))
+                    found += [node] if node not in found else []
             now = self.transport.now()
-        return list(found.values())
+        return found
 
     def wait(self, seconds: float) -> None:
         """See MessageLink."""
