@@ -43,7 +43,7 @@ typedef struct {
     RTS_UI8 peer_address[2 * ROUTER_MAX_NETWORK];
 #endif
 #if COMM_HOST_CHANNELS
-    RTS_UI32 (*host_of)(const struct ROUTER_PEER *peer); /* its machine; 0: this one. NULL: not known */
+    RTS_UI32 (*host_of)(const struct ROUTER_PEER *peer); /* its machine, or tool; 0: this machine */
 #endif
     void *instance; /* the driver's own */
 

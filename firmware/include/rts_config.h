@@ -294,7 +294,8 @@
 #define COMM_ENDPOINTS 0
 #endif
 
-/* Channels that the peers of one machine on a network may have together, so that it leaves one to others; 0: no limit. */
+/* Channels that the peers of one machine on a network, of a serial line, or of a tool on CAN may have together, so that one
+ * is left to others; 0: no limit. */
 #ifndef COMM_HOST_CHANNELS
 #define COMM_HOST_CHANNELS (COMM_ENDPOINTS && COMM_MAX_CLIENTS > 2 ? COMM_MAX_CLIENTS - 1 : 0)
 #endif

@@ -278,6 +278,24 @@ static void tools_that_have_vanished_give_way_in_less_than_a_second(void)
     can_end();
 }
 
+/* With ever new addresses in its packets. */
+static void a_tool_that_is_many_leaves_a_channel_to_others(void)
+{
+    CAN_TOOL *crowded;
+    CLIENT many[COMM_MAX_CLIENTS];
+    CLIENT other;
+
+    can_start(500 * KBIT, 0);
+    crowded = can_tool(200);
+    for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS; i++) {
+        can_client(&many[i], crowded);
+        many[i].address = (RTS_UI16)(0x1000 + i);
+        CHECK_EQUAL(client_open(&many[i]) && client_login(&many[i]), i < COMM_HOST_CHANNELS);
+    }
+    CHECK(can_connect(&other, can_tool(201)));
+    can_end();
+}
+
 /* ---- scans ---- */
 
 static void scan(CAN_TOOL *tool, RTS_UI8 target, RTS_UI8 window, RTS_UI32 request_id)
@@ -523,6 +541,7 @@ int main(void)
     RUN(more_packets_than_there_is_room_for_are_sent_again);
     RUN(a_tool_that_stops_in_the_middle_blocks_no_other);
     RUN(tools_that_have_vanished_give_way_in_less_than_a_second);
+    RUN(a_tool_that_is_many_leaves_a_channel_to_others);
     RUN(a_scan_of_all_or_of_one_is_answered);
     RUN(the_answer_comes_at_a_random_moment_of_the_window);
     RUN(scans_of_two_tools_are_both_answered);

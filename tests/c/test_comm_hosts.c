@@ -1,6 +1,6 @@
 /*
- * test_comm_hosts.c - machines on a network, each with many ports or connections: none of them gets all channels, or all
- * connections. The sockets are the test's, because on loopback all is one machine.
+ * test_comm_hosts.c - machines on a network, each with many ports or connections, and what is on a serial line: none of
+ * them gets all channels, or all connections. The sockets are the test's, because on loopback all is one machine.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -8,6 +8,7 @@
 
 #include "CmpBlkDrvTcp.h"
 #include "CmpChannelServerEmbedded.h"
+#include "CmpChecksum.h"
 #include "CmpPackets.h"
 #include "SysSocket.h"
 #include "comm_client.h"
@@ -262,6 +263,67 @@ static void tools_on_the_machine_of_the_device_may_have_all_channels(void)
     }
 }
 
+/* ---- a serial line ---- */
+
+static void put_line(RTS_UI8 byte, bool escaped)
+{
+    fakes.line_in[fakes.line_in_size++] = byte;
+    if (escaped && byte == '#')
+        fakes.line_in[fakes.line_in_size++] = '_';
+}
+
+static void send_on_line(void *instance, const RTS_UI8 *packet, RTS_UI32 size)
+{
+    RTS_UI16 crc = CRC16Update(CRC16_INIT, packet, size);
+
+    RTS_UNUSED(instance);
+    fakes.line_in_size = fakes.line_in_read = 0;
+    put_line('#', false);
+    put_line('<', false);
+    for (RTS_UI32 i = 0; i < size; i++)
+        put_line(packet[i], true);
+    put_line((RTS_UI8)crc, true);
+    put_line((RTS_UI8)(crc >> 8), true);
+    put_line('#', false);
+    put_line('>', false);
+    fakes_cycle(0);
+}
+
+static RTS_UI32 receive_on_line(void *instance, RTS_UI8 *packet, RTS_UI32 capacity)
+{
+    RTS_UI32 size = 0;
+    RTS_UI32 i = 2; /* after the start of the frame */
+
+    RTS_UNUSED(instance);
+    if (fakes.line_out_size == 0)
+        return 0;
+    for (; memcmp(fakes.line_out + i, "#>", 2) != 0 && size < capacity; i++) {
+        packet[size++] = fakes.line_out[i];
+        i += fakes.line_out[i] == '#';
+    }
+    i += 2;
+    fakes.line_out_size -= i;
+    memmove(fakes.line_out, fakes.line_out + i, fakes.line_out_size);
+    return size - (RTS_UI32)sizeof(RTS_UI16);
+}
+
+/* With an address of its own for each channel. */
+static void what_is_on_a_serial_line_leaves_a_channel_to_others(void)
+{
+    static const CLIENT_LINK line = {send_on_line, receive_on_line, NULL};
+    CLIENT many[COMM_MAX_CLIENTS];
+    TOOL other;
+
+    start();
+    for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS; i++) {
+        client_init(&many[i], (RTS_UI16)(0x1000 + i));
+        many[i].link = &line;
+        CHECK_EQUAL(client_open(&many[i]) && client_login(&many[i]), i < COMM_HOST_CHANNELS);
+    }
+    place_tool(&other, OTHER_IP, 0);
+    CHECK(logs_in(&other) && is_served(&other));
+}
+
 /* Two tools want the last channel at the same time. */
 static void a_tool_whose_new_channel_was_taken_opens_again(void)
 {
@@ -316,6 +378,7 @@ int main(void)
     RUN(a_machine_that_opens_without_end_does_not_end_the_login_of_another_one);
     RUN(a_machine_with_its_share_gets_what_its_own_tools_leave);
     RUN(tools_on_the_machine_of_the_device_may_have_all_channels);
+    RUN(what_is_on_a_serial_line_leaves_a_channel_to_others);
     RUN(a_tool_whose_new_channel_was_taken_opens_again);
     RUN(connections_of_one_machine_displace_its_own);
     return test_result();

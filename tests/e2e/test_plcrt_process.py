@@ -371,6 +371,7 @@ class Wire:
     long_packet = simplecom.LONG_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     point_to_point = False
+    peer_words = 1
     places = NO_PLACES
     byte_rate = math.inf
     is_slow = False

@@ -445,6 +445,14 @@ static bool is_address_possible(const CAN_ADDRESS *address)
     return false;
 }
 
+#if COMM_HOST_CHANNELS
+/* The tool, whatever addresses its packets have. On which machine it runs is not known. */
+static RTS_UI32 host_of(const ROUTER_PEER *peer)
+{
+    return (RTS_UI32)peer->endpoint;
+}
+#endif
+
 static void open_bus(void)
 {
     CMP_CLEAR(can);
@@ -461,6 +469,9 @@ static void open_bus(void)
     can.driver.takes = CAN_PACKET_SIZE;
 #endif
     can.driver.send = can_send;
+#if COMM_HOST_CHANNELS
+    can.driver.host_of = host_of;
+#endif
     RTS_RESULT result = open_controller();
     can.open = result == ERR_OK;
     can.fd = can.open && SysCanIsFd(CONTROLLER);

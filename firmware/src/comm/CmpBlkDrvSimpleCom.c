@@ -288,6 +288,14 @@ static void reset_lines(void)
         CMP_CLEAR(counters);
 }
 
+#if COMM_HOST_CHANNELS
+/* What is at the other end, whatever addresses it gives: the line's number, which is the address of no machine. */
+static RTS_UI32 host_of(const ROUTER_PEER *peer)
+{
+    return peer->driver->address[1];
+}
+#endif
+
 static COM_LINE *begin_line(RTS_UI32 index)
 {
     COM_LINE *line = &lines[index];
@@ -302,6 +310,9 @@ static COM_LINE *begin_line(RTS_UI32 index)
 #endif
     line->driver.instance = line;
     line->driver.send = com_send;
+#if COMM_HOST_CHANNELS
+    line->driver.host_of = host_of;
+#endif
     return line;
 }
 
