@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from front_support import check, main
+from test_st_programs import PROGRAMS, checked
 
 from plctool.compiler import check_with_tests, load_sources
 from plctool.compiler.front import Source, check_sources
@@ -533,8 +534,8 @@ def test_the_examples_have_no_pitfalls(name: str) -> None:
 
 def test_the_programs_of_the_tests_have_no_pitfalls() -> None:
     found = []
-    for path in [*sorted((ROOT / "tests/st").glob("*.st")), *sorted((ROOT / "bench/programs").glob("*.st"))]:
-        found += check_sources([Source(path.name, path.read_text("utf-8"))]).diagnostics
+    for path in [*PROGRAMS, *sorted((ROOT / "bench/programs").glob("*.st"))]:
+        found += checked(path).diagnostics
     assert not [d for d in found if d.code in PITFALLS and d.severity == "warning"]
 
 

@@ -7,10 +7,11 @@ standard, unless the export named what they will not see.
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
-from test_st_programs import PROGRAMS, checked, read_script, runs
+from test_st_programs import PROGRAMS, built_without_optimisation, read_script, runs
 
 from plctool.compiler import IoFiles, check_with_tests, program_files
 from plctool.compiler.build import build_program
@@ -37,6 +38,11 @@ def exported(sources: list[Source]) -> Written:
     return write_project(sources, "p", declared_names_asked_for(standard_library(), (), sources))
 
 
+@cache
+def exported_program(path: Path) -> Written:
+    return exported(program_files([path]).load_sources())
+
+
 def image_of(result: CheckResult) -> bytes:
     assert result.program is not None, "\n".join(f"{d.line}: {d.message}" for d in result.diagnostics)
     return build_program(result.program, OPTIONS).image
@@ -44,12 +50,11 @@ def image_of(result: CheckResult) -> bytes:
 
 @pytest.mark.parametrize("path", RUNNING, ids=lambda p: p.stem)
 def test_program(path: Path) -> None:
-    sources = program_files([path]).load_sources()
-    written = exported(sources)
+    written = exported_program(path)
     assert written.ok
-    image = image_of(checked(path))
+    image = built_without_optimisation(path, "all").image
     again = check_sources(read_project("p.xml", written.text))
-    if ASKS_FOR_ITS_PLACE in sources[0].text:
+    if ASKS_FOR_ITS_PLACE in path.read_text("utf-8"):
         assert again.ok
         return
     assert image_of(again) == image
@@ -72,5 +77,5 @@ def test_project(path: Path) -> None:
 
 
 def test_few_programs_are_kept_as_text() -> None:
-    kept = [path for path in RUNNING if "SourceText" in exported(program_files([path]).load_sources()).text]
+    kept = [path for path in RUNNING if "SourceText" in exported_program(path).text]
     assert 0 < len(kept) < len(RUNNING) // 30

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from plctool.compiler import check_sources
-from plctool.compiler.build import build_program
+from plctool.compiler import Level, check_sources
+from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_unit import Options, parse_checks
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.front import CheckResult
@@ -149,15 +149,23 @@ def checked(path: Path) -> CheckResult:
     return check_sources([path])
 
 
-def run_program(path: Path, script: Script, level: int = 2) -> list[str]:
+def build(path: Path, level: Level, checks: str) -> BuildResult:
+    typed_program = checked(path).program
+    assert typed_program is not None, "it does not compile"
+    return build_program(typed_program, Options(find_target(DEFAULT_TARGET), level, parse_checks(checks)))
+
+
+@cache
+def built_without_optimisation(path: Path, checks: str) -> BuildResult:
+    """A program as it is lowered, for all that is looked at of it."""
+    return build(path, 0, checks)
+
+
+def run_program(script: Script, result: BuildResult) -> list[str]:
     """Runs the program; what is not as expected."""
     per_cycle = {name: values for name, values in script.expected if len(values) > 1}
     at_end = {name: values[0] for name, values in script.expected if len(values) == 1}
     wrong = []
-    typed_program = checked(path).program
-    assert typed_program is not None, "it does not compile"
-    checks = parse_checks(script.options.get("checks", "all"))
-    result = build_program(typed_program, Options(find_target(DEFAULT_TARGET), level, checks))
     with Simulator(result.image, result.symbols) as plc:
         if script.time_ms:
             plc.run_for(script.time_ms, check=False)
@@ -197,14 +205,15 @@ def test_program(path: Path) -> None:
     script = read_script(path)
     wrong = check_diagnostics(checked(path).diagnostics, script)
     if runs(script):
-        wrong += run_program(path, script)
+        wrong += run_program(script, build(path, 2, script.options.get("checks", "all")))
     assert not wrong, "\n".join(wrong)
 
 
 @pytest.mark.parametrize("path", [p for p in PROGRAMS if runs(read_script(p))], ids=lambda p: p.stem)
 def test_program_without_optimisation(path: Path) -> None:
     """What the optimiser makes of it must not depend on luck."""
-    wrong = run_program(path, read_script(path), level=0)
+    script = read_script(path)
+    wrong = run_program(script, built_without_optimisation(path, script.options.get("checks", "all")))
     assert not wrong, "\n".join(wrong)
 
 
