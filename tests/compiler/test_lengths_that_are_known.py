@@ -77,6 +77,7 @@ class Model:
                 * 4,
                 (f"{x} := CONCAT({y}, {z});", lambda: self._assign(x, appended(y, z))),
                 *[(f"{x} := CONCAT({x}, Change({y}));", changes)] * 3,
+                *[(f"{x} := Twice({y});", lambda: self._assign(x, (t(y)[:80] * 2)[:9]))] * 2,
                 (f"{x} := LEFT({y}, {n});", lambda: self._assign(x, t(y)[:n])),
                 (f"{x} := RIGHT({y}, {n});", lambda: self._assign(x, t(y)[max(0, len(t(y)) - n) :])),
                 (f"{x} := MID({y}, {n}, {k + 1});", lambda: self._assign(x, t(y)[k : k + n])),
@@ -103,12 +104,13 @@ class Model:
 def program(model: Model, *, in_block: bool) -> str:
     rest = f"p : POINTER TO BYTE; lengths : ARRAY[0..{STATEMENTS - 1}] OF INT; END_VAR"
     change = "FUNCTION Change : STRING[9] VAR_IN_OUT x : STRING; END_VAR x := 'changed'; Change := '*'; END_FUNCTION\n"
+    twice = "FUNCTION Twice : STRING[9] VAR_INPUT x : STRING; END_VAR Twice := CONCAT(x, x); END_FUNCTION\n"
     if in_block:
         return (
-            f"{change}FUNCTION_BLOCK Work VAR {DECLARATIONS} {rest}\n{model.body}\nEND_FUNCTION_BLOCK\n"
+            f"{change}{twice}FUNCTION_BLOCK Work VAR {DECLARATIONS} {rest}\n{model.body}\nEND_FUNCTION_BLOCK\n"
             "PROGRAM Main VAR work : Work; END_VAR work(); END_PROGRAM"
         )
-    return f"{change}PROGRAM Main VAR {DECLARATIONS} {rest}\n{model.body}\nEND_PROGRAM"
+    return f"{change}{twice}PROGRAM Main VAR {DECLARATIONS} {rest}\n{model.body}\nEND_PROGRAM"
 
 
 @pytest.mark.parametrize("seed", range(8))
