@@ -239,6 +239,13 @@ def test_blocks_of_the_library_are_not_inlined_where_flash_is_small(timers: Type
     assert normal < fast / 2
 
 
+@pytest.mark.parametrize("target", ["cortex-m3", "cortex-m4f"])
+def test_loops_of_the_library_are_not_unrolled_where_flash_is_small(target: str) -> None:
+    text = lowered("PROGRAM Main VAR s, t : STRING; END_VAR s := CONCAT(s, t); END_PROGRAM", target)
+    normal, fast = (str(optimised(Part(text), find_target(target), level)[0]).count("load i8") for level in (2, 3))
+    assert 0 < normal < fast
+
+
 def test_small_code_has_a_body_once_unless_it_is_called_once() -> None:
     target = find_target("cortex-m3")
     once = "x(a := 1, b := 2);"

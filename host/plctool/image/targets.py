@@ -57,6 +57,10 @@ class Target:
         """Whether programs are in a small flash."""
         return self.pointer_size == 4
 
+    def saves_room(self, opt_level: int) -> bool:
+        """Whether code for a small flash is to stay small, at that level of optimisation."""
+        return self.compact and opt_level < 3
+
 
 TARGETS: dict[str, Target] = {
     t.name: t

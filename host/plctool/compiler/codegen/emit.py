@@ -37,6 +37,7 @@ def optimised(part: Part, target: Target, opt_level: int) -> tuple[llvm.ModuleRe
     module.verify()
     shorter = part.large and opt_level == 2
     options = llvm.create_pipeline_tuning_options(speed_level=1 if shorter else opt_level)
+    options.loop_unrolling = not target.saves_room(opt_level)
     options.loop_vectorization = opt_level >= 2 and not shorter
     options.slp_vectorization = opt_level >= 3  # slow, and seldom of use for what programs of controllers do
     builder = llvm.create_pass_builder(machine, options)

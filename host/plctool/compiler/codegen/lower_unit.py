@@ -66,7 +66,7 @@ class Options:
     def compact(self) -> bool:
         """Whether loops are not unrolled and blocks of the library are not inlined: where memory is small, unless
         level 3 asks for it."""
-        return self.size or (self.target.compact and self.opt_level < 3)
+        return self.size or self.target.saves_room(self.opt_level)
 
 
 def interface_signature(text: str) -> int:
