@@ -246,6 +246,17 @@ def test_loops_of_the_library_are_not_unrolled_where_flash_is_small(target: str)
     assert 0 < normal < fast
 
 
+def test_short_numbers_fill_the_registers_they_are_passed_in() -> None:
+    declarations = "VAR_INPUT i : INT; u : UINT; s : SINT; b : BOOL; d : DINT; END_VAR"
+    text = lowered(
+        f"FUNCTION F : INT {declarations} F := i; END_FUNCTION\n"
+        "PROGRAM Main VAR i : INT; END_VAR i := F(1, 2, 3, TRUE, 5); END_PROGRAM"
+    )
+    types = r"ptr [^,]*, i16 signext [^,]*, i16 zeroext [^,]*, i8 signext [^,]*, i8 [%\w]*, i32 [%\w]*\)"
+    assert re.search(rf"^define .* i16 @st\.F\({types}", text, re.M)
+    assert re.search(rf"call i16 @st\.F\({types}", text)
+
+
 def test_small_code_has_a_body_once_unless_it_is_called_once() -> None:
     target = find_target("cortex-m3")
     once = "x(a := 1, b := 2);"

@@ -8,8 +8,7 @@ from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower_arith import convert, is_real
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Frame, Ref, rule
 from plctool.compiler.codegen.lower_string import copy_literal, copy_string
-from plctool.compiler.codegen.lower_unit import value_type
-from plctool.compiler.codegen.signatures import CONTEXT, SELF, parameter_value, result_type
+from plctool.compiler.codegen.signatures import CONTEXT, SELF, parameter_value, passed_type, result_type
 from plctool.compiler.typed import (
     Binary,
     BinaryOp,
@@ -92,7 +91,7 @@ def _inputs(frame: Frame, s: FbCall, instance: Ref) -> list[str]:
     for variable in handed:
         if variable not in values:
             values[variable] = frame.load(_member(frame, s.block, instance, variable))
-    return [f"{value_type(variable.type)} {values[variable]}" for variable in handed]
+    return [f"{passed_type(variable.type)} {values[variable]}" for variable in handed]
 
 
 def _is_plain(frame: Frame, argument: Expr | Place, block: Pou) -> bool:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from plctool.compiler.codegen.closed import Closed, closed_block
 from plctool.compiler.codegen.ir import FixedPointer, Value
 from plctool.compiler.codegen.lengths import length_variable
-from plctool.compiler.codegen.lower_arith import is_real, is_signed
+from plctool.compiler.codegen.lower_arith import is_bool, is_real, is_signed
 from plctool.compiler.codegen.lower_frame import RAISED
 from plctool.compiler.codegen.lower_unit import value_type
 from plctool.compiler.typed import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
@@ -49,7 +49,13 @@ def parameter_types(pou: Pou, parameter: Parameter) -> list[str]:
         return ["ptr", "i32"]
     if parameter.by_reference or not is_scalar(t):
         return ["ptr"]
-    return [f"{value_type(t)} {extension(t)}".rstrip() if pou.external else value_type(t)]
+    return [f"{value_type(t)} {extension(t)}".rstrip() if pou.external else passed_type(t)]
+
+
+def passed_type(t: Type) -> str:
+    """The LLVM type of a scalar parameter inside the image. A short integer fills its register: constants and what is
+    loaded do so anyway. Of a BOOL only the lowest bit counts."""
+    return value_type(t) if is_bool(t) else f"{value_type(t)} {extension(t)}".rstrip()
 
 
 def extension(t: Type) -> str:
@@ -100,7 +106,7 @@ def formals(pou: Pou, handed: HandedInputs, *, raises: bool = False, closed: Clo
             values = (parameter_value(number), parameter_capacity(number))
             types = parameter_types(pou, parameter)
             found += [Formal(text, value) for text, value in zip(types, values, strict=False)]
-    found += [Formal(value_type(v.type), parameter_value(n)) for n, v in enumerate(handed.get(pou, ()))]
+    found += [Formal(passed_type(v.type), parameter_value(n)) for n, v in enumerate(handed.get(pou, ()))]
     return found
 
 
