@@ -16,7 +16,7 @@ from plctool.debug.variables import Symbol
 from plctool.errors import DeviceError, UsageError, did_you_mean
 from plctool.iec.addresses import parse_address
 from plctool.iec.areas import Area
-from plctool.iec.types import BOOL, Type, base_of
+from plctool.iec.types import BOOL, UDINT, Type, base_of
 from plctool.iec.values import decode, encode
 from plctool.io.faults import FAULTS, check_name
 
@@ -25,7 +25,7 @@ from plctool.io.faults import FAULTS, check_name
 class SimChannel:
     """A channel of the symbol file. `core`: the runtime that simulates it; `bit`: the first of its `bits` in the
     parameter of the device; `area_bit`: in the inputs or outputs. `enabled`: the device is; else there is none that
-    could measure anything."""
+    could measure anything. `event`: what its edges post, "" for nothing."""
 
     core: Core
     device: str
@@ -38,6 +38,9 @@ class SimChannel:
     bits: int
     big_endian: bool
     enabled: bool
+    event: str = ""
+    rising: bool = False
+    falling: bool = False
 
     @property
     def title(self) -> str:
@@ -52,8 +55,14 @@ class SimChannel:
         return self._ordered(bytes(ffi.buffer(data)))
 
     def write(self, data: bytes) -> None:
-        """What the device measures from now on."""
+        """What the device measures from now on; an edge is the event of the line, as on a board."""
+        was = self.read() if self.event else data
         _check(self.core.lib.SimIoWrite(self.device.encode(), self._place(), self._ordered(data)), self.title)
+        if was != data and (self.rising if any(data) else self.falling) and not self._is_absent():
+            self.core.lib.SimPostEvent(self.event.encode())  # refused if no task waits for it
+
+    def _is_absent(self) -> bool:
+        return bool(read_parameter(self.core, self.device, FAULTS["absent"], UDINT))
 
     def _place(self) -> Any:
         return self.core.ffi.new("SIM_IO_PLACE *", (self.parameter, self.bit, self.bits, self.output))
@@ -156,6 +165,7 @@ def _channel(core: Core, entry: dict[str, Any], symbols: SymbolTable, enabled: b
     return SimChannel(
         core, entry["device"], entry["channel"], entry["output"], symbol, area_bit, entry["parameter"],
         entry["parameter_bit"], entry["bits"], entry["big_endian"], enabled,
+        entry.get("event", ""), entry.get("rising", False), entry.get("falling", False),
     )  # fmt: skip
 
 

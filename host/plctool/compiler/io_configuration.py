@@ -176,6 +176,7 @@ def io_document(program: TypedProgram, description: Description) -> dict[str, An
             "parameter_bit": c.parameter_bit,
             "bits": c.size_bits,
             "big_endian": c.big_endian,
+            **({"event": c.event, "rising": c.rising, "falling": c.falling} if c.event else {}),
         }
         for connector, c in description.channels
     ]

@@ -29,12 +29,11 @@ _EDGES = {"rising": _RISING, "falling": _FALLING, "both": _RISING | _FALLING}
 
 @dataclass(frozen=True)
 class _Line:
-    """`name`: what the port calls it; `event`: what its edges post, "" for nothing."""
+    """`name`: what the port calls it."""
 
     channel: Channel
     name: str
     options: int
-    event: str
 
 
 def read_gpio(table: Table, context: Context) -> list[Connector]:
@@ -57,7 +56,7 @@ def _fill(connector: Connector, lines: list[_Line]) -> None:
         channel.parameter_bit = number
         connector.channels.append(channel)
         texts = [(int(lib.GPIO_LINE), line.name, channel.name)]
-        texts += [(int(lib.GPIO_EVENT), line.event, f"{channel.name}.event")] if line.event else []
+        texts += [(int(lib.GPIO_EVENT), channel.event, f"{channel.name}.event")] if channel.event else []
         connector.parameters += [Parameter(i + number, StringType(len(text)), text, n) for i, text, n in texts]
         if line.options:
             options = int(lib.GPIO_OPTIONS) + number
@@ -78,7 +77,8 @@ def _lines(table: Table, context: Context, used: dict[str, Pos]) -> Iterator[_Li
             table.mistakes.error(entry.key_pos, f"{entry.key} is the line {name}, which is in use {where} already")
             continue
         used[name] = entry.key_pos
-        yield _Line(channel, name, options, event)
+        channel.event, channel.rising, channel.falling = event, bool(options & _RISING), bool(options & _FALLING)
+        yield _Line(channel, name, options)
 
 
 def _options(entry: Entry, output: bool) -> tuple[int, str]:

@@ -60,7 +60,8 @@ class Channel:
     address (`%IX0.1`), or that of a module's channel at which a variable is (`%IX4.0.1`), written at `pos`. `bits`: its
     size, 1 for a BOOL; None: that of the variable. `type`: what the device has, None if any type of that size will do.
     `age_us`: how old a value may be when the driver hands it over, 0
-    if it reads the line itself. The compiler sets what follows.
+    if it reads the line itself. `event`: what happens when the input rises (`rising`), falls or both; "" for nothing.
+    The compiler sets what follows.
     """
 
     name: str
@@ -74,6 +75,9 @@ class Channel:
     big_endian: bool = False
     substitute: Substitute = Substitute(HOLD)
     age_us: int = 0
+    event: str = ""
+    rising: bool = False
+    falling: bool = False
 
     variable_type: Type | None = None
     area_bit: int = -1
