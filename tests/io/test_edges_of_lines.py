@@ -35,7 +35,7 @@ DESCRIPTION = """
 DI0 = { var = "Main.a", event = "rise" }
 DI1 = { var = "Main.b", event = "fall", edge = "falling", invert = true }
 DI2 = { var = "Main.c", event = "both", edge = "both" }
-DI3 = { var = "Main.d", event = "nobody" }
+DI3 = { var = "Main.d", event = "other" }
 """
 
 

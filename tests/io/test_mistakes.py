@@ -43,7 +43,9 @@ range = { id = 100, type = "USINT", choices = { low = 0, high = 1 } }
 
 MISTAKES = [
     # TOML
-    ("[sim]\nin = { a = }", 2, "this is not TOML: invalid"),
+    ("[sim]\nin = { a = }", 2, "this is not TOML: invalid value; write true, false, a number, or a text in quotes"),
+    ("[sim.in]\na = '%IX0.0'\na = '%IX0.1'\n", 3, "cannot overwrite a value: there is one of this name already"),
+    ("[sim]\n[sim]\n", 2, "cannot declare ('sim',) twice; of several tables each has two brackets: [[sim]]"),
     ("[sim\n", 1, "this is not TOML: expected ']' at the end of a table declaration"),
     # tables and keys
     ("[gpoi]", 1, "there is no 'gpoi' here; did you mean gpio?"),
@@ -77,6 +79,8 @@ MISTAKES = [
     ("[sim]\nin = { a = 'Main.list[7]' }", 2, "index 7 is outside 0..3"),
     ("[sim]\nin = { a = 'Main.level.3' }", 2, "'Main.level.3' is not a variable"),
     ("[sim]\nout = { a = { var = 'Main.level', on_stop = 'maybe' } }", 2, "on_stop: 'maybe' is not a value of INT"),
+    ("[sim]\nout = { a = { var = 'Main.motor', on_stop = 'keep' } }", 2, 'write TRUE or FALSE, or "hold" or "zero"'),
+    ("[sim.out.a]\nvar = 'Main.level'\non_stop = 70000\n", 3, "on_stop: '70000' is not a value of INT"),
     ("[sim]\nout = { a = { var = 'Main.motor', on_stop = [1] } }", 2, 'on_stop can be "hold", "zero" or a value'),
     ("[sim]\nin = { a = { var = 'Main.start', on_stop = 0 } }", 2, "there is no 'on_stop' here"),
     # lines of the board

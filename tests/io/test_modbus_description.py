@@ -204,6 +204,17 @@ def test_one_job_reads_and_writes(tmp_path: Path) -> None:
     assert sorted((c.parameter_bit, c.bits) for c in channels) == [(0, 32), (0, 160)]
 
 
+def writes(when: str, name: str, function: int = 16, address: int = 40001) -> str:
+    """A device to which a variable is written."""
+    head, _, _ = device("word_1").partition("[[modbus.rs485.device.read]]")
+    return f"""{head}[[modbus.rs485.device.write]]
+function = {function}
+address = {address}
+{when}
+var = "Main.{name}"
+"""
+
+
 MISTAKES = [
     (BOTH.format(order="unit = 3", read="on", write="bools"), "Main.bools"),
     (BOTH.format(order="", read="reals", write="word_1"), "Main.reals is ARRAY[0..3] OF REAL: with this order"),
@@ -253,7 +264,26 @@ MISTAKES = [
     (server('"40001.3" = "Main.on", "40001.03" = "Main.off"'), "40001.03 is the bit 40001.3 in line 3"),
     (server('"40001.3" = "Main.on", "400001.3" = "Main.off"'), "400001.3 is the bit 40001.3 in line 3"),
     (server('40001.3 = "Main.on", 40001.4 = "Main.off"'), 'a bit of a register is written in quotes: "40001.3"'),
-    ('[modbus.server.tcp]\naddress = "plc"', "'plc' is not an address"),
+    ('[modbus.server.tcp]\naddress = "plc"', "'plc' is not an address: write for example"),
+    ('[[modbus.tcp]]\nhost = "10.0.0.1:503"', 'is not an address: write host = "10.0.0.1" and port = 503'),
+    (server('"40001.16" = "Main.on"'), "3: 40001.16: the bits of a register are 0 to 15"),
+    (device("word_1", address=-1), "10: -1 is not the address of holding registers: they are 40001 to 49999"),
+    (device("word_1").replace("9600", '"9600"'), "baud is a text in quotes; it has to be a number: write baud = 9600"),
+    (
+        device("word_1").replace("unit = 3", "unit = 3\ntimeout = 200"),
+        '7: timeout is a number; it has to be a duration: write for example timeout = "T#200ms"',
+    ),
+    (f"{device('word_1')}\nvar = 'Main.word_2'", "write var or vars, not both"),
+    (f"{device('word_1')}\norder = 'CDAB'", "order cannot be here: it is a key of the device"),
+    (f"{device('word_1')}\nverify = true", "verify cannot be here: only what is written has it"),
+    (writes("", "word_1"), 'device.write] needs every = "T#1s" or on_change = true, or both'),
+    (writes("on_change = true", "real_1", 6), "function 6 has one register at most, these are 2: use 16"),
+    (writes("on_change = true", "word_1", 5, 1), "function 5 has one bit at most, these are 16: use 15"),
+    (writes("on_change = true", "real_1", 22), "these are 2: it is for a variable of at most 16 bits"),
+    (
+        device("words").replace('"Main.words"', ", ".join(f'"%IW{n}"' for n in range(126))),
+        "function 3 has 125 registers at most, these are 126: name the others in a further table",
+    ),
     ("[modbus.serve.tcp]\nport = 1", "there is no 'serve' here"),
 ]
 
@@ -288,6 +318,27 @@ def test_build_prints_the_load_of_a_line(tmp_path: Path, capsys: pytest.CaptureF
 def test_two_devices_cannot_have_one_line_or_port(tmp_path: Path, tables: str, what: str) -> None:
     found = messages(tmp_path, PROGRAM, tables)
     assert any(f"B cannot have {what}, which A in line 2 has" in message for message in found), found
+
+
+def test_a_line_that_is_there_twice_is_one_mistake(tmp_path: Path) -> None:
+    tables = '[[modbus.rs485]]\nport = "COM2"\n[[modbus.rs485]]\nport = "COM2"\n'
+    message = "modbus_COM2 cannot have the line COM2, which modbus_COM2 in line 1 has: write its devices there"
+    found = messages(tmp_path, PROGRAM, tables)
+    assert [m for m in found if not m.startswith("main.st:")] == [f"3: {message}"]
+
+
+def second_device(key: str, name: str = "Second") -> str:
+    return f'{device("word_1")}[[modbus.rs485.device]]\nname = "{name}"\n{key}\n'
+
+
+def test_two_devices_with_one_unit_are_a_warning(tmp_path: Path) -> None:
+    found = messages(tmp_path, PROGRAM, second_device("unit = 3"))
+    assert any("Second has the unit 3 of " in message and "both are one device" in message for message in found), found
+
+
+@pytest.mark.parametrize("key", ["unit = 4", 'unit = 3\norder = "CDAB"', "unit = 3\nenabled = false"])
+def test_another_unit_or_order_of_bytes_is_no_warning(tmp_path: Path, key: str) -> None:
+    assert not any("has the unit" in message for message in messages(tmp_path, PROGRAM, second_device(key)))
 
 
 @pytest.mark.parametrize("key", ["optional = true", "enabled = false"])

@@ -67,8 +67,7 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
             made.connectors += read(table, context)
             table.close()
     root.close()
-    _check_names(made.connectors, mistakes)
-    _check_taken(made.connectors, mistakes)
+    _check_names(made.connectors, _check_taken(made.connectors, mistakes), mistakes)
     return made
 
 
@@ -92,22 +91,29 @@ def load_device(path: Path) -> tuple[DeviceFile | None, Mistakes, str]:
     return device, mistakes, text
 
 
-def _check_taken(connectors: Sequence[Connector], mistakes: Mistakes) -> None:
-    """Two devices cannot have the same line, or listen at the same port; one that is optional goes without."""
+def _check_taken(connectors: Sequence[Connector], mistakes: Mistakes) -> set[str]:
+    """Two devices cannot have the same line, or listen at the same port; one that is optional goes without. Returns the
+    names of those that do."""
+    reported = set[str]()
     seen: dict[str, Connector] = {}
     for connector in (c for c in connectors if c.takes and c.enabled and not c.optional):
         first = seen.setdefault(connector.takes, connector)
         if first is not connector:
             message = f"{connector.name} cannot have {connector.takes}, which {first.name} in line {first.pos.line} has"
-            mistakes.error(connector.pos, message)
+            same = type(connector) is type(first) and connector.faults
+            hint = ": write its devices there" if same else ""
+            mistakes.error(connector.pos, message + hint)
+            reported.add(connector.name)
+    return reported
 
 
-def _check_names(connectors: Sequence[Connector], mistakes: Mistakes) -> None:
-    """Names are unique: of devices all, of channels those of one device."""
+def _check_names(connectors: Sequence[Connector], reported: set[str], mistakes: Mistakes) -> None:
+    """Names are unique: of devices all but those of which something worse is `reported`, of channels those of one
+    device."""
     seen: dict[str, Pos] = {}
     for connector in connectors:
         first = seen.setdefault(connector.name.casefold(), connector.pos)
-        if first is not connector.pos:
+        if first is not connector.pos and connector.name not in reported:
             hint = "give it another name" if connector.variable else 'give it a name: name = "..."'
             message = f"there is a device {connector.name} in line {first.line} already; {hint}"
             mistakes.error(connector.pos, message)

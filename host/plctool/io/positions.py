@@ -29,6 +29,11 @@ _TOKEN = re.compile(
 _TOO_LARGE = "a number has at most 64 bits"
 _MAX_DEPTH = 100  # brackets within each other: what reads them calls itself
 _LEAST, _LARGEST = -(1 << 63), (1 << 64) - 1
+_HINTS = {
+    "Invalid value": '; write true, false, a number, or a text in quotes: "Main.start"',
+    "Cannot overwrite": ": there is one of this name already",
+    "Cannot declare": "; of several tables each has two brackets: [[sim]]",
+}  # by what tomllib says
 _PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
@@ -102,7 +107,8 @@ class BadToml(Exception):
 
     def __init__(self, pos: Pos, reason: str) -> None:
         self.pos = pos
-        self.message = f"this is not TOML: {reason[:1].lower()}{reason[1:]}"
+        hint = next((hint for words, hint in _HINTS.items() if reason.startswith(words)), "")
+        self.message = f"this is not TOML: {reason[:1].lower()}{reason[1:]}{hint}"
         super().__init__(self.message)
 
 

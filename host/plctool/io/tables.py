@@ -7,6 +7,7 @@ is the default, or None.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -68,6 +69,21 @@ class Table:
         """Where the value of a key is; of one that is missing, the table."""
         return self._text.value_pos((*self._path, key)) if key in self._values else self.pos
 
+    def only_one(self, key: str, other: str) -> bool:
+        """Whether not both of two keys are there; reports it if they are."""
+        if key not in self._values or other not in self._values:
+            return True
+        self._read |= {key, other}
+        self.error(f"write {key} or {other}, not both", other)
+        return False
+
+    def belongs(self, where: str, *keys: str) -> None:
+        """Reports those of the keys that are here: they are said elsewhere."""
+        for key in keys:
+            if key in self._values:
+                self._read.add(key)
+                self.mistakes.error(self._text.key_pos((*self._path, key)), f"{key} cannot be here: {where}")
+
     def close(self) -> None:
         """Reports the keys that nothing has asked for."""
         for key in self._values:
@@ -91,11 +107,21 @@ class Table:
         return default if found is None else found
 
     def number(
-        self, key: str, low: int, high: int, default: int | None = None, *, required: int | None = None, unit: str = ""
+        self,
+        key: str,
+        low: int | None,
+        high: int | None,
+        default: int | None = None,
+        *,
+        required: int | None = None,
+        unit: str = "",
     ) -> int | None:
-        """An integer from `low` to `high`. `required`: an example; without a value that is a mistake."""
+        """An integer from `low` to `high`, if the caller does not check it itself. `required`: an example; without a
+        value that is a mistake."""
         found = self._value(key, int, default, "" if required is None else str(required))
-        if key in self._values and found is not None and not low <= found <= high:
+        if low is None or high is None or key not in self._values or found is None:
+            return found
+        if not low <= found <= high:
             unit = f" {unit}" if unit else ""
             self.error(f"{key} is {found}{unit}; it can be {low} to {high}{unit}", key)
             return default
@@ -105,6 +131,10 @@ class Table:
         self, key: str, low_us: int, high_us: int, default_us: int | None = None, *, required: str = ""
     ) -> int | None:
         """A duration such as "T#200ms", in microseconds, of whole milliseconds."""
+        if type(self._values.get(key)) is int:
+            self._ask(key)
+            self.error(f'{key} is a number; it has to be a duration: write for example {key} = "T#200ms"', key)
+            return default_us
         found = self._value(key, str, None, required)
         if found is None:
             return default_us
@@ -166,7 +196,7 @@ class Table:
             return default
         found = self._values[key]
         if type(found) is not kind:
-            self.error(f"{key} is {_word(found)}; it has to be {_WORDS[kind]}", key)
+            self.error(f"{key} is {_word(found)}; it has to be {_WORDS[kind]}{_unquoted(key, kind, found)}", key)
             return default
         return found
 
@@ -232,6 +262,13 @@ def each(tables: Iterable[Table], read: Callable[[Table], T | None]) -> list[T]:
 
 def _word(value: object) -> str:
     return _WORDS.get(type(value), "a date")
+
+
+def _unquoted(key: str, kind: type[object], found: object) -> str:
+    """What to write in place of a text that says the right thing in quotes."""
+    if kind is int and isinstance(found, str) and re.fullmatch(r"[1-9]\d{0,8}|0", found, re.ASCII):
+        return f": write {key} = {found}"
+    return ""
 
 
 def _duration(us: int) -> str:

@@ -51,7 +51,8 @@ def report(mistakes: Mistakes, diagnostics: Diagnostics) -> None:
 def device_variables(description: Description, declared: Iterable[str]) -> Source | None:
     """A list of globals with the IO_DEVICE of each device that has a name, but for those that the program has
     `declared` itself (names in small letters)."""
-    devices = [c for c in description.connectors if c.variable and c.name.casefold() not in declared]
+    first = {c.name.casefold(): c for c in reversed(description.connectors) if c.variable}  # two of a name are reported
+    devices = [c for name, c in first.items() if name not in declared][::-1]
     if not devices:
         return None
     text, pieces = "VAR_GLOBAL ", [Piece(0, devices[0].pos.line, devices[0].pos.column, copied=False)]
@@ -268,9 +269,10 @@ class IoChannels:
                 return
             channel.variable_type = variable.type
             channel.area_bit = variable.offset * 8 + (variable.bit or 0)
-        problem = _misfit(connector, channel) or _bad_substitute(channel)
-        if problem:
+        if problem := _misfit(connector, channel):
             diagnostics.error(channel.pos, CODE, problem)
+        elif problem := _bad_substitute(channel):
+            diagnostics.error(channel.substitute.pos or channel.pos, CODE, problem)
 
     def _finish_devices(self, allocation: Allocation, diagnostics: Diagnostics) -> None:
         assert self.description is not None
@@ -392,7 +394,8 @@ def _bad_substitute(channel: Channel) -> str:
     try:
         data = encode(channel.variable_type, given.value)
     except UsageError as error:
-        return f"{key}: {error.message}"
+        words = ', or "hold" or "zero"' if isinstance(given.value, str) else ""
+        return f"{key}: {error.message.removesuffix('.')}{words}"
     if any(data[4:]):
         return f'{key} can be "hold", "zero" or a value of at most 32 bits, not {given.value}'
     return ""

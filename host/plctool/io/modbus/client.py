@@ -171,6 +171,7 @@ class ModbusDevice(Connector):
     """A device of a client. `pause_us`: of all devices at once, how long the line is left to them after a request."""
 
     pause_us: int | None = None
+    unit: int = 0
     order: Order = ORDERS["ABCD"]
     jobs: list[Job] = field(default_factory=list)
 
@@ -300,7 +301,12 @@ def _fits(job: Job, mistakes: Mistakes) -> bool:
     what = "bits" if function.of_bits else "registers"
     for part, most in job.parts:
         if part.count > most:
-            mistakes.error(part.pos, f"function {function.code} has {most} {what} at most, these are {part.count}")
+            message = f"function {function.code} has {'one' if most == 1 else most} {what if most > 1 else what[:-1]}"
+            several = {5: 15, 6: 16}.get(function.code)
+            hint = f"use {several}" if several is not None else "name the others in a further table"
+            if function.code == lib.MODBUS_MASK_WRITE_REGISTER:
+                hint = "it is for a variable of at most 16 bits"
+            mistakes.error(part.pos, f"{message} at most, these are {part.count}: {hint}")
             return False
         if part.first + part.count - 1 > LAST_ADDRESS:
             mistakes.error(part.pos, f"{part.count} {what} from here on are more than the last address")
@@ -330,7 +336,19 @@ def read_tcp_client(table: Table) -> list[Connector]:
 
 
 def _read_devices(table: Table, line: ModbusLine) -> list[Connector]:
-    return each(table.tables("device"), lambda t: _read_device(t, line))
+    devices = each(table.tables("device"), lambda t: _read_device(t, line))
+    _warn_of_equal_units(line, table.mistakes)
+    return list(devices)
+
+
+def _warn_of_equal_units(line: ModbusLine, mistakes: Mistakes) -> None:
+    """Two devices with one unit are one that is described twice, which its orders of bytes may need, or a mistake."""
+    seen: dict[tuple[int, Order], ModbusDevice] = {}
+    for device in line.devices:
+        first = seen.setdefault((device.unit, device.order), device)
+        if first is not device and device.enabled and first.enabled:
+            message = f"{device.name} has the unit {device.unit} of {first.name} in line {first.pos.line}"
+            mistakes.warning(device.pos, f"{message}: both are one device; give it its own unit, or one table")
 
 
 def _read_device(table: Table, line: ModbusLine) -> Connector:
@@ -338,6 +356,7 @@ def _read_device(table: Table, line: ModbusLine) -> Connector:
     device = read_connector(ModbusDevice, table, DRIVER, parent=line)
     line.devices.append(device)
     unit = table.number("unit", 0, MAX_UNIT if serial else 255, None if serial else 255, required=1 if serial else None)
+    device.unit = unit or 0
     to_all = serial and unit == 0
     default_us = _BROADCAST_US if to_all else _TIMEOUT_US
     timeout_us = table.duration_us("timeout", 1000, _MAX_TIMEOUT_US, default_us) or default_us
@@ -358,7 +377,13 @@ def _read_device(table: Table, line: ModbusLine) -> Connector:
 def _read_job(table: Table, kind: str) -> Job | None:
     function = _read_function(table, kind)
     on_change = kind == "write" and table.flag("on_change")
-    interval_us = table.duration_us("every", 1000, _MAX_INTERVAL_US, None, required="" if on_change else "T#100ms")
+    table.belongs("it is a key of the device", "order", "unit", "timeout")
+    if kind == "read":
+        table.belongs("only what is written has it", "verify", "on_change", "on_stop")
+    if kind == "write" and not on_change and "on_change" not in table and "every" not in table:
+        table.error(f'[{table.name}] needs every = "T#1s" or on_change = true, or both')
+    needed = kind != "write"
+    interval_us = table.duration_us("every", 1000, _MAX_INTERVAL_US, None, required="T#100ms" if needed else "")
     verify = kind != "read" and table.flag("verify")
     read, write = _nothing(), _nothing()
     if kind != "write":
@@ -413,6 +438,8 @@ def _read_variables(table: Table, function: Function | None, *, writes: bool) ->
 
 def _job_channels(table: Table, writes: bool) -> list[Channel]:
     """Of `var = ""`, or of `vars = []`, one after the other."""
+    if not table.only_one("var", "vars"):
+        return []
     if "vars" not in table:
         channel = read_channel(table, "", output=writes)
         return [] if channel is None else [replace(channel, name=channel.target)]
@@ -429,13 +456,13 @@ def _job_channels(table: Table, writes: bool) -> list[Channel]:
 
 def _read_address(table: Table, function: Function | None) -> int | None:
     """The address on the wire, of `address = 40001` or `wire = 0`."""
+    if not table.only_one("address", "wire"):
+        return None
     wire = table.number("wire", 0, LAST_ADDRESS)
     if "wire" in table:
-        if "address" in table:
-            table.error("write address or wire, not both", "wire")
         return wire
     example = first_reference(function.table) if function else 40001
-    address = table.number("address", 0, 465536, None, required=example)  # 0 is mentioned with the others of no table
+    address = table.number("address", None, None, None, required=example)
     if address is None or function is None:
         return None
     found = wire_address(address, function.table)

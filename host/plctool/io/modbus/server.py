@@ -236,7 +236,10 @@ def _read_object(entry: Entry, table: Table, kind: int) -> Object | None:
     match = _KEY.fullmatch(entry.key)
     first = wire_address(int(match[1]), kind) if match else None
     bit = int(match[2]) if match and match[2] is not None else None
-    if first is None or (bit is not None and (kind in (COILS, DISCRETE) or bit >= REGISTER_BITS)):
+    if first is not None and bit is not None and kind not in (COILS, DISCRETE) and bit >= REGISTER_BITS:
+        table.mistakes.error(entry.key_pos, f"{entry.key}: the bits of a register are 0 to {REGISTER_BITS - 1}")
+        return None
+    if first is None or (bit is not None and kind in (COILS, DISCRETE)):
         table.mistakes.error(entry.key_pos, wrong_reference(entry.key, kind))
         return None
     from_network = kind in (HOLDING, COILS)

@@ -67,7 +67,11 @@ def address_parameters(table: Table, key: str, default: str) -> list[Parameter]:
     try:
         address = int(ipaddress.IPv4Address(host))
     except ValueError:
-        table.error(f"'{host}' is not an address: write for example \"192.168.0.7\"", key)
+        of_host, colon, of_port = host.partition(":")
+        hint = f'write {key} = "{of_host}" and port = {of_port}'
+        if not colon or not of_port.isdecimal():
+            hint = 'write for example "192.168.0.7"'
+        table.error(f"'{host}' is not an address: {hint}", key)
         address = 0
     port = table.number("port", 1, 65535, int(lib.MODBUS_PORT))
     return [
