@@ -76,6 +76,19 @@ def test_project(path: Path) -> None:
         assert image_of(again) == image_of(original)
 
 
+def test_globals_of_a_file_with_units_keep_their_names(tmp_path: Path) -> None:
+    program = "PROGRAM Main hours := hours + 1; units.days := GVL.years; END_PROGRAM\n"
+    (tmp_path / "units.st").write_text(f"VAR_GLOBAL PERSISTENT hours : UDINT; days : INT; END_VAR {program}")
+    (tmp_path / "GVL.st").write_text("VAR_GLOBAL PERSISTENT years : INT; END_VAR\n")
+    sources = program_files([tmp_path]).load_sources()
+    original = check_sources(sources)
+    written = exported(sources)
+    for _ in range(2):
+        again = read_project("p.xml", written.text)
+        assert image_of(check_sources(again)) == image_of(original)
+        written = exported(again)
+
+
 def test_few_programs_are_kept_as_text() -> None:
     kept = [path for path in RUNNING if "SourceText" in exported_program(path).text]
     assert 0 < len(kept) < len(RUNNING) // 30

@@ -47,13 +47,15 @@ class Piece:
 class Source:
     """A text to compile; `path` is what diagnostics and debug information call it.
 
-    `name`: what the list of globals in it is called, unless by the file. `original`: the file, when the text was made
-    from it, in `pieces` that begin at offset 0.
+    `name`: what the list of globals in it is called, unless by the file. `shared`: the file had more than globals, so
+    this is no part of their full names. `original`: the file, when the text was made from it, in `pieces` that begin at
+    offset 0.
     """
 
     path: str
     text: str
     name: str = ""
+    shared: bool = False
     original: str | None = field(default=None, repr=False)
     pieces: tuple[Piece, ...] = field(default=(), repr=False, compare=False)
     findings: tuple[Finding, ...] = field(default=(), compare=False)

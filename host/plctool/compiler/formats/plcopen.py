@@ -47,7 +47,7 @@ def read_project(path: str, text: str) -> list[Source]:
         return [Text().source(path, text, findings=findings.all)]
     project = _Project(findings)
     project.read(root)
-    lists = [made.source(path, text, name=name) for name, made in project.lists.items()]
+    lists = [made.source(path, text, name=name, shared=name in project.shared) for name, made in project.lists.items()]
     files = [_source_text(element).source(path, text, name=element.get("name")) for element in _files(root)]
     return [project.text.source(path, text, findings=findings.all), *lists, *files]
 
@@ -67,6 +67,7 @@ class _Project:
     def __init__(self, findings: Findings) -> None:
         self.text = Text()
         self.lists: dict[str, Text] = {}
+        self.shared: set[str] = set()  # those of files that have more than globals
         self._findings = findings
         self._blocks: dict[str, dict[str, str]] = {}
         self._programs: list[Element] = []
@@ -118,6 +119,8 @@ class _Project:
 
     def _globals(self, element: Element) -> None:
         made = self.lists.setdefault(element.get("name"), Text())
+        if element.child_data("sharedlist"):
+            self.shared.add(element.get("name"))
         plain = plain_text(element)
         if _begins_with(plain, {"GLOBAL", "CONFIG"}):
             made.copied(plain)

@@ -109,10 +109,12 @@ class Text:
             self._parts.append(text)
             self._length += len(text)
 
-    def source(self, path: str, original: str, *, name: str = "", findings: tuple[Finding, ...] = ()) -> Source:
+    def source(
+        self, path: str, original: str, *, name: str = "", shared: bool = False, findings: tuple[Finding, ...] = ()
+    ) -> Source:
         """The text as a source of that file."""
         pieces = tuple(self._pieces) or (Piece(0, 1, 1, copied=False),)
-        return Source(path, "".join(self._parts), name, original, pieces, findings)
+        return Source(path, "".join(self._parts), name, shared, original, pieces, findings)
 
 
 def lines_of(text: str) -> list[Chunk]:

@@ -57,6 +57,11 @@ def documentation(parent: Xml, text: str) -> None:
         text_in(child(parent, "documentation"), text)
 
 
+def shared_list(globals_: Xml) -> None:
+    """Notes that the file of these globals has more than globals, so that its name is no part of theirs."""
+    child(_added(globals_, "plctool/sharedlist", "discard"), "SharedList")
+
+
 def source_text(root: Xml, name: str, text: str) -> None:
     """A file as it is. `name`: what the list of globals in it is called."""
     text_in(child(_added(root, "plctool/sourcetext", "discard"), "SourceText", name=name), text)

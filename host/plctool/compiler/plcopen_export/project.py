@@ -28,6 +28,7 @@ from plctool.compiler.plcopen_export.elements import (
     data,
     documentation,
     plain,
+    shared_list,
     source_text,
     text_in,
 )
@@ -237,6 +238,8 @@ class _File:
         written = self._declarations.section(holder, part, name=self._source.stem)
         if written is None:  # VAR_CONFIG
             written = child(holder, "globalVars", name=self._source.stem)
+        if self._source.shared or any(p.kind not in ("GLOBAL", "CONFIG", *_TESTS) for p in self._outline.parts):
+            shared_list(written)
         attributes(written, self._outline.attributes.get(part.pos, {}))
         plain(written, self._balanced(part.text, part.pos))
         self._project.lists.append(written)

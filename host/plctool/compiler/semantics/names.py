@@ -120,7 +120,8 @@ class Names:
         if not blocks:
             return
         qualified = any(d.qualified for d in blocks)
-        alone = all(isinstance(d, ast.GlobalBlock | ast.InstanceBlock | ast.TestDecl) for d in declarations)
+        listed = ast.GlobalBlock | ast.InstanceBlock | ast.TestDecl
+        alone = not source.shared and all(isinstance(d, listed) for d in declarations)
         namespace = Namespace(source.stem, "list of globals", {})
         for block in blocks:
             prefix = f"{source.stem}." if alone or qualified else ""
