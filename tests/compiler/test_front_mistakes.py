@@ -95,6 +95,7 @@ def in_declaration(line: str) -> list[str]:
         ("IF strcmp(s, 'a') = 0 THEN a := 1; END_IF;", ["1: unknown function strcmp; strings are compared with ="]),
         ("a := strlen(s);", ["1: unknown function strlen; write LEN"]),
         ("a := 1; # first", ["1: # has no place in a program; a comment is written // or (* *)"]),
+        ("a := #b;", ["1: # has no place in a program; a name is written without it; a comment is // or (* *)"]),
         ("a := 1; -- first\nb := 2;", ["1: a comment is written // or (* *)"]),
         ("GOTO lab;", ["1: a jump is written JMP lab; and its label lab:"]),
     ],

@@ -396,3 +396,22 @@ def test_what_a_cut_off_file_declares_is_not_missing(tmp_path: Path) -> None:
     errors = [d for d in check_sources(load_sources([tmp_path])).diagnostics if d.severity == "error"]
     assert [d.code for d in errors] == ["xml", "unknown"]
     assert errors[1].message == "unknown type MC_Power"
+
+
+def test_scl_of_siemens_is_one_error_that_says_what_to_write(tmp_path: Path) -> None:
+    (tmp_path / "main.st").write_text("PROGRAM Main\nVAR n : INT; END_VAR\nn := k;\nEND_PROGRAM\n")
+    (tmp_path / "valve.scl").write_text(
+        "// (* TIA Portal *)\nTYPE T : INT; END_TYPE\n"
+        '  FUNCTION_BLOCK "Valve"\nVERSION : 0.1\nBEGIN\n#tmr(IN := #cmd);\nEND_FUNCTION_BLOCK\n'
+    )
+    sources = load_sources([tmp_path])
+    found = [(d.file, d.line, d.column, d.message) for d in check_sources(sources).diagnostics if d.severity == "error"]
+    assert [message for *_, message in found if "unknown name k" in message] and len(found) == 2
+    ((_, line, column, message),) = [error for error in found if error[0].endswith(".scl")]
+    assert (line, column) == (3, 3) and "names without # and quotes" in message
+
+
+@pytest.mark.parametrize("text", ['(* as in\nFUNCTION "f" *)', 'VAR_GLOBAL w : WSTRING := "DATA_BLOCK x"; END_VAR'])
+def test_a_text_that_only_mentions_units_of_siemens_is_none(tmp_path: Path, text: str) -> None:
+    (tmp_path / "main.st").write_text(f"{text}\nPROGRAM Main\nEND_PROGRAM\n")
+    assert check_sources(load_sources([tmp_path])).ok

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from plctool.compiler.formats import beremiz, codesys2, global_lists, object_text, plcopen, twincat, unreadable
 from plctool.compiler.garbage import no_collection
-from plctool.compiler.source import Finding, Source
+from plctool.compiler.source import Finding, Piece, Source
 from plctool.errors import UsageError
 from plctool.project import LIBRARY_FILE
 
@@ -20,6 +20,9 @@ Reader = Callable[[str, str], list[Source]]
 
 
 def _structured_text(path: str, text: str) -> list[Source]:
+    refused = unreadable.refused_text(text)
+    if refused is not None:
+        return [Source(path, "", original=text, pieces=(Piece(0, 1, 1, copied=False),), findings=(refused,))]
     return [beremiz.without_blocks_in_c(object_text.read_object(path, text))]
 
 

@@ -27,6 +27,7 @@ _UNIT = re.compile(
     rf"(?:(?:PUBLIC|PRIVATE|INTERNAL|ABSTRACT|FINAL)\s+)*({NAME})",
     re.IGNORECASE | re.ASCII,
 )
+_LITTLE_ENDIAN = "ISLITTLEENDIAN"  # CODESYS and TwinCAT define it so; here every processor is
 _TYPES = re.compile(r"(?<!\.)\bTYPE\b(.*?)\bEND_TYPE\b", re.IGNORECASE | re.DOTALL)
 _TYPE = re.compile(rf"({NAME})\s*(?::(?!=)|EXTENDS\b)", re.IGNORECASE | re.ASCII)
 _GLOBALS = re.compile(r"\bVAR_GLOBAL\b(.*?)\bEND_VAR\b", re.IGNORECASE | re.DOTALL)
@@ -77,7 +78,7 @@ class Conditions:
     def __init__(self, report: Callable[[int, str, str], None], declared: frozenset[str]) -> None:
         self._report = report
         self._declared = declared
-        self._defined: set[str] = set()
+        self._defined = {_LITTLE_ENDIAN}
         self._open: list[_Branches] = []
 
     @property

@@ -283,6 +283,8 @@ class Lexer:
             return True
         shown = character if character.isprintable() else f"character {ord(character)}"
         hint = slips.CHARACTERS.get(character, "")
+        if character == "#" and self.text[pos + 1 : pos + 2].isalpha():
+            hint = "a name is written without it; a comment is // or (* *)"
         self._report(pos, "character", f"{shown} has no place in a program{'; ' * bool(hint)}{hint}")
         return True
 

@@ -71,6 +71,7 @@ NAMES = {
 
 FUNCTIONS = {
     **dict.fromkeys(("STRCMP", "EQUALS"), "strings are compared with ="),
+    "ASSERT": "in a TEST write ASSERT_TRUE",
     "STRLEN": "write LEN", "STRCAT": "write CONCAT", "STRCPY": "strings are assigned with :=", "STRSTR": "write FIND",
     "SUBSTR": "write MID", "ATOI": "write STRING_TO_INT", "ATOF": "write STRING_TO_REAL", "POW": "write a ** b",
     "ROUND": "write REAL_TO_INT, which rounds", "MALLOC": "nothing is allocated while a program runs",
@@ -105,14 +106,19 @@ REFUSED = {
 }
 """Words that begin what this compiler leaves out."""
 
+_VARINFO = "nothing but ADR and SIZEOF is known of a variable while a program runs"
+
+REFUSED_TYPES = {"__SYSTEM.VAR_INFO": _VARINFO}
+"""Types of other systems that this one has not, and why."""
+
 REFUSED_CALLS = {
     "BITADR": "a bit has no address of its own here; use the variable itself, or ADR and a bit number",
     "INDEXOF": "a POU has no number here; call it by its name",
     **dict.fromkeys(
-        ("__XADD", "__COMPARE_AND_SWAP", "TEST_AND_SET"),
+        ("__XADD", "__COMPARE_AND_SWAP", "TEST_AND_SET", "TESTANDSET", "SYSCPUTESTANDSET"),
         "there is no reading and writing in one step that other tasks cannot interrupt; let one task alone write it",
     ),
-    "__VARINFO": "nothing but ADR and SIZEOF is known of a variable while a program runs",
+    "__VARINFO": _VARINFO,
     "INI": "an instance gets its initial values when the program starts; assign them one by one",
 }
 """Functions of other systems that this one has not, and why."""
