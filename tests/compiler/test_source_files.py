@@ -415,3 +415,62 @@ def test_scl_of_siemens_is_one_error_that_says_what_to_write(tmp_path: Path) -> 
 def test_a_text_that_only_mentions_units_of_siemens_is_none(tmp_path: Path, text: str) -> None:
     (tmp_path / "main.st").write_text(f"{text}\nPROGRAM Main\nEND_PROGRAM\n")
     assert check_sources(load_sources([tmp_path])).ok
+
+
+AUTOMATION_STUDIO = {
+    "Lib.fun": """{REDUND_ERROR} FUNCTION_BLOCK Drive (*moves*)
+    VAR_INPUT
+        speed : {REDUND_UNREPLICABLE} REAL; (*of it*)
+    END_VAR
+    VAR
+        twice : REAL;
+    END_VAR
+END_FUNCTION_BLOCK
+FUNCTION Scale : REAL
+    VAR_INPUT x : REAL; END_VAR
+END_FUNCTION
+FUNCTION Whole : INT
+    VAR_INPUT x : INT; END_VAR
+    Whole := x + 1;
+END_FUNCTION
+""",
+    "Drive.st": "(* moves *)\nFUNCTION_BLOCK Drive\n    twice := Scale(speed);\nEND_FUNCTION_BLOCK\n",
+    "Scale.st": "FUNCTION Scale Scale := x * 2.0; END_FUNCTION\n",
+    "Main.st": "PROGRAM Main\nVAR d : Drive; n : INT; END_VAR\nd(speed := 1.5);\nn := Whole(6);\nEND_PROGRAM\n",
+}
+
+
+def in_files(folder: Path, files: dict[str, str]) -> Path:
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    return folder
+
+
+def test_bodies_of_automation_studio_find_their_declarations(tmp_path: Path) -> None:
+    assert errors(in_files(tmp_path, AUTOMATION_STUDIO)) == []
+    with started(tmp_path) as plc:
+        plc.run_cycles(1)
+        assert (plc.read("Main.d.twice"), plc.read("Main.n")) == (3.0, 7)
+
+
+def test_errors_in_a_unit_of_automation_studio_are_in_the_file_that_has_them(tmp_path: Path) -> None:
+    wrong = AUTOMATION_STUDIO | {
+        "Lib.fun": AUTOMATION_STUDIO["Lib.fun"].replace("twice : REAL", "twice : REEL"),
+        "Scale.st": "FUNCTION Scale Scale := y * 2.0; END_FUNCTION\n",
+    }
+    assert errors(in_files(tmp_path, wrong)) == [
+        ("Lib.fun", 6, 17, "unknown type REEL; did you mean REAL?"),
+        ("Scale.st", 1, 25, "unknown name y"),
+    ]
+
+
+def test_a_body_that_declares_something_is_another_unit(tmp_path: Path) -> None:
+    own = AUTOMATION_STUDIO | {
+        "Scale.st": "FUNCTION Scale : REAL VAR_INPUT x : REAL; END_VAR Scale := x; END_FUNCTION\n"
+    }
+    assert any("declared already" in message for *_, message in errors(in_files(tmp_path, own)))
+
+
+def errors(folder: Path) -> list[tuple[str, int, int, str]]:
+    found = check_sources(load_sources([folder])).diagnostics
+    return [(Path(d.file).name, d.line, d.column, d.message) for d in found if d.severity == "error"]

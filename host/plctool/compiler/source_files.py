@@ -9,7 +9,16 @@ import codecs
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from pathlib import Path
 
-from plctool.compiler.formats import beremiz, codesys2, global_lists, object_text, plcopen, twincat, unreadable
+from plctool.compiler.formats import (
+    automation_studio,
+    beremiz,
+    codesys2,
+    global_lists,
+    object_text,
+    plcopen,
+    twincat,
+    unreadable,
+)
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.source import Finding, Piece, Source
 from plctool.errors import UsageError
@@ -83,6 +92,7 @@ def read_contents(contents: Mapping[Path, bytes]) -> list[Source]:
 def _read_all(files: Iterable[Path], content: Callable[[Path], bytes]) -> list[Source]:
     with no_collection():
         read = {file: _read(file, content(file)) for file in files}
+    automation_studio.with_bodies(read)
     for owner, members in _members(read).items():
         read[owner] = object_text.with_members(read[owner][0], [read.pop(member)[0] for member in members])
     return [source for sources in read.values() for source in sources]
