@@ -17,6 +17,12 @@ def test_variable_of_a_channel_is_in_the_inputs(tmp_path: Path) -> None:
     assert built.symbols.resolve("Main.start").area == 0
 
 
+def test_variable_that_only_a_channel_names_is_used(tmp_path: Path) -> None:
+    program = MAIN.format("recipe : INT; spare : INT; b : INT;", "b := 1;")
+    found = messages(tmp_path, program, "[sim]\nin = { x = 'Main.recipe' }\nout = { y = 'Main.b' }")
+    assert found == ["main.st:2: spare is never used"]
+
+
 def test_variable_with_an_address_keeps_it(tmp_path: Path) -> None:
     program = MAIN.format("a AT %IX3.5 : BOOL; b AT %QW4 : INT;", "b := SEL(a, 1, 2);")
     built = build(tmp_path, program, "[sim]\nin = { x = 'Main.a' }\nout = { y = 'Main.b' }")

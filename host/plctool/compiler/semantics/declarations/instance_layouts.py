@@ -269,7 +269,9 @@ class Programs:
                 self._variables.check_kept(name, t, own, scope, offset)
                 full_name = f"{info.name}.{name}"
                 location = self._variables.address(line.location, t, scope, symbol.pos, full_name)
-                wanted = own if location is not None or self._world.io.area(full_name) is not None else keep
+                connected = self._world.io.area(full_name) is not None
+                symbol.used = symbol.used or connected
+                wanted = own if location is not None or connected else keep
                 symbol.variable = self._variables.area_variable(full_name, t, init, location, wanted, scope, offset)
                 if symbol.variable is None:
                     continue
