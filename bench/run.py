@@ -43,12 +43,14 @@ def line(what: str, figure: str, beside: str = "") -> None:
     print(f"  {what:<52}{figure:>14}  {beside}", flush=True)
 
 
-def build(text: str) -> BuildResult:
-    """Compiles a program given as text."""
+def build(text: str, description: str = "") -> BuildResult:
+    """Compiles a program given as text, with a description of its inputs and outputs if there is one."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.st"
         path.write_text(text)
-        return compile_sources([path])
+        if description:
+            path.with_name("bench.io.toml").write_text(description)
+        return compile_sources([path], io=IoFiles())
 
 
 # ---- serial --------------------------------------------------------------------------------------------------------
@@ -205,14 +207,39 @@ def bench_tanks() -> None:
             line(f"{name}, checks {checks}", f"{code:.1f} ns", beside)
 
 
+BUS = """[[modbus.rs485]]
+port = "/dev/null"
+baud = 115200
+[[modbus.rs485.device]]
+name = "Meter"
+unit = 1
+read = [{function = 4, address = 30001, every = "T#100ms", vars = ["Main.power", "Main.energy"]}]
+[[modbus.rs485.device]]
+name = "Valve"
+unit = 2
+read = [{function = 2, address = 10001, every = "T#100ms", var = "Main.open"}]
+write = [{function = 16, address = 40001, every = "T#100ms", on_change = true, var = "Main.n"}]
+[[modbus.tcp]]
+host = "127.0.0.1"
+[[modbus.tcp.device]]
+name = "Drive"
+read = [{function = 3, address = 40001, every = "T#100ms", var = "Main.speed"}]
+"""
+
+
 def bench_day() -> None:
     print("\nA day of PLC time with a 10 ms task, in the simulator")
-    text = "PROGRAM Main VAR n : UDINT; t : TON; END_VAR n := n + 1; t(IN := NOT t.Q, PT := T#1s); END_PROGRAM"
-    result = build(text)
-    with Simulator(result.image, result.symbols) as plc:
-        begin = time.monotonic()
-        plc.run_for(seconds=86400)
-        line(f"{plc.read('Main.n')} cycles", f"{time.monotonic() - begin:.2f} s")
+    own = "n : UDINT; t : TON;"
+    text = f"PROGRAM Main VAR {own} {{}} END_VAR n := n + 1; t(IN := NOT t.Q, PT := T#1s); END_PROGRAM"
+    bus = text.format("power, energy : REAL; open : BOOL; speed : INT;")
+    for devices, result in (((), build(text.format(""))), (("Meter", "Valve", "Drive"), build(bus, BUS))):
+        with Simulator(result.image, result.symbols) as plc:
+            begin = time.monotonic()
+            plc.run_for(seconds=86400)
+            seconds = time.monotonic() - begin
+            assert all(plc.read(f"{name}.ok") and plc.read(f"{name}.errors") == 0 for name in devices)
+            what = f"{plc.read('Main.n')} cycles" + " and three Modbus devices" * bool(devices)
+            line(what, f"{seconds:.2f} s", f"{86400 / seconds:,.0f} times as fast")
 
 
 def main() -> None:
