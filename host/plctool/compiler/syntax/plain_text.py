@@ -9,8 +9,8 @@ import re
 from functools import lru_cache
 
 NAME = r"(?u:(?!\d)\w++)"
-"""The pattern of a name, for patterns with re.ASCII: letters and digits of any language. It does not begin with a set of
-characters, because Python looks for those with re.ASCII first."""
+"""The pattern of a name, for patterns with re.ASCII: letters and digits of any language. It does not begin with a set
+of characters, because Python looks for those with re.ASCII first."""
 
 FLAT_COMMENT = r"//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/"
 """The pattern of a comment with none in it."""
