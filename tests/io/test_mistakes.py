@@ -127,3 +127,13 @@ def test_a_mistake_does_not_leave_channels_that_overlap(tmp_path: Path) -> None:
     found = messages(tmp_path, PROGRAM, description)
     check(found, 3, "did you mean motor?")
     assert not [text for text in found if "shares its memory" in text]
+
+
+def test_device_becomes_a_variable_by_a_name_of_its_own(tmp_path: Path) -> None:
+    program = PROGRAM.replace("motor := start", "motor := start AND Analog.ok")
+    description = "device = 'device.toml'\n[local.Analog]\nrange = 'low'\n"
+    found = messages(tmp_path, program, description, DEVICE)
+    name = 'name = "Analog"'
+    said = f"unknown name Analog; write {name} into the table of the device, which makes it a variable"
+    assert [text for text in found if "Analog" in text] == [f"main.st:6: {said}"]
+    assert not [text for text in messages(tmp_path, program, description + name, DEVICE) if "Analog" in text]

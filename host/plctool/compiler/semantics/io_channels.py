@@ -80,6 +80,11 @@ class IoChannels:
         """Whether anything can be said of inputs and outputs."""
         return self.description is None or self.description.readable
 
+    def is_device_without_name(self, name: str) -> bool:
+        """Whether messages call a device by this name, which is none that the description gives it."""
+        connectors = () if self.description is None else self.description.connectors
+        return any(c.name.casefold() == name.casefold() and not c.variable for c in connectors)
+
     # ---- while variables are declared ----
 
     def begin(self, names: Names, diagnostics: Diagnostics) -> None:

@@ -180,6 +180,9 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
     inside = c.world.names.program_variables(node.name)
     if inside:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(inside)}")
+    if c.world.io.is_device_without_name(node.name):
+        message = f'unknown name {node.name}; write name = "{node.name}" into the table of the device'
+        return c.error(node.pos, "unknown", f"{message}, which makes it a variable")
     names = [*(s for s in c.scope.names), *c.world.names.visible_names()]
     hint = known_name_like(node.name, {_written(c, n) for n in names} - {""})
     if node.name and not hint:
