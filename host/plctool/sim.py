@@ -389,6 +389,8 @@ class Simulator(Controller):
             return self._ffi.buffer(address, symbol.size)
         if symbol.pointer is not None:
             return None
+        if symbol.name.startswith("%"):
+            raise DeviceError(f"The program has no memory at {symbol.name}.", "no-memory")
         raise DeviceError(
             f"{symbol.name} is not in the memory of the program; the symbols do not belong to it.", "wrong-symbols"
         )

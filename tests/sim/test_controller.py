@@ -282,3 +282,10 @@ def test_log_entries_come_once(plc: Controller) -> None:
     assert [entry.handle for entry in entries] == sorted({entry.handle for entry in entries})
     assert all(entry.component and entry.text for entry in entries)
     assert plc.log(entries[-1].handle) == []
+
+
+@pytest.mark.parametrize("address", ["%MD10000", "%IX9000.0"])
+def test_an_address_where_the_program_has_no_memory_is_told_of(plc: Controller, address: str) -> None:
+    with pytest.raises(DeviceError, match="The program has no memory at"):
+        plc.read(address)
+    assert plc.read("Main.points[1].x") == 0
