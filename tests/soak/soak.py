@@ -34,7 +34,7 @@ from plctool.compiler import compile_sources
 from plctool.core import lib
 from plctool.device import Plc, connect
 from plctool.errors import LinkError, PlcError
-from plctool.link import services
+from plctool.link import bintag, l7, services
 from plctool.link.connection import Connection
 from plctool.link.session import Session
 from plctool.link.transports import open_transport, parse_link
@@ -200,9 +200,10 @@ class Line:
 
     def fetch_nothing(self, connection: Connection) -> None:
         """Many requests, of whose replies one is read."""
-        stream = connection.stream([b"\0" * ECHO] * 20)
-        with suppress(StopIteration, LinkError):
-            next(stream)
+        request = services.echo_request(bytes(ECHO))
+        message = Session(connection).message(request.group, request.service, bintag.encode(request.tags))
+        stream = connection.stream([l7.encode(message)] * 20)  # until it is let go, nothing is closed
+        next(stream)
         raise Vanished
 
     def make_noise(self, connection: Connection) -> None:

@@ -164,12 +164,18 @@ def _wide_text(content: bytes) -> str:
 
 def echo(session: Session, data: bytes) -> bytes:
     """What the device sends back for `data`; equal when the line is well. `data` must fit a message."""
+    (reply,) = session.recover(lambda: session.call_each([echo_request(data)]))
+    return reply.bytes(lib.TAG_DEV_ECHO_DATA)
+
+
+def echo_request(data: bytes) -> Request:
+    """What `echo` asks for."""
     tags = [
         bintag.u32(lib.TAG_DEV_ECHO_LENGTH, len(data)),
         bintag.u32(lib.TAG_DEV_ECHO_REPLY_LENGTH, len(data)),
         bintag.raw(lib.TAG_DEV_ECHO_DATA, data),
     ]
-    return session.recover(lambda: session.call(lib.SG_DEVICE, lib.SRV_DEV_ECHO, tags)).bytes(lib.TAG_DEV_ECHO_DATA)
+    return Request(lib.SG_DEVICE, lib.SRV_DEV_ECHO, tags)
 
 
 def set_password(session: Session, password: str | None) -> None:
