@@ -21,20 +21,20 @@ CORTEX_M := $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v q
 RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command -v qemu-system-riscv32),build-rv32imac))
 BUILDS := build build-sanitized $(CORTEX_M) $(RISC_V)
 
-.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz run-fuzz habits all clean
+.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz habits all clean
+.PHONY: run-test run-all run-bench run-size run-fuzz
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
 
 # A make of its own, so that BUILDS sees what bootstrapping has just installed.
-test: $(VENV)/dev
-	$(MAKE) all
-	$(MAKE) --no-print-directory run-tests
+test all bench size: $(VENV)/dev
+	@$(MAKE) --no-print-directory run-$@
 
-run-tests:
+run-test: run-all
 	$(BIN)/python tests/run_all.py --meson $(MESON) $(BUILDS)
 
-all: $(BUILDS:%=%/build.ninja)
+run-all: $(BUILDS:%=%/build.ninja)
 	set -e; for build in $(BUILDS); do $(MESON) compile -C $$build; done
 
 # CAN of a real kernel, in a small Linux of its own; skipped with the reason where that cannot run.
@@ -63,12 +63,12 @@ format: $(VENV)/dev
 
 BENCHED := $(filter build build-cm3 build-cm4f,$(BUILDS))
 
-bench: $(BENCHED:%=%/build.ninja)
+run-bench: $(BENCHED:%=%/build.ninja)
 	set -e; for build in $(BENCHED); do $(MESON) compile -C $$build; done
 	$(MESON) compile -C build can_share
 	PYTHONPATH=host:build/host PLCRT=build/firmware/port/linux/plcrt $(BIN)/python bench/run.py $(ARGS)
 
-size: build-cm3/build.ninja $(RISC_V:%=%/build.ninja)
+run-size: build-cm3/build.ninja $(RISC_V:%=%/build.ninja)
 	set -e; for build in build-cm3 $(RISC_V); do echo "$$build:"; $(MESON) compile -C $$build size; done
 
 # The tag says which C library it needs at least: that of this machine's compiler.
