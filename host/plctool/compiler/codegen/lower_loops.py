@@ -47,8 +47,7 @@ def _loop_body(frame: Body, body: list[Statement], on_continue: str, on_exit: st
 
 @rule(STATEMENTS, For)
 def for_loop(frame: Body, s: For) -> None:
-    """The test before the increment keeps the variable from wrapping; it ends at the first value past
-    `stop`, or at the limit of its type."""
+    """Ends with the first value of the variable past `stop`, or with the limit of its type."""
     fn = frame.fn
     start = frame.value(s.start)
     stop, step = _stop_and_step(frame, s)
@@ -59,6 +58,7 @@ def for_loop(frame: Body, s: For) -> None:
     body, following, end = fn.label("for"), fn.label("next"), fn.label("endfor")
     fn.branch_if(loop.enters(start), body, end)
     fn.begin_detached(body)
+    loop.show()
     with_range = loop.limits()
     if var is not None and with_range is not None:
         frame.ranges[var] = with_range
@@ -68,18 +68,9 @@ def for_loop(frame: Body, s: For) -> None:
     if s.each_turn:
         stop, step = _stop_and_step(frame, s)
         loop.use(stop, step)
-    again, last = fn.label("again"), fn.label("last")
-    current = loop.current()
-    fn.branch_if(loop.goes_on(current), again, last)
-    fn.begin_detached(again)
-    loop.set(fn.value(f"add {loop.text} {current}, {step}"))
-    fn.branch(body)
-    fn.begin_detached(last)
-    word = "sadd" if is_signed(s.var.type) else "uadd"
-    if known_step is not None and known_step < 0 and word == "uadd":
-        word, step = "usub", number(-known_step)
-    loop.set(fn.value(f"call {loop.text} @llvm.{word}.sat.{loop.text}({loop.text} {current}, {loop.text} {step})"))
+    loop.turn(body, end)
     fn.begin(end)
+    loop.show()
     if var is not None:
         frame.shadows.pop(var, None)
         frame.ranges.pop(var, None)
@@ -94,7 +85,8 @@ def _stop_and_step(frame: Body, s: For) -> tuple[Value, Value]:
 
 
 class _Loop:
-    """The control variable of a FOR loop. When only the loop writes it, its value is kept in a register as well."""
+    """The control variable of a FOR loop. When only the loop writes it, its value is kept in a register, and `show`
+    stores it where the program may read it, leave the loop or stop."""
 
     def __init__(
         self, body: Body, s: For, stop: Value, step: Value, known_step: int | None, var: Variable | None
@@ -106,12 +98,20 @@ class _Loop:
             body.shadows[var] = self._shadow
 
     def set(self, value: Value) -> None:
-        body = self._body
-        body.store(body.ref(self._s.var), value)
-        if self._shadow is not None:
-            body.fn.do(f"store {self.text} {value}, ptr {self._shadow}")
+        if self._shadow is None:
+            self._store(value)
+        else:
+            self._body.fn.do(f"store {self.text} {value}, ptr {self._shadow}")
 
-    def current(self) -> Value:
+    def show(self) -> None:
+        """At the start of each iteration, and after the last one."""
+        if self._shadow is not None:
+            self._store(self._current())
+
+    def _store(self, value: Value) -> None:
+        self._body.store(self._body.ref(self._s.var), value)
+
+    def _current(self) -> Value:
         body = self._body
         if self._shadow is not None:
             return body.fn.value(f"load {self.text}, ptr {self._shadow}")
@@ -124,20 +124,49 @@ class _Loop:
     def enters(self, start: Value) -> Value:
         return self._reaches(start)
 
-    def goes_on(self, current: Value) -> Value:
-        """Whether another round follows: `current` + step neither passes `stop` nor wraps."""
+    def turn(self, again: str, end: str) -> None:
+        """Sets the next value. Branches to `again`, or to `end` when it is past `stop`, or would wrap, which leaves
+        the limit of the type."""
+        fn, current = self._body.fn, self._current()
+        following = fn.value(f"add {self.text} {current}, {self._step}")
+        if self._shadow is not None and self._next_fits():
+            self.set(following)
+            fn.branch_if(self._reaches(following), again, end)
+            return
+        goes_on, last = self._goes_on(current), fn.label("last")
+        if self._shadow is not None:
+            self.set(following)  # where it is seen by nothing else, so it may wrap
+            fn.branch_if(goes_on, again, last)
+        else:
+            advance = fn.label("again")
+            fn.branch_if(goes_on, advance, last)
+            fn.begin_detached(advance)
+            self.set(following)
+            fn.branch(again)
+        fn.begin_detached(last)
+        self.set(self._saturated(current))
+        fn.branch(end)
+
+    def _goes_on(self, current: Value) -> Value:
+        """Whether `current` + step neither passes `stop` nor wraps."""
         body, fn, t = self._body, self._body.fn, self._s.var.type
         if self._known_step in (1, -1):
             op = BinaryOp.LT if self._known_step == 1 else BinaryOp.GT
             return compare(body, op, current, self._stop, t)
-        if self._shadow is not None and self._next_fits():
-            return self._reaches(fn.value(f"add {self.text} {current}, {self._step}"))
         room = self._by_direction(
             fn.value(f"sub {self.text} {self._stop}, {current}"), fn.value(f"sub {self.text} {current}, {self._stop}")
         )
         size = self._by_direction(self._step, fn.value(f"sub {self.text} 0, {self._step}"))
         enough = fn.value(f"icmp uge {self.text} {room}, {size}")
         return fn.value(f"and i1 {self._reaches(current)}, {enough}")
+
+    def _saturated(self, current: Value) -> Value:
+        """`current` + step, or the limit of the type."""
+        word, step = "sadd" if is_signed(self._s.var.type) else "uadd", self._step
+        if self._known_step is not None and self._known_step < 0 and word == "uadd":
+            word, step = "usub", number(-self._known_step)
+        text = self.text
+        return self._body.fn.value(f"call {text} @llvm.{word}.sat.{text}({text} {current}, {text} {step})")
 
     def limits(self) -> tuple[int, int] | None:
         """The values the variable can have in the body."""

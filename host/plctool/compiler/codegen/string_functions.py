@@ -13,7 +13,10 @@ from plctool.compiler.codegen.ir import Function, Value, number
 from plctool.image.targets import Target
 
 # Functions of stdlib/strings.st that have a faster body here, with the same meaning.
-LIBRARY_FUNCTIONS = {"SPAN__": "str.span", "COPY__": "str.copy", "WSPAN__": "str.wspan", "WCOPY__": "str.wcopy"}
+LIBRARY_FUNCTIONS = {
+    "SPAN__": "str.span", "SEEK__": "str.seek", "COPY__": "str.copy",
+    "WSPAN__": "str.wspan", "WSEEK__": "str.wseek", "WCOPY__": "str.wcopy",
+}  # fmt: skip
 
 _ZERO = number(0)
 
@@ -22,7 +25,7 @@ def string_function(name: str, target: Target, attributes: str) -> str:
     """The definition of one of the str.* functions for a target; those of WSTRING begin with str.w."""
     strings = _Strings(target, name.startswith("str.w"))
     kind = name.replace("str.w", "str.")
-    fn = Function(f"i32 @{name}({_PARAMETERS[kind]})", attributes)
+    fn = Function(f"i32 @{name}({_PARAMETERS[kind].format(character=strings.character)})", attributes)
     _BODIES[kind](fn, strings)
     return fn.definition("internal")
 
@@ -94,7 +97,7 @@ class _Strings:
         fn.do(f"store {self._chunk_type} {chunk}, ptr {address}, align 1")
 
     def marks(self, fn: Function, chunk: Value) -> Value:
-        """Which characters of a chunk are NUL."""
+        """Which characters of a chunk are NUL; of integers the lowest mark only is sure."""
         if self.target.vectors:
             found = fn.value(f"icmp eq {self._chunk_type} {chunk}, zeroinitializer")
             return fn.value(f"bitcast <{self.chunk} x i1> {found} to i{self.chunk}")
@@ -104,11 +107,28 @@ class _Strings:
         under = fn.value(f"and {self._integer} {less}, {inverted}")
         return fn.value(f"and {self._integer} {under}, {highs}")
 
-    def has_nul(self, fn: Function, marks: Value) -> Value:
+    def marks_of(self, fn: Function, chunk: Value, pattern: Value) -> Value:
+        """The first characters of a chunk that are NUL, or the one that the pattern is made of."""
+        other = fn.value(f"xor {self._chunk_type} {chunk}, {pattern}")
+        return fn.value(f"or {self._marks_type} {self.marks(fn, chunk)}, {self.marks(fn, other)}")
+
+    def pattern(self, fn: Function, character: str) -> Value:
+        """A chunk of one character."""
+        if self.target.vectors:
+            first = fn.value(f"insertelement {self._chunk_type} poison, i8 {character}, i32 0")
+            return fn.value(
+                f"shufflevector {self._chunk_type} {first}, {self._chunk_type} poison, "
+                f"<{self.chunk} x i32> zeroinitializer"
+            )
+        wide = fn.value(f"zext i8 {character} to {self._integer}")
+        ones = int.from_bytes(bytes([1]) * self.chunk, "little")
+        return fn.value(f"mul {self._integer} {wide}, {ones}")
+
+    def has_mark(self, fn: Function, marks: Value) -> Value:
         return fn.value(f"icmp ne {self._marks_type} {marks}, 0")
 
     def first(self, fn: Function, marks: Value) -> Value:
-        """The index of the first NUL, which is there."""
+        """The index of the first mark, which is there."""
         if self.target.vectors:
             wide = fn.value(f"zext i{self.chunk} {marks} to i32")
             return fn.value(f"call i32 @llvm.cttz.i32(i32 {wide}, i1 true)")
@@ -119,11 +139,7 @@ class _Strings:
     def cut(self, fn: Function, chunk: Value, length: Value) -> Value:
         """A vector with zeros from a character on."""
         lanes = ", ".join(f"i8 {lane}" for lane in range(self.chunk))
-        byte = fn.value(f"trunc i32 {length} to i8")
-        first = fn.value(f"insertelement {self._chunk_type} poison, i8 {byte}, i32 0")
-        ends = fn.value(
-            f"shufflevector {self._chunk_type} {first}, {self._chunk_type} poison, <{self.chunk} x i32> zeroinitializer"
-        )
+        ends = self.pattern(fn, str(fn.value(f"trunc i32 {length} to i8")))
         kept = fn.value(f"icmp ult {self._chunk_type} <{lanes}>, {ends}")
         return fn.value(
             f"select <{self.chunk} x i1> {kept}, {self._chunk_type} {chunk}, {self._chunk_type} zeroinitializer"
@@ -148,7 +164,8 @@ def _least(fn: Function, one: str | Value, other: str | Value) -> Value:
 def _walk_chunks(
     fn: Function, strings: _Strings, room: Value, count: Value, visit: Callable[[Value], Value]
 ) -> tuple[Value, Value]:
-    """From the entry on, over the chunks within `room` characters. `visit` gets the index of a chunk and loads it.
+    """From the entry on, over the chunks within `room` characters. `visit` gets the index of a chunk, and gives the
+    marks of where the walk ends.
 
     Leads to the block `loop` from `short`, with the first result as the index to go on at; or on, in the block `full`,
     with the second one as the number of characters, at most `count`.
@@ -159,8 +176,8 @@ def _walk_chunks(
     fn.begin_detached("chunk")
     at = fn.phi("i32", (_ZERO, "entry"))
     after = fn.value(f"add i32 {at}, {strings.chunk}")
-    marks = strings.marks(fn, visit(strings.index(fn, at)))
-    fn.branch_if(strings.has_nul(fn, marks), "found", "clear")
+    marks = visit(strings.index(fn, at))
+    fn.branch_if(strings.has_mark(fn, marks), "found", "clear")
     fn.begin_detached("clear")
     fn.add_incoming(at, after, "clear")
     fn.branch_if(fn.value(f"icmp ult i32 {after}, {bound}"), "chunk", "short")
@@ -178,8 +195,8 @@ def _walk_characters(
 ) -> tuple[Value, Value, Value]:
     """The block `loop`: character by character, from the entry, and from `short` with the index `start`.
 
-    Leads to `done` from `loop` and `test`, or on, in the block `next`. Results: the index, also as wide as an address,
-    and the character.
+    Leads to `done` from `loop` and `test`, or on, in the block `next`, from where `_next_character` goes on. Results:
+    the index, also as wide as an address, and the character.
     """
     fn.begin_detached("loop")
     i = fn.phi("i32", (_ZERO, "entry"), *([] if start is None else [(start, "short")]))
@@ -193,26 +210,43 @@ def _walk_characters(
 
 
 def _next_character(fn: Function, i: Value) -> None:
-    """Back from `next` to `loop`."""
-    fn.add_incoming(i, fn.value(f"add i32 {i}, 1"), "next")
+    """Back to `loop`."""
+    fn.add_incoming(i, fn.value(f"add i32 {i}, 1"), fn.block)
     fn.branch("loop")
 
 
 def _span(fn: Function, strings: _Strings) -> None:
     """SPAN__ of stdlib/strings.st: the index at most `want` characters after `start` where the string ends."""
     left = fn.value("sub i32 %cap, %start")
-    count = _least(fn, "%want", left)
+    _scan(fn, strings, left, _least(fn, "%want", left), None)
+
+
+def _seek(fn: Function, strings: _Strings) -> None:
+    """SEEK__ of stdlib/strings.st: the index of the first character %c from `start` on, or of the end."""
+    left = fn.value("sub i32 %cap, %start")
+    _scan(fn, strings, left, left, "%c")
+
+
+def _scan(fn: Function, strings: _Strings, left: Value, count: Value, sought: str | None) -> None:
+    """Returns the index at most `count` of the `left` characters after `start`, of the end or a character `sought`."""
     room = fn.value(f"add i32 {left}, 1")
     base = strings.at(fn, "%s", strings.index(fn, "%start"))
     start = None
     if strings.chunk:
-        start, length = _walk_chunks(
-            fn, strings, room, count, lambda index: strings.load_chunk(fn, strings.at(fn, base, index))
-        )
+        pattern = None if sought is None else strings.pattern(fn, sought)
+
+        def marks(index: Value) -> Value:
+            chunk = strings.load_chunk(fn, strings.at(fn, base, index))
+            return strings.marks(fn, chunk) if pattern is None else strings.marks_of(fn, chunk, pattern)
+
+        start, length = _walk_chunks(fn, strings, room, count, marks)
         fn.terminate(f"ret i32 {fn.value(f'add i32 %start, {length}')}")
     else:
         fn.branch("loop")
-    i, _, _ = _walk_characters(fn, strings, base, count, start)
+    i, _, character = _walk_characters(fn, strings, base, count, start)
+    if sought is not None:
+        fn.branch_if(fn.value(f"icmp eq {strings.character} {character}, {sought}"), "done", "other")
+        fn.begin_detached("other")
     _next_character(fn, i)
     fn.begin_detached("done")
     fn.terminate(f"ret i32 {fn.value(f'add i32 %start, {i}')}")
@@ -232,7 +266,7 @@ def _copy(fn: Function, strings: _Strings) -> None:
     def visit(index: Value) -> Value:
         chunk = strings.load_chunk(fn, strings.at(fn, source, index))
         strings.store_chunk(fn, chunk, strings.at(fn, target, index))
-        return chunk
+        return strings.marks(fn, chunk)
 
     start, whole = None, list[tuple[Value, str]]()
     if strings.chunk and strings.target.vectors:
@@ -313,7 +347,7 @@ def _compare_chunks(fn: Function, strings: _Strings, room: Value) -> Value:
     one, other = (strings.load_chunk(fn, strings.at(fn, base, index)) for base in ("%a", "%b"))
     marks = strings.marks(fn, one)
     unlike = strings.unlike(fn, one, other)
-    ends = strings.has_nul(fn, marks)
+    ends = strings.has_mark(fn, marks)
     fn.branch_if(fn.value(f"or i1 {ends}, {unlike}"), "loop", "skip")
     return at
 
@@ -353,9 +387,10 @@ def _compare(fn: Function, strings: _Strings) -> None:
     fn.terminate(f"ret i32 {fn.value(f'sub i32 {left}, {right}')}")
 
 
-_BODIES = {"str.span": _span, "str.copy": _copy, "str.compare": _compare}
+_BODIES = {"str.span": _span, "str.seek": _seek, "str.copy": _copy, "str.compare": _compare}
 _PARAMETERS = {
     "str.span": "ptr %ctx, ptr %s, i32 %cap, i32 %start, i32 %want",
+    "str.seek": "ptr %ctx, ptr %s, i32 %cap, i32 %start, {character} %c",
     "str.copy": "ptr %ctx, ptr %d, i32 %dcap, i32 %pos, ptr %s, i32 %scap, i32 %start, i32 %want",
     "str.compare": "ptr %a, i32 %acap, ptr %b, i32 %bcap",
 }
