@@ -7,6 +7,7 @@
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each (ARGS="--only tcp,lines --seed 7")
+# make properties what holds for all values, tried with other ones than `make test` does (ARGS="-k telegrams")
 #
 # Everything is installed into .venv and built in build*/; Debian packages that are missing are installed when you are root.
 
@@ -21,7 +22,7 @@ CORTEX_M := $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v q
 RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command -v qemu-system-riscv32),build-rv32imac))
 BUILDS := build build-sanitized $(CORTEX_M) $(RISC_V)
 
-.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz habits all clean
+.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz properties habits all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz
 
 demo: $(VENV)/installed
@@ -109,6 +110,13 @@ fuzz: $(VENV)/dev
 run-fuzz: $(FUZZED:%=%/build.ninja)
 	set -e; ninja --quiet -C build under_attack; for build in $(FUZZED); do ninja --quiet -C $$build fuzz; done
 	PYTHONPATH=host:build/host $(BIN)/python tests/fuzz/run.py --seconds $(FUZZ_SECONDS) $(ARGS) $(FUZZED)
+
+PROPERTIES = $(sort $(shell grep -rl --include='test_*.py' 'from hypothesis' tests))
+
+properties: build/build.ninja
+	ninja --quiet -C build under_attack
+	@PYTHONPATH=.:host:build/host PLCRT=$(abspath build/firmware/port/linux/plcrt) \
+		$(BIN)/python -m pytest --quiet -m hypothesis --hypothesis-profile=new $(PROPERTIES) $(ARGS)
 
 build/build.ninja: $(VENV)/dev
 	$(MESON) setup build
