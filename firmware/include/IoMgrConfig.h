@@ -24,6 +24,9 @@ const IoConfigConnector *IoMgrConfigGetFirstChild(const IoConfigConnector *conne
 const IoConfigConnector *IoMgrConfigGetNextChild(const IoConfigConnector *connector, int *count,
                                                  const IoConfigConnector *parent);
 
+/* CRC-32 of its parameters: whether two connectors are configured alike. */
+RTS_UI32 IoMgrConfigGetCrc(const IoConfigConnector *connector);
+
 /* Its place among all connectors, for tables of a driver, and the other way: NULL when there is none. */
 RTS_UI32 IoMgrConfigGetIndex(const IoConfigConnector *connector);
 const IoConfigConnector *IoMgrConfigGetConnector(RTS_UI32 index);

@@ -111,8 +111,7 @@ static RTS_NOINLINE void leave_note(IO_DRIVER *driver, RTS_UI32 what)
 {
     (void)SysAtomicAdd(&driver->skipped, 1);
     note(driver, what);
-    if (take_driver(driver)) /* it has just been left */
-        leave_driver(driver);
+    follow_notes(driver); /* it may just have been left */
 }
 
 /* Enters, or leaves a note for who is in; false then. */

@@ -11,7 +11,6 @@
 #include <string.h>
 
 #include "CmpBytes.h"
-#include "CmpChecksum.h"
 #include "CmpIoMgrEmbedded.h"
 #include "SchedEvents.h"
 #include "SysGpio.h"
@@ -79,24 +78,10 @@ static RTS_UI32 get_options(const IoConfigConnector *connector, RTS_UI32 number)
     return IoMgrConfigGetParameterValueDword(IoMgrConfigGetParameter(connector, GPIO_OPTIONS + number), NULL);
 }
 
-static RTS_UI32 crc_of_text(RTS_UI32 crc, const char *text)
-{
-    return text != NULL ? CRC32Update(crc, text, (RTS_UI32)strlen(text) + 1) : crc + 1;
-}
-
 /* What tells one set of lines from another. */
 static RTS_UI32 crc_of_lines(const IoConfigConnector *connector)
 {
-    RTS_UI32 crc = 1;
-    RTS_UI32 n;
-
-    for (n = 0; n < IO_GPIO_LINES; n++) {
-        RTS_UI32 options = get_options(connector, n);
-        crc = crc_of_text(crc, get_text(connector, GPIO_LINE + n));
-        crc = crc_of_text(crc, get_text(connector, GPIO_EVENT + n));
-        crc = CRC32Update(crc, &options, sizeof options);
-    }
-    return crc | 1;
+    return IoMgrConfigGetCrc(connector) | 1;
 }
 
 static RTS_RESULT register_event(GROUP *group, const char *name, RTS_HANDLE *event)

@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "CmpChecksum.h"
 #include "IoTables.h"
 
 static const IO_CONFIG no_config;
@@ -98,7 +99,7 @@ const IoConfigConnector *IoMgrConfigGetNextChild(const IoConfigConnector *connec
     return find(connector + 1, count, true, IoMgrConfigGetIndex(parent));
 }
 
-RTS_UI32 IoMgrConfigGetIndex(const IoConfigConnector *connector)
+RTS_NOINLINE RTS_UI32 IoMgrConfigGetIndex(const IoConfigConnector *connector)
 {
     return (RTS_UI32)(connector - tables.connectors);
 }
@@ -169,6 +170,22 @@ const char *IoMgrConfigGetParameterValueText(const IoConfigParameter *parameter)
     RTS_UI32 size = parameter != NULL ? parameter->bits / 8 : 0;
 
     return text != NULL && size > 0 && text[size - 1] == '\0' ? text : NULL;
+}
+
+/* Where a value is does not count. */
+RTS_UI32 IoMgrConfigGetCrc(const IoConfigConnector *connector)
+{
+    const IoConfigParameter *parameter = get_parameters() + connector->first_parameter;
+    RTS_UI32 crc = 0;
+    RTS_UI32 left;
+
+    for (left = connector->parameter_count; left > 0; left--, parameter++) {
+        bool is_pointer = (parameter->flags & PVF_POINTER) != 0;
+        crc = CRC32Update(crc, parameter, offsetof(IoConfigParameter, value));
+        crc = CRC32Update(crc, is_pointer ? get_text(parameter->value) : (const void *)&parameter->value,
+                          is_pointer ? (parameter->bits + 7) / 8 : sizeof parameter->value);
+    }
+    return crc;
 }
 
 /* ---- maps ---- */
