@@ -69,6 +69,8 @@ enum {
  */
 enum {
     MODBUS_RANGE_WRITABLE = 0x01, /* from the network */
+    MODBUS_RANGE_NUMBER_SHIFT =
+        4, /* flags >> 4: the registers of a number (1, 2 or 4) - 1; a part of one is not written */
 };
 
 /* Memory of a server: it is in one table, or in several at a time: a coil and a bit of a register are the same memory

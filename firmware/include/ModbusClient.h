@@ -19,7 +19,7 @@
 typedef struct {
     const MODBUS_JOB *job;
     RTS_UI8 *in;      /* what was read last */
-    RTS_UI8 *out;     /* what is to be written */
+    RTS_UI8 *out;     /* what is to be written; bits that are not are 0 */
     RTS_UI8 *written; /* what the device has of it; as much room as `out`, which the driver uses before `has_out` */
     bool has_out;     /* `out` was filled, nothing is written before */
     bool is_written;  /* `written` is valid */
@@ -28,13 +28,14 @@ typedef struct {
     RTS_I64 done_ns;  /* when it was tried last */
 } MODBUS_JOB_STATE;
 
+/* In the order of MODBUS_PARAM_REQUESTS .. MODBUS_PARAM_LAST_EXCEPTION. */
 typedef struct {
     RTS_UI32 requests;
     RTS_UI32 timeouts;   /* no reply, or none that was one */
     RTS_UI32 exceptions; /* the device refused */
     RTS_UI32 others;     /* frames that were not a reply to the request */
     RTS_UI32 unverified; /* read back as something else */
-    RTS_UI8 last_exception;
+    RTS_UI32 last_exception;
 } MODBUS_DEVICE_COUNTERS;
 
 typedef struct {
@@ -105,6 +106,9 @@ void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns);
 /* When the client has to be polled next if nothing arrives before, INT64_MAX: not at all. One that waits for its link:
  * now. For ports that need not poll all the time. */
 RTS_I64 ModbusClientGetDueNs(const MODBUS_CLIENT *client, RTS_I64 now_ns);
+
+/* What a job asks for. */
+MODBUS_REQUEST ModbusJobGetRequest(const MODBUS_JOB *job);
 
 /* Bytes of a group that a job has in reverse order; 0: none are. */
 static inline RTS_UI32 ModbusJobGetReverse(const MODBUS_JOB *job, const MODBUS_FUNCTION *function)

@@ -12,6 +12,7 @@
 #include "CmpErrors.h"
 #include "Modbus.h"
 #include "SysSocket.h"
+#include "rts_config.h"
 
 /* Places in the buffer: the header of TCP, of which RTU has only the unit, the PDU, and the CRC of RTU. */
 enum {
@@ -52,12 +53,20 @@ struct MODBUS_LINK {
     RTS_UI16 sent;       /* of them */
     RTS_I64 began_ns;    /* TCP: when the connection began, or was tried */
     RTS_I64 moved_ns;    /* RTU: when the last byte that is sent leaves; TCP: when a byte moved last, or it began */
-    RTS_I64 silence_ns;  /* RTU: the shortest pause between frames */
-    RTS_I64 char_ns;     /* RTU: how long a character takes */
+    RTS_UI32 silence_ns; /* RTU: the shortest pause between frames */
+    RTS_UI32 char_ns;    /* RTU: how long a character takes */
     SOCKADDRESS peer;    /* TCP: the server that a client connects to */
     RTS_UI32 bad_frames; /* of a wrong CRC or length */
     RTS_UI8 frame[MODBUS_FRAME_SIZE];
 };
+
+/* Without TCP all links are serial lines, whose functions need not be looked up. */
+extern const MODBUS_LINK_TYPE ModbusRtuType;
+
+static inline const MODBUS_LINK_TYPE *ModbusLinkType(const MODBUS_LINK *link)
+{
+    return MODBUS_MAX_CONNECTIONS > 0 ? link->type : &ModbusRtuType;
+}
 
 /* What was received is not needed, the next frame may come. */
 static inline void ModbusLinkDrop(MODBUS_LINK *link)

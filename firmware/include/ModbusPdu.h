@@ -40,6 +40,9 @@ RTS_UI32 ModbusDataSize(const MODBUS_FUNCTION *function, RTS_UI32 count);
  * length than it should, or asks for too much), MODBUS_ILLEGAL_ADDRESS (beyond 65535). */
 RTS_UI8 ModbusReadRequest(RTS_UI8 *pdu, RTS_UI32 size, MODBUS_REQUEST *request);
 
+/* Whether a request asks for as much as there may be of its function. 0, or the exception it deserves. */
+RTS_UI8 ModbusCheckCounts(const MODBUS_REQUEST *request);
+
 /* Begins a request: all but the data (of functions 17 and 43: what follows the function), for which `request->data` gets a place in `pdu` (MODBUS_MAX_PDU bytes). The counts
  * are within the limits. Returns its size, with the data. */
 RTS_UI32 ModbusBeginRequest(MODBUS_REQUEST *request, RTS_UI8 *pdu);
@@ -61,10 +64,6 @@ static inline RTS_UI16 ModbusGet16(const RTS_UI8 *data)
     return (RTS_UI16)(data[0] << 8 | data[1]);
 }
 
-static inline void ModbusPut16(RTS_UI8 *data, RTS_UI32 value)
-{
-    data[0] = (RTS_UI8)(value >> 8);
-    data[1] = (RTS_UI8)value;
-}
+void ModbusPut16(RTS_UI8 *data, RTS_UI32 value);
 
 #endif

@@ -295,7 +295,7 @@ static void a_chip_that_has_gone_comes_back(void)
     CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
     CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 1);
     CHECK_EQUAL(SimGpioGet("DO0"), 1);
-    CHECK(log_has("Board is lost") && log_has("Board is back"));
+    CHECK(log_has("Board has an error") && log_has("Board is back"));
     end_lines();
 }
 

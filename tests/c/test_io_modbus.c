@@ -22,6 +22,7 @@ static struct {
     RTS_UI32 asked[OTHER_UNIT + 1]; /* frames by unit */
     RTS_UI8 identification_of;      /* this unit has one */
     RTS_UI8 server_id_of;           /* this one has an ID only */
+    RTS_UI8 refusing;               /* this one replies with an exception */
 } line;
 
 /* ---- the line ---- */
@@ -73,7 +74,9 @@ static void reply_who_it_is(const RTS_UI8 *request)
                                          "Acme\x01\x02P7\x02\x01"
                                          "2";
 
-    if (request[0] == line.identification_of && request[1] == MODBUS_ENCAPSULATED)
+    if (request[0] == line.refusing)
+        reply(request[0], (const char[]){(char)(request[1] | MODBUS_EXCEPTION), MODBUS_ILLEGAL_ADDRESS}, 2);
+    else if (request[0] == line.identification_of && request[1] == MODBUS_ENCAPSULATED)
         reply(request[0], identification, sizeof identification - 1);
     else if (request[0] == line.server_id_of && request[1] == MODBUS_ENCAPSULATED)
         reply(request[0], "\xAB\x01", 2);
@@ -251,6 +254,24 @@ static void outputs_that_hold_are_not_written_before_the_program_runs(void)
         run_long();
         CHECK(has_written(held == 0 ? "\x11\x22\x66\x55" : "\x66\x55\x33\x44"));
     }
+}
+
+/* It was silent, and refuses now: that it does not answer is not true any more. */
+static void a_device_that_refuses_is_not_one_that_is_silent(void)
+{
+    IO_DEVICE_STATE state;
+
+    begin_outputs(MODBUS_WRITE_REGISTERS, 1);
+    (void)add_output(0, 0, IO_ZERO);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    run_long();
+    CHECK_EQUAL(IoMgrGetState(1, &state), ERR_OK);
+    CHECK_EQUAL(state.flags & (CF_CONNECTOR_BUS_ERROR | CF_CONNECTOR_ERROR), CF_CONNECTOR_BUS_ERROR);
+    line.refusing = UNIT;
+    run_long();
+    CHECK_EQUAL(IoMgrGetState(1, &state), ERR_OK);
+    CHECK_EQUAL(state.flags & (CF_CONNECTOR_BUS_ERROR | CF_CONNECTOR_ERROR), CF_CONNECTOR_ERROR);
+    CHECK_EQUAL(state.ok, 0);
 }
 
 static void single_bits_hold_like_registers(void)
@@ -547,6 +568,7 @@ int main(void)
     NEEDS_X86_64;
     RUN(outputs_are_safe_before_the_program_runs);
     RUN(outputs_that_hold_are_not_written_before_the_program_runs);
+    RUN(a_device_that_refuses_is_not_one_that_is_silent);
     RUN(single_bits_hold_like_registers);
     RUN(outputs_of_two_tasks_are_not_written_before_both_have_run);
     RUN(an_optional_device_is_left_out_with_all_its_jobs);

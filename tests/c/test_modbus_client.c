@@ -212,11 +212,12 @@ static void bits_that_are_not_written_are_not_verified(void)
         {MODBUS_MASK_WRITE_REGISTER, MODBUS_JOB_VERIFY, 0, 0, 4, 1, 0x0F00, 50},
         {MODBUS_MASK_WRITE_REGISTER, MODBUS_JOB_VERIFY | MODBUS_JOB_REVERSE_2, 0, 0, 4, 1, 0x0F00, 50},
     };
+    static const RTS_UI8 written[][2] = {{1, 0}, {0xFF, 7}, {0x0F, 0}, {0, 0x0F}};
 
     for (RTS_UI32 i = 0; i < RTS_COUNT(each); i++) {
         begin(1);
         add(0, each[i]);
-        memset(out[0][0], 0xFF, 4);
+        memcpy(out[0][0], written[i], sizeof(written[i]));
         memset(remotes[0].data + 8, 0x30, 2);
         states[0][0].has_out = true;
         run_ms(60);

@@ -19,6 +19,10 @@ static RTS_UI8 last[16];
 static RTS_UI8 swapped[8];
 static RTS_UI8 many[250];
 static RTS_UI8 reals[8];
+static RTS_UI8 wholes[8];
+static RTS_UI8 long_number[8];
+
+enum { WHOLE_OF_TWO = 1 << MODBUS_RANGE_NUMBER_SHIFT, WHOLE_OF_FOUR = 3 << MODBUS_RANGE_NUMBER_SHIFT };
 
 static const MODBUS_RANGE ranges[] = {
     {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE, 0, 0, 1, 160},
@@ -29,10 +33,13 @@ static const MODBUS_RANGE ranges[] = {
     {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE, 500, 500, 2, 64},
     {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE, 1000, 1000, 1, 2000},
     {MODBUS_HOLDING_REGISTERS, MODBUS_RANGE_WRITABLE, 2000, 0, 4, 64},
+    {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE | WHOLE_OF_TWO, 3001, 48016, 4, 64},
+    {MODBUS_HOLDING_REGISTERS, MODBUS_RANGE_WRITABLE | WHOLE_OF_FOUR, 3005, 0, 8, 64},
 };
-static const MODBUS_MEMORY memory[] = {{&ranges[0], writable}, {&ranges[1], readable}, {&ranges[2], inputs},
-                                       {&ranges[3], discrete}, {&ranges[4], last},     {&ranges[5], swapped},
-                                       {&ranges[6], many},     {&ranges[7], reals}};
+static const MODBUS_MEMORY memory[] = {{&ranges[0], writable},   {&ranges[1], readable}, {&ranges[2], inputs},
+                                       {&ranges[3], discrete},   {&ranges[4], last},     {&ranges[5], swapped},
+                                       {&ranges[6], many},       {&ranges[7], reals},    {&ranges[8], wholes},
+                                       {&ranges[9], long_number}};
 
 static MODBUS_SERVER server;
 static RTS_UI8 pdu[MODBUS_MAX_PDU + 8];
@@ -44,6 +51,8 @@ static void begin(void)
     memset(swapped, 0, sizeof(swapped));
     memset(last, 0, sizeof(last));
     memset(many, 0, sizeof(many));
+    memset(wholes, 0, sizeof(wholes));
+    memset(long_number, 0, sizeof(long_number));
     for (int i = 0; i < 4; i++)
         readable[i] = (RTS_UI8)(0xC0 + i);
     for (int i = 0; i < 250; i++) {
@@ -144,6 +153,25 @@ static void numbers_of_two_registers_may_have_the_high_one_first(void)
     CHECK_REPLY(ASK(16, 0x07, 0xD0, 0, 4, 8, 0xAA, 0xBB, 0xCC, 0xDD, 1, 2, 3, 4), 16, 0x07, 0xD0, 0, 4);
     CHECK(memcmp(reals, in_memory, sizeof(reals)) == 0);
     CHECK_REPLY(ASK(3, 0x07, 0xD1, 0, 2), 3, 4, 0xCC, 0xDD, 1, 2);
+}
+
+/* Half of one would be another number than anyone meant. */
+static void a_part_of_a_number_is_not_written(void)
+{
+    begin();
+    CHECK_EXCEPTION(MODBUS_ILLEGAL_ADDRESS, 6, 0x0B, 0xB9, 0x40, 0xA0);
+    CHECK_EXCEPTION(MODBUS_ILLEGAL_ADDRESS, 6, 0x0B, 0xBA, 0x40, 0xA0);
+    CHECK_EXCEPTION(MODBUS_ILLEGAL_ADDRESS, 22, 0x0B, 0xB9, 0, 0, 0, 1);
+    CHECK_EXCEPTION(MODBUS_ILLEGAL_ADDRESS, 16, 0x0B, 0xBA, 0, 2, 4, 1, 2, 3, 4);
+    CHECK_EXCEPTION(MODBUS_ILLEGAL_ADDRESS, 16, 0x0B, 0xB9, 0, 3, 6, 1, 2, 3, 4, 5, 6);
+    CHECK_EXCEPTION(MODBUS_ILLEGAL_ADDRESS, 16, 0x0B, 0xBD, 0, 2, 4, 1, 2, 3, 4); /* of four registers */
+    CHECK_EQUAL(wholes[0] | wholes[1] | wholes[2] | wholes[3] | wholes[4] | wholes[5] | long_number[6], 0);
+    CHECK_REPLY(ASK(16, 0x0B, 0xBB, 0, 6, 12, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12), 16, 0x0B, 0xBB, 0, 6);
+    CHECK_EQUAL(wholes[4], 4);
+    CHECK_EQUAL(wholes[7], 1);
+    CHECK_EQUAL(long_number[0], 12);
+    CHECK_REPLY(ASK(3, 0x0B, 0xBC, 0, 2), 3, 4, 3, 4, 5, 6);          /* but read */
+    CHECK_REPLY(ASK(5, 0xBB, 0x90, 0xFF, 0), 5, 0xBB, 0x90, 0xFF, 0); /* bits are meant one by one */
 }
 
 static void bits_are_packed_from_the_lowest(void)
@@ -371,6 +399,7 @@ int main(void)
     RUN(coils_and_registers_are_one_memory);
     RUN(memory_with_the_low_byte_first_looks_the_same_from_outside);
     RUN(numbers_of_two_registers_may_have_the_high_one_first);
+    RUN(a_part_of_a_number_is_not_written);
     RUN(bits_are_packed_from_the_lowest);
     RUN(a_register_is_masked);
     RUN(a_write_comes_before_the_read_of_the_same_request);

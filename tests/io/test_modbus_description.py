@@ -145,11 +145,28 @@ def test_server_has_a_range_for_each_object(tmp_path: Path) -> None:
     found = [(r.tables, r.flags, r.first_register, r.first_bit, r.reverse, r.bits) for r in ranges]
     registers, outputs = int(lib.MODBUS_HOLDING_REGISTERS), int(lib.MODBUS_INPUT_REGISTERS)
     coils, discrete = int(lib.MODBUS_COILS), int(lib.MODBUS_DISCRETE_INPUTS)
+    number = int(lib.MODBUS_RANGE_NUMBER_SHIFT)
     assert found == [
         (registers | coils, 1, 0, 0, 2, 16),
-        (registers | coils, 1, 1, 16, 4, 128),
-        (outputs | discrete, 0, 0, 0, 4, 32),
+        (registers | coils, 1 | 1 << number, 1, 16, 4, 128),
+        (outputs | discrete, 1 << number, 0, 0, 4, 32),
     ]
+
+
+def test_numbers_of_several_registers_are_written_as_a_whole_but_words_of_bits_are_not(tmp_path: Path) -> None:
+    program = """PROGRAM Main
+VAR
+    a : INT; b : REAL; c : DWORD; d : ARRAY[0..1] OF LREAL; e : TIME; f : STRING(3); g : ARRAY[0..1] OF DWORD;
+END_VAR
+END_PROGRAM
+"""
+    at = {"a": 40001, "b": 40002, "c": 40004, "d": 40006, "e": 40014, "f": 40016, "g": 40018}
+    text = server(", ".join(f'{n} = "Main.{v}"' for v, n in at.items()))
+    made = configuration(build(tmp_path, program, text))
+    numbers = range(int(lib.MODBUS_PARAM_RANGE), int(lib.MODBUS_PARAM_RANGE) + len(at))
+    ranges = [structure(made.connectors[0], "MODBUS_RANGE", n) for n in numbers]
+    others = [r.flags >> lib.MODBUS_RANGE_NUMBER_SHIFT for r in ranges]
+    assert dict(zip(at, others, strict=True)) == {"a": 0, "b": 1, "c": 0, "d": 3, "e": 1, "f": 0, "g": 0}
 
 
 def test_bits_of_one_register_are_one_range(tmp_path: Path) -> None:

@@ -115,32 +115,6 @@ static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 
 /* ---- tasks ---- */
 
-typedef void (*PF_COPY)(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory, RTS_UI32 bits);
-
-static void copy_all(const IoConfigConnectorMap *maps, int count, bool is_output, PF_COPY copy)
-{
-    RTS_UI32 lock = SysLockEnter();
-    RTS_UI32 bits;
-
-    for (; count > 0; count--, maps++) {
-        const MODBUS_PLACE place = ModbusFindPlace(&setup, IoMgrConfigGetConnector(maps->connector));
-        const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
-        for (RTS_UI32 i = 0; i < maps->channel_map_count; i++) {
-            RTS_UI8 *memory = ModbusFindMemory(&place, channel[i].parameter, is_output, &bits);
-            if (memory != NULL)
-                copy(&place, &channel[i], memory, bits);
-        }
-    }
-    SysLockLeave(lock);
-}
-
-static void copy_input(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory, RTS_UI32 bits)
-{
-    RTS_UNUSED(place);
-    RTS_UNUSED(bits);
-    IoMgrCopyInputLE(channel, memory);
-}
-
 /* The job may be done when all that it writes is of the program, or of the safe state: what holds its value is not in
  * that, and other tasks may run later. */
 static void note_output(MODBUS_JOB_STATE *job, const IoConfigChannelMap *channel, RTS_UI32 bits)
@@ -155,23 +129,44 @@ static void note_output(MODBUS_JOB_STATE *job, const IoConfigChannelMap *channel
     job->has_out = size == 0;
 }
 
-static void copy_output(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory, RTS_UI32 bits)
+static void copy(const IoConfigConnectorMap *map, bool is_output)
 {
-    IoMgrCopyOutputLE(channel, memory);
-    if (place->device != NULL && !job_of(place, channel)->has_out)
-        note_output(job_of(place, channel), channel, bits);
+    const MODBUS_PLACE place = ModbusFindPlace(&setup, IoMgrConfigGetConnector(map->connector));
+    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
+    RTS_UI32 bits;
+
+    for (RTS_UI32 count = map->channel_map_count; count > 0; count--, channel++) {
+        RTS_UI8 *memory = ModbusFindMemory(&place, channel->parameter, is_output, &bits);
+        if (memory == NULL)
+            continue;
+        if (!is_output) {
+            IoMgrCopyInputLE(channel, memory);
+            continue;
+        }
+        IoMgrCopyOutputLE(channel, memory);
+        if (place.device != NULL && !job_of(&place, channel)->has_out)
+            note_output(job_of(&place, channel), channel, bits);
+    }
+}
+
+static RTS_RESULT copy_all(const IoConfigConnectorMap *maps, int count, bool is_output)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    for (; count > 0; count--, maps++)
+        copy(maps, is_output);
+    SysLockLeave(lock);
+    return ERR_OK;
 }
 
 static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
 {
-    copy_all(maps, count, false, copy_input);
-    return ERR_OK;
+    return copy_all(maps, count, false);
 }
 
 static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
 {
-    copy_all(maps, count, true, copy_output);
-    return ERR_OK;
+    return copy_all(maps, count, true);
 }
 
 /* ---- what the manager sees ---- */
@@ -181,10 +176,12 @@ static void note_error(MODBUS_NOTED *noted, RTS_UI32 errors, RTS_UI32 flag)
     if (errors == noted->noted_errors)
         return;
     noted->noted_errors = errors;
-    if (flag != 0)
-        IoMgrConfigSetDiagnosis(noted->connector, flag);
-    else
+    if (flag == 0) {
         IoMgrConfigNoteError(noted->connector);
+        return;
+    }
+    IoMgrConfigSetDiagnosis(noted->connector, flag);
+    IoMgrConfigResetDiagnosis(noted->connector, (CF_CONNECTOR_BUS_ERROR | CF_CONNECTOR_ERROR) & ~flag);
 }
 
 static RTS_UI32 errors_of(const MODBUS_DEVICE *device)
@@ -210,18 +207,20 @@ static void note_device(MODBUS_NOTED *noted, const MODBUS_DEVICE *device)
 static void note_client(MODBUS_CLIENT_LINE *line)
 {
     const MODBUS_CLIENT *client = &line->client;
-    RTS_UI32 first = (RTS_UI32)(client->devices - setup.devices);
+    const MODBUS_DEVICE *device = client->devices;
+    const MODBUS_DEVICE *end = device + client->device_count;
+    MODBUS_NOTED *noted = line->devices;
     bool can_reply = false;
     bool replies = false;
     bool failed = false;
 
-    for (RTS_UI32 i = 0; i < client->device_count; i++) {
-        const MODBUS_DEVICE *device = &client->devices[i];
-        bool is_one = ModbusDeviceIsOne(client, device);
-        note_device(&setup.noted[first + i], device);
-        can_reply = can_reply || is_one;
-        replies = replies || (is_one && device->good_ns != 0 && !ModbusDeviceIsLost(device));
+    for (; device < end; device++, noted++) {
+        note_device(noted, device);
         failed = failed || device->failures != 0;
+        if (!ModbusDeviceIsOne(client, device))
+            continue;
+        can_reply = true;
+        replies = replies || (device->good_ns != 0 && !ModbusDeviceIsLost(device));
     }
     bool lost = can_reply && !replies && failed;
     if (replies || !can_reply)
@@ -313,32 +312,15 @@ static void cycle(void)
 
 /* ---- requests from the PC ---- */
 
+/* MODBUS_DEVICE_COUNTERS has them in the order of their numbers. */
 static RTS_RESULT device_counter(const MODBUS_DEVICE *device, RTS_UI32 id, RTS_UI32 *value)
 {
-    const MODBUS_DEVICE_COUNTERS *counters = &device->counters;
+    RTS_UI32 index = id - MODBUS_PARAM_REQUESTS;
 
-    switch (id) {
-    case MODBUS_PARAM_REQUESTS:
-        *value = counters->requests;
-        return ERR_OK;
-    case MODBUS_PARAM_TIMEOUTS:
-        *value = counters->timeouts;
-        return ERR_OK;
-    case MODBUS_PARAM_EXCEPTIONS:
-        *value = counters->exceptions;
-        return ERR_OK;
-    case MODBUS_PARAM_OTHERS:
-        *value = counters->others;
-        return ERR_OK;
-    case MODBUS_PARAM_UNVERIFIED:
-        *value = counters->unverified;
-        return ERR_OK;
-    case MODBUS_PARAM_LAST_EXCEPTION:
-        *value = counters->last_exception;
-        return ERR_OK;
-    default:
+    if (index >= sizeof(device->counters) / sizeof(*value))
         return ERR_NO_OBJECT;
-    }
+    memcpy(value, (const RTS_UI8 *)&device->counters + index * sizeof(*value), sizeof(*value));
+    return ERR_OK;
 }
 
 static RTS_RESULT server_counter(const MODBUS_SERVER_LINE *line, RTS_UI32 id, RTS_UI32 *value)

@@ -251,7 +251,7 @@ void IoDevicesUpdate(RTS_UI32 task)
 
 void IoDevicesLog(void)
 {
-    static const char *const words[] = {"stopped", "is back", "is lost"}; /* by HEALTH_* */
+    static const char *const words[] = {"stopped", "is back", "has an error"}; /* by HEALTH_* */
     RTS_UI32 i;
 
     for (i = 0; i < IoTablesCountConnectors(); i++) {
@@ -263,8 +263,8 @@ void IoDevicesLog(void)
         change(&devices[i].flags, (RTS_UI32)HEALTH_MASK << TOLD_SHIFT, health << TOLD_SHIFT);
         if (told == HEALTH_STARTING && health == HEALTH_GOOD)
             continue;
-        LogAdd(CMPID_CmpIoMgrEmbedded, health == HEALTH_LOST ? LOG_WARNING : LOG_INFO, ERR_OK, "%s %s%s",
-               IoMgrConfigGetName(IoMgrConfigGetConnector(i)), words[health],
-               (flags & CF_CONNECTOR_BUS_ERROR) != 0 ? ": it does not answer" : "");
+        LogAdd(CMPID_CmpIoMgrEmbedded, health == HEALTH_LOST ? LOG_WARNING : LOG_INFO, ERR_OK, "%s %s",
+               IoMgrConfigGetName(IoMgrConfigGetConnector(i)),
+               (flags & CF_CONNECTOR_BUS_ERROR) != 0 ? "is lost: it does not answer" : words[health]);
     }
 }

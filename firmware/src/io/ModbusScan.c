@@ -38,7 +38,7 @@ static struct {
 
 static bool is_tcp(void)
 {
-    return !scan.client->link.type->broadcasts;
+    return !ModbusLinkType(&scan.client->link)->broadcasts;
 }
 
 /* ---- asking ---- */

@@ -40,25 +40,27 @@ static const void *structure(const IoConfigConnector *connector, RTS_UI32 id, RT
                                                             : NULL;
 }
 
-RTS_RESULT ModbusRefused(RTS_RESULT result)
+RTS_NOINLINE RTS_RESULT ModbusRefused(RTS_RESULT result)
 {
     return result == ERR_OK ? (RTS_RESULT)ERR_PENDING : result;
 }
 
-static RTS_RESULT refuse_number(const IoConfigConnector *connector, const char *what, RTS_UI32 most)
+/* Takes `count` of those that there are `most` of. */
+static RTS_RESULT take(const IoConfigConnector *connector, RTS_UI32 *used, RTS_UI32 count, RTS_UI32 most,
+                       const char *what)
 {
-    return MODBUS_REFUSE(connector, ERR_NOMEMORY, "this device has room for %u %s.", (unsigned)most, what);
+    if (count > most - *used)
+        return MODBUS_REFUSE(connector, ERR_NOMEMORY, "this device has room for %u %s.", (unsigned)most, what);
+    *used += count;
+    return ERR_OK;
 }
 
-/* Bytes of the data, zero; NULL: no room. */
-static RTS_UI8 *take_data(MODBUS_SETUP *setup, RTS_UI32 size)
+/* Takes bytes of the data, which are zero. */
+static RTS_NOINLINE RTS_RESULT take_data(MODBUS_SETUP *setup, const IoConfigConnector *connector, RTS_UI32 size,
+                                         RTS_UI8 **data)
 {
-    RTS_UI8 *data = setup->data + setup->data_size;
-
-    if (size > MODBUS_DATA_SIZE - setup->data_size)
-        return NULL;
-    setup->data_size += size;
-    return data;
+    *data = setup->data + setup->data_size;
+    return take(connector, &setup->data_size, size, MODBUS_DATA_SIZE, "bytes of Modbus data");
 }
 
 /* ---- serial lines ---- */
@@ -134,7 +136,7 @@ static RTS_RESULT open_line(MODBUS_LINK *link, MODBUS_SERVER *server, const IoCo
 static void close_link(MODBUS_LINK *link)
 {
     if (link->type != NULL)
-        link->type->close(link);
+        ModbusLinkType(link)->close(link);
 }
 
 /* ---- TCP ---- */
@@ -191,13 +193,12 @@ static void close_servers(void)
 
 static bool is_job_good(const MODBUS_JOB *job)
 {
-    const MODBUS_FUNCTION *function = ModbusFindFunction(job->function);
+    const MODBUS_REQUEST request = ModbusJobGetRequest(job);
     RTS_UI32 reverse = job->flags >> MODBUS_JOB_REVERSE_SHIFT & 14;
 
-    return function != NULL && function->table != 0 && (reverse & (reverse - 1)) == 0 &&
-           (job->read_count == 0) == (function->most_read == 0) && job->read_count <= function->most_read &&
-           (job->write_count == 0) == (function->most_written == 0) && job->write_count <= function->most_written &&
-           (reverse == 0 || ((2u * job->read_count) % reverse == 0 && (2u * job->write_count) % reverse == 0)) &&
+    return request.function != NULL && request.function->table != 0 && ModbusCheckCounts(&request) == 0 &&
+           (reverse & (reverse - 1)) == 0 &&
+           (reverse == 0 || (2u * (job->read_count | job->write_count)) % reverse == 0) &&
            (job->interval_ms != 0 || (job->flags & MODBUS_JOB_ON_CHANGE) != 0);
 }
 
@@ -205,21 +206,22 @@ static RTS_RESULT add_job(MODBUS_SETUP *setup, const IoConfigConnector *connecto
 {
     MODBUS_JOB_STATE *state = &setup->jobs[setup->job_count];
     const MODBUS_FUNCTION *function = ModbusFindFunction(job->function);
+    RTS_UI32 read_size;
     RTS_UI32 write_size;
+    RTS_RESULT result;
 
     if (!is_job_good(job))
         return MODBUS_REFUSE(connector, ERR_PARAMETER, "one of its jobs cannot be a request.");
-    if (setup->job_count == MODBUS_MAX_JOBS)
-        return refuse_number(connector, "reads and writes of Modbus", MODBUS_MAX_JOBS);
+    result = take(connector, &setup->job_count, 1, MODBUS_MAX_JOBS, "reads and writes of Modbus");
+    if (result != ERR_OK)
+        return result;
+    read_size = ModbusDataSize(function, job->read_count);
     write_size = ModbusDataSize(function, job->write_count);
     state->job = job;
-    state->in = take_data(setup, ModbusDataSize(function, job->read_count));
-    state->out = take_data(setup, write_size);
-    state->written = take_data(setup, write_size);
-    if (state->in == NULL || state->out == NULL || state->written == NULL)
-        return refuse_number(connector, "bytes of Modbus data", MODBUS_DATA_SIZE);
-    setup->job_count++;
-    return ERR_OK;
+    result = take_data(setup, connector, read_size + 2 * write_size, &state->in);
+    state->out = state->in + read_size;
+    state->written = state->out + write_size;
+    return result;
 }
 
 static RTS_RESULT add_jobs(MODBUS_SETUP *setup, MODBUS_DEVICE *device, const IoConfigConnector *connector)
@@ -240,14 +242,15 @@ static RTS_RESULT add_device(MODBUS_SETUP *setup, const IoConfigConnector *conne
 {
     MODBUS_DEVICE *device = &setup->devices[setup->device_count];
     RTS_UI32 unit = number(connector, MODBUS_PARAM_UNIT, 1);
+    RTS_RESULT result = take(connector, &setup->device_count, 1, MODBUS_MAX_DEVICES, "Modbus devices");
 
-    if (setup->device_count == MODBUS_MAX_DEVICES)
-        return refuse_number(connector, "Modbus devices", MODBUS_MAX_DEVICES);
+    if (result != ERR_OK)
+        return result;
     if (unit > UINT8_MAX)
         return MODBUS_REFUSE(connector, ERR_PARAMETER, "there is no unit %u.", (unsigned)unit);
     device->unit = (RTS_UI8)unit;
     device->timeout_ms = number(connector, MODBUS_PARAM_TIMEOUT, DEFAULT_TIMEOUT_MS);
-    setup->noted[setup->device_count++].connector = connector;
+    setup->noted[setup->device_count - 1].connector = connector;
     return add_jobs(setup, device, connector);
 }
 
@@ -258,18 +261,16 @@ static RTS_RESULT add_client(MODBUS_SETUP *setup, const IO_DRIVER *driver, const
     RTS_UI32 index = IoMgrConfigGetIndex(connector);
     RTS_UI32 first = setup->device_count;
     const IoConfigConnector *child;
-    RTS_RESULT result = ERR_OK;
+    RTS_RESULT result = take(connector, &setup->client_count, 1, MODBUS_MAX_CLIENTS, "Modbus lines");
 
-    if (setup->client_count == MODBUS_MAX_CLIENTS)
-        return refuse_number(connector, "Modbus lines", MODBUS_MAX_CLIENTS);
+    if (result != ERR_OK)
+        return result;
+    line->noted.connector = connector;
+    line->devices = setup->noted + setup->device_count;
     if (is_tcp)
         begin_client(&line->client.link, connector);
     else
         result = open_line(&line->client.link, NULL, connector);
-    if (result != ERR_OK)
-        return result;
-    line->noted.connector = connector;
-    setup->client_count++;
     for (RTS_UI32 i = index + 1; result == ERR_OK && (child = IoMgrConfigGetConnector(i)) != NULL; i++) {
         if (child->parent == index && IoMgrConfigIsMine(child, driver))
             result = add_device(setup, child);
@@ -303,16 +304,15 @@ static RTS_RESULT add_range(MODBUS_SETUP *setup, const IoConfigConnector *connec
 {
     MODBUS_MEMORY *memory = &setup->ranges[setup->range_count];
 
+    RTS_RESULT result;
+
     if (!is_range_good(range))
         return MODBUS_REFUSE(connector, ERR_PARAMETER, "one of its ranges cannot be.");
-    if (setup->range_count == MODBUS_MAX_RANGES)
-        return refuse_number(connector, "ranges of Modbus servers", MODBUS_MAX_RANGES);
+    result = take(connector, &setup->range_count, 1, MODBUS_MAX_RANGES, "ranges of Modbus servers");
+    if (result != ERR_OK)
+        return result;
     memory->range = range;
-    memory->data = take_data(setup, (range->bits + 7) / 8);
-    if (memory->data == NULL)
-        return refuse_number(connector, "bytes of Modbus data", MODBUS_DATA_SIZE);
-    setup->range_count++;
-    return ERR_OK;
+    return take_data(setup, connector, (range->bits + 7) / 8, &memory->data);
 }
 
 static RTS_RESULT add_ranges(MODBUS_SETUP *setup, MODBUS_SERVER *server, const IoConfigConnector *connector)
@@ -345,20 +345,18 @@ static void describe(MODBUS_SERVER *server, const IoConfigConnector *connector)
 static RTS_RESULT add_server(MODBUS_SETUP *setup, const IoConfigConnector *connector, bool is_tcp)
 {
     MODBUS_SERVER_LINE *line = &setup->servers[setup->server_count];
-    RTS_RESULT result = ERR_OK;
+    RTS_RESULT result = take(connector, &setup->server_count, 1, MODBUS_MAX_SERVERS, "Modbus servers");
 
-    if (setup->server_count == MODBUS_MAX_SERVERS)
-        return refuse_number(connector, "Modbus servers", MODBUS_MAX_SERVERS);
+    if (result != ERR_OK)
+        return result;
+    line->noted.connector = connector;
     line->server.tcp = is_tcp;
     line->server.unit = (RTS_UI8)number(connector, MODBUS_PARAM_UNIT, is_tcp ? 0 : 1);
     describe(&line->server, connector);
     if (!is_tcp)
         result = open_line(&line->link, &line->server, connector);
-    if (result != ERR_OK)
-        return result;
-    line->noted.connector = connector;
-    setup->server_count++;
-    result = add_ranges(setup, &line->server, connector);
+    if (result == ERR_OK)
+        result = add_ranges(setup, &line->server, connector);
     if (is_tcp && result == ERR_OK)
         begin_server(&line->server, connector);
     return result;
@@ -418,17 +416,15 @@ RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver)
 
 MODBUS_PLACE ModbusFindPlace(MODBUS_SETUP *setup, const IoConfigConnector *connector)
 {
-    MODBUS_PLACE place = {NULL, NULL};
-
-    for (RTS_UI32 i = 0; i < setup->device_count && place.device == NULL; i++) {
+    for (RTS_UI32 i = 0; i < setup->device_count; i++) {
         if (setup->noted[i].connector == connector)
-            place.device = &setup->devices[i];
+            return (MODBUS_PLACE){&setup->devices[i], NULL};
     }
-    for (RTS_UI32 i = 0; i < setup->server_count && place.server == NULL; i++) {
+    for (RTS_UI32 i = 0; i < setup->server_count; i++) {
         if (setup->servers[i].noted.connector == connector)
-            place.server = &setup->servers[i];
+            return (MODBUS_PLACE){NULL, &setup->servers[i]};
     }
-    return place;
+    return (MODBUS_PLACE){NULL, NULL};
 }
 
 static RTS_UI8 *memory_of_job(const MODBUS_DEVICE *device, RTS_UI32 index, bool is_output, RTS_UI32 *bits)

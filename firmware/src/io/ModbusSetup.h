@@ -30,6 +30,7 @@ typedef struct {
 
 typedef struct {
     MODBUS_NOTED noted;
+    MODBUS_NOTED *devices; /* of each of them */
     MODBUS_CLIENT client;
 } MODBUS_CLIENT_LINE;
 

@@ -21,7 +21,7 @@ bool ModbusDeviceIsLost(const MODBUS_DEVICE *device)
     return device->failures >= MODBUS_TRIES;
 }
 
-bool ModbusDeviceIsGood(const MODBUS_DEVICE *device)
+RTS_NOINLINE bool ModbusDeviceIsGood(const MODBUS_DEVICE *device)
 {
     bool good = device->good_ns != 0 && !ModbusDeviceIsLost(device);
 
@@ -190,16 +190,22 @@ static void put_call(const MODBUS_CALL *call, const MODBUS_REQUEST *request, RTS
     memcpy(request->data, call->data, size - head);
 }
 
+MODBUS_REQUEST ModbusJobGetRequest(const MODBUS_JOB *job)
+{
+    return (MODBUS_REQUEST){ModbusFindFunction(job->function),
+                            job->read_address,
+                            job->read_count,
+                            job->write_address,
+                            job->write_count,
+                            NULL};
+}
+
 static void describe_job(MODBUS_CLIENT *client)
 {
     const MODBUS_JOB *job = client->job->job;
     MODBUS_REQUEST *request = &client->request;
 
-    request->function = ModbusFindFunction(job->function);
-    request->read_address = job->read_address;
-    request->read_count = job->read_count;
-    request->write_address = job->write_address;
-    request->write_count = job->write_count;
+    *request = ModbusJobGetRequest(job);
     if (!client->verifies)
         return;
     request->function = ModbusFindFunction(function_to_verify(request->function));
@@ -209,7 +215,7 @@ static void describe_job(MODBUS_CLIENT *client)
 }
 
 /* From when the last byte has left, or should have. */
-static void begin_to_wait(MODBUS_CLIENT *client, RTS_I64 now_ns)
+static RTS_NOINLINE void begin_to_wait(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     client->waits = !client->link.sending;
     client->since_ns = client->link.moved_ns > now_ns ? client->link.moved_ns : now_ns;
@@ -236,7 +242,7 @@ static void send(MODBUS_CLIENT *client, RTS_I64 now_ns)
     client->device->counters.requests++;
     client->device->asked = true;
     client->sent = true;
-    link->type->send(link, size, now_ns);
+    ModbusLinkType(link)->send(link, size, now_ns);
     begin_to_wait(client, now_ns);
 }
 
@@ -250,9 +256,9 @@ static void next_due(MODBUS_JOB_STATE *state, RTS_I64 interval_ns, RTS_I64 now_n
         state->due_ns = now_ns;
 }
 
-bool ModbusDeviceIsOne(const MODBUS_CLIENT *client, const MODBUS_DEVICE *device)
+RTS_NOINLINE bool ModbusDeviceIsOne(const MODBUS_CLIENT *client, const MODBUS_DEVICE *device)
 {
-    return device->unit != MODBUS_BROADCAST || !client->link.type->broadcasts;
+    return device->unit != MODBUS_BROADCAST || !ModbusLinkType(&client->link)->broadcasts;
 }
 
 static bool others_reply(const MODBUS_CLIENT *client)
@@ -335,7 +341,7 @@ static void end_job(MODBUS_JOB_STATE *job, bool good, RTS_I64 now_ns)
 {
     RTS_I64 interval_ns = job->job->interval_ms * NS_PER_MS;
 
-    if (!good && interval_ns < REFUSED_MS * NS_PER_MS && job->job->write_count != 0)
+    if (!good && job->job->interval_ms < REFUSED_MS && job->job->write_count != 0)
         job->due_ns = now_ns + REFUSED_MS * NS_PER_MS;
     else
         next_due(job, interval_ns, now_ns);
@@ -354,41 +360,32 @@ static void end(MODBUS_CLIENT *client, bool good, RTS_I64 now_ns)
     client->device = NULL;
 }
 
-/* The bits of byte `i` on the wire that were written. */
-static RTS_UI8 written_bits(const MODBUS_JOB *job, RTS_UI32 i, RTS_UI32 size)
+/* Of what was read back all that was not written is 0, as it is in `written`. */
+static void clear_others(const MODBUS_JOB *job, RTS_UI32 bits, RTS_UI8 *data)
 {
     if (job->function == MODBUS_MASK_WRITE_REGISTER)
-        return (RTS_UI8)(i == 0 ? job->mask >> 8 : job->mask);
-    if (ModbusFindFunction(job->function)->count_of_bits == 1 && i + 1 == size && job->write_count % 8 != 0)
-        return (RTS_UI8)((1u << job->write_count % 8) - 1);
-    return 0xFF;
+        ModbusPut16(data, ModbusGet16(data) & job->mask);
+    else if (bits % 8 != 0)
+        data[bits / 8] &= (RTS_UI8)((1u << bits % 8) - 1);
 }
 
-/* Whether the device has what was written to it: compared in the order of memory. */
-static bool is_verified(const MODBUS_CLIENT *client, RTS_UI8 *data)
-{
-    const MODBUS_JOB_STATE *state = client->job;
-    RTS_UI32 reverse = ModbusJobGetReverse(state->job, client->request.function);
-    RTS_UI32 size = write_size(state);
-    RTS_UI32 wrong = 0;
-
-    for (RTS_UI32 i = 0; i < size; i++) {
-        RTS_UI8 wanted = state->written[reverse != 0 ? i ^ (reverse - 1) : i];
-        wrong |= (data[i] ^ wanted) & written_bits(state->job, i, size);
-    }
-    return wrong == 0;
-}
-
-static void take_data(const MODBUS_CLIENT *client, RTS_UI8 *data)
+/* Data of the job, or what the device has of those that were written to it; false: it has others. */
+static bool take_data(const MODBUS_CLIENT *client, RTS_UI8 *data)
 {
     MODBUS_JOB_STATE *state = client->job;
-    RTS_UI32 size = ModbusDataSize(client->request.function, client->request.read_count);
+    const MODBUS_FUNCTION *function = client->request.function;
+    RTS_UI32 size = ModbusDataSize(function, client->request.read_count);
     RTS_UI32 lock;
 
-    reorder(state, client->request.function, data, size);
+    if (client->verifies)
+        clear_others(state->job, client->request.read_count * (RTS_UI32)function->count_of_bits, data);
+    reorder(state, function, data, size);
+    if (client->verifies)
+        return memcmp(data, state->written, size) == 0;
     lock = SysLockEnter();
     memcpy(state->in, data, size);
     SysLockLeave(lock);
+    return true;
 }
 
 /* What follows the function, and of what was read the number of bytes; of a write nothing. */
@@ -404,8 +401,7 @@ static void take_call(const MODBUS_CLIENT *client, const RTS_UI8 *pdu, RTS_UI32 
 
 static void take_good(MODBUS_CLIENT *client, RTS_UI8 *pdu, RTS_UI32 size, RTS_I64 now_ns)
 {
-    RTS_UI8 *data = pdu + 2;
-    bool good = true;
+    bool good;
 
     note_reply(client, now_ns);
     if (client->job == NULL) {
@@ -413,12 +409,8 @@ static void take_good(MODBUS_CLIENT *client, RTS_UI8 *pdu, RTS_UI32 size, RTS_I6
         end(client, true, now_ns);
         return;
     }
-    if (client->verifies) {
-        good = is_verified(client, data);
-        client->device->counters.unverified += !good;
-    } else if (client->request.read_count != 0) {
-        take_data(client, data);
-    }
+    good = client->request.read_count == 0 || take_data(client, pdu + 2);
+    client->device->counters.unverified += !good;
     if (!client->verifies && (client->job->job->flags & MODBUS_JOB_VERIFY) != 0) {
         client->verifies = true;
         client->sent = false;
@@ -482,14 +474,14 @@ static void end_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
         end(client, true, now_ns);
         return;
     }
-    client->link.type->give_up(&client->link);
+    ModbusLinkType(&client->link)->give_up(&client->link);
     fail(client, now_ns);
 }
 
 static void wait_for_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     MODBUS_LINK *link = &client->link;
-    RTS_UI32 size = link->type->receive(link, now_ns);
+    RTS_UI32 size = ModbusLinkType(link)->receive(link, now_ns);
 
     if (link->handle == RTS_INVALID_HANDLE) {
         fail(client, now_ns);
@@ -515,13 +507,13 @@ static void begin(MODBUS_CLIENT *client, RTS_I64 now_ns)
 /* Frames that come while nothing was asked belong to nothing. */
 static void drop_frames(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
-    if (client->link.handle != RTS_INVALID_HANDLE && client->link.type->receive(&client->link, now_ns) != 0)
+    if (client->link.handle != RTS_INVALID_HANDLE && ModbusLinkType(&client->link)->receive(&client->link, now_ns) != 0)
         ModbusLinkDrop(&client->link);
 }
 
 static void try_to_send(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
-    if (client->link.type->ready(&client->link, now_ns))
+    if (ModbusLinkType(&client->link)->ready(&client->link, now_ns))
         send(client, now_ns);
     else if (is_too_late(client, now_ns))
         fail(client, now_ns);

@@ -34,9 +34,15 @@ const MODBUS_FUNCTION *ModbusFindFunction(RTS_UI8 function)
     return NULL;
 }
 
-RTS_UI32 ModbusDataSize(const MODBUS_FUNCTION *function, RTS_UI32 count)
+RTS_NOINLINE RTS_UI32 ModbusDataSize(const MODBUS_FUNCTION *function, RTS_UI32 count)
 {
     return (count * function->count_of_bits + 7) / 8;
+}
+
+RTS_NOINLINE void ModbusPut16(RTS_UI8 *data, RTS_UI32 value)
+{
+    data[0] = (RTS_UI8)(value >> 8);
+    data[1] = (RTS_UI8)value;
 }
 
 /* Whether the data of its request are as long as a count says that is before them. */
@@ -52,7 +58,7 @@ static bool is_beyond(RTS_UI16 address, RTS_UI16 count)
     return (RTS_UI32)address + count > LAST_ADDRESS + 1u;
 }
 
-static RTS_UI8 check_counts(const MODBUS_REQUEST *request)
+RTS_UI8 ModbusCheckCounts(const MODBUS_REQUEST *request)
 {
     const MODBUS_FUNCTION *function = request->function;
     bool reads = function->most_read != 0;
@@ -113,7 +119,7 @@ RTS_UI8 ModbusReadRequest(RTS_UI8 *pdu, RTS_UI32 size, MODBUS_REQUEST *request)
     if (has_byte_count(request->function) ? size < request->function->size : size != request->function->size)
         return MODBUS_ILLEGAL_VALUE;
     read_numbers(pdu, request);
-    exception = check_counts(request);
+    exception = ModbusCheckCounts(request);
     if (exception == 0)
         exception = check_data(request, size);
     return exception != 0 ? exception : check_coil(request);

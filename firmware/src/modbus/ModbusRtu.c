@@ -31,18 +31,18 @@ RTS_UI16 ModbusCrc(const RTS_UI8 *data, RTS_UI32 size)
     return (RTS_UI16)crc;
 }
 
-static const MODBUS_LINK_TYPE rtu = {ModbusRtuReady,  ModbusRtuReceive, ModbusRtuSend,
-                                     ModbusRtuGiveUp, ModbusRtuClose,   true};
+const MODBUS_LINK_TYPE ModbusRtuType = {ModbusRtuReady,  ModbusRtuReceive, ModbusRtuSend,
+                                        ModbusRtuGiveUp, ModbusRtuClose,   true};
 
 void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *settings)
 {
     RTS_UI32 bits = 1 + 8 + (settings->parity != SYSCOM_PARITY_NONE) + settings->stop_bits;
 
-    link->type = &rtu;
+    link->type = &ModbusRtuType;
     link->handle = line;
     link->sending = false;
     link->fill = 0;
-    link->char_ns = (RTS_I64)(NS_PER_S / settings->baud * bits);
+    link->char_ns = NS_PER_S / settings->baud * bits;
     link->silence_ns = settings->baud > FAST_BAUD ? FAST_SILENCE_NS : link->char_ns * HALVES_OF_SILENCE / 2;
     link->moved_ns = 0;
 }
@@ -94,7 +94,7 @@ void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns)
     link->fill = (RTS_UI16)(1 + pdu_size + MODBUS_CRC_SIZE);
     link->sent = 0;
     link->sending = true;
-    link->moved_ns = now_ns + link->fill * link->char_ns;
+    link->moved_ns = now_ns + (RTS_I64)link->fill * link->char_ns;
     forget_received(link);
     transmit(link, now_ns);
 }

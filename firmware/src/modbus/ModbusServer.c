@@ -17,6 +17,11 @@
 
 enum { TEXT_MAX = 100, REGISTER_SIZE = 2, ANY_UNIT = 255, LATE_NS = 100000000 };
 
+static bool is_tcp(const MODBUS_SERVER *server)
+{
+    return MODBUS_MAX_CONNECTIONS > 0 && server->tcp;
+}
+
 /* ---- memory ---- */
 
 /* Bits in memory, or in a PDU. */
@@ -81,48 +86,47 @@ static RTS_UI32 find_in(const MODBUS_MEMORY *memory, RTS_UI8 table, RTS_UI32 add
     return count - (address - first);
 }
 
-static RTS_UI32 find(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 address, bool to_write, BITS *found)
+/* Whether registers that are written are whole numbers. */
+static bool is_whole(const MODBUS_RANGE *range, RTS_UI8 table, RTS_UI32 at, RTS_UI32 count)
+{
+    RTS_UI32 others = range->flags >> MODBUS_RANGE_NUMBER_SHIFT;
+
+    return !is_of_registers(table) || (((at / MODBUS_REGISTER_BITS) | count) & others) == 0;
+}
+
+/* How many of `count` from the address on are in one range, 0: they are not there, or cannot be written. */
+static RTS_UI32 find(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 address, RTS_UI32 count, bool to_write,
+                     BITS *found)
 {
     for (RTS_UI32 i = 0; i < server->range_count; i++) {
-        const MODBUS_MEMORY *memory = &server->memory[i];
-        RTS_UI32 there = find_in(memory, table, address, found);
+        const MODBUS_RANGE *range = server->memory[i].range;
+        RTS_UI32 there = least(count, find_in(&server->memory[i], table, address, found));
         if (there != 0)
-            return to_write && (memory->range->flags & MODBUS_RANGE_WRITABLE) == 0 ? 0 : there;
+            return to_write &&
+                           ((range->flags & MODBUS_RANGE_WRITABLE) == 0 || !is_whole(range, table, found->at, there))
+                       ? 0
+                       : there;
     }
     return 0;
 }
 
-/* Whether all of them are there. */
-static bool has_all(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 address, RTS_UI32 count, bool to_write)
-{
-    BITS found;
-
-    while (count != 0) {
-        RTS_UI32 there = least(count, find(server, table, address, to_write, &found));
-        if (there == 0)
-            return false;
-        address += there;
-        count -= there;
-    }
-    return true;
-}
-
-/* Moves them between memory and a PDU; `has_all`, and locked. */
-static void exchange(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 address, RTS_UI32 count, RTS_UI8 *data,
+/* Moves them between memory and a PDU, locked; `data` NULL: none yet. False: they are not all there. */
+static bool exchange(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 address, RTS_UI32 count, RTS_UI8 *data,
                      bool to_write)
 {
     BITS pdu = {data, 0, is_of_registers(table)};
     BITS found = {NULL, 0, 0};
 
     while (count != 0) {
-        RTS_UI32 there = least(count, find(server, table, address, to_write, &found));
-        if (to_write)
-            move(&found, &pdu, there * unit_of(table));
-        else
-            move(&pdu, &found, there * unit_of(table));
+        RTS_UI32 there = find(server, table, address, count, to_write, &found);
+        if (there == 0)
+            return false;
+        if (data != NULL)
+            move(to_write ? &found : &pdu, to_write ? &pdu : &found, there * unit_of(table));
         address += there;
         count -= there;
     }
+    return true;
 }
 
 /* ---- reading and writing ---- */
@@ -131,13 +135,13 @@ static void mask_register(const MODBUS_SERVER *server, const MODBUS_REQUEST *req
 {
     RTS_UI8 value[REGISTER_SIZE];
 
-    exchange(server, request->function->table, request->write_address, 1, value, false);
+    (void)exchange(server, request->function->table, request->write_address, 1, value, false);
     for (RTS_UI32 i = 0; i < REGISTER_SIZE; i++) {
         RTS_UI8 and_mask = request->data[i];
         RTS_UI8 or_mask = request->data[REGISTER_SIZE + i];
         value[i] = (RTS_UI8)((value[i] & and_mask) | (or_mask & ~and_mask));
     }
-    exchange(server, request->function->table, request->write_address, 1, value, true);
+    (void)exchange(server, request->function->table, request->write_address, 1, value, true);
 }
 
 static RTS_UI8 access(MODBUS_SERVER *server, const MODBUS_REQUEST *request, RTS_UI8 *pdu)
@@ -145,15 +149,15 @@ static RTS_UI8 access(MODBUS_SERVER *server, const MODBUS_REQUEST *request, RTS_
     RTS_UI8 table = request->function->table;
     RTS_UI32 lock;
 
-    if (!has_all(server, table, request->read_address, request->read_count, false) ||
-        !has_all(server, table, request->write_address, request->write_count, true))
+    if (!exchange(server, table, request->read_address, request->read_count, NULL, false) ||
+        !exchange(server, table, request->write_address, request->write_count, NULL, true))
         return MODBUS_ILLEGAL_ADDRESS;
     lock = SysLockEnter();
     if (request->function->function == MODBUS_MASK_WRITE_REGISTER)
         mask_register(server, request);
     else
-        exchange(server, table, request->write_address, request->write_count, request->data, true);
-    exchange(server, table, request->read_address, request->read_count, pdu + 2, false);
+        (void)exchange(server, table, request->write_address, request->write_count, request->data, true);
+    (void)exchange(server, table, request->read_address, request->read_count, pdu + 2, false);
     SysLockLeave(lock);
     if (request->write_count != 0)
         server->written++;
@@ -208,7 +212,7 @@ static RTS_UI32 reply_server_id(const MODBUS_SERVER *server, RTS_UI8 *pdu)
 
 enum { ID_BASIC = 1, ID_REGULAR = 2, ID_EXTENDED = 3, ID_INDIVIDUAL = 4, ID_CONFORMITY = 0x82 };
 
-static bool has_object(const MODBUS_SERVER *server, RTS_UI32 object)
+static RTS_NOINLINE bool has_object(const MODBUS_SERVER *server, RTS_UI32 object)
 {
     return object < MODBUS_BASIC_OBJECTS || (server->object[object] != NULL && server->object[object][0] != '\0');
 }
@@ -310,7 +314,7 @@ RTS_UI32 ModbusServerReply(MODBUS_SERVER *server, RTS_UI8 *pdu, RTS_UI32 size)
 /* What tools say is for one device: its reply is a part of it. */
 static bool is_for(const MODBUS_SERVER *server, RTS_UI8 unit, bool of_tool)
 {
-    if (!server->tcp)
+    if (!is_tcp(server))
         return unit == server->unit || (unit == MODBUS_BROADCAST && !of_tool);
     return server->unit == 0 || unit == server->unit || unit == 0 || unit == ANY_UNIT;
 }
@@ -318,7 +322,7 @@ static bool is_for(const MODBUS_SERVER *server, RTS_UI8 unit, bool of_tool)
 /* On TCP 0 is not all devices, but the one that is connected. */
 static bool wants_reply(const MODBUS_SERVER *server, RTS_UI8 unit)
 {
-    return server->tcp || unit != MODBUS_BROADCAST;
+    return is_tcp(server) || unit != MODBUS_BROADCAST;
 }
 
 /* A client of TCP need not wait until it gives up: there is no such device here. */
@@ -333,13 +337,13 @@ static RTS_UI32 reply_no_target(RTS_UI8 *pdu)
  * to a later one. */
 static void give_up_late(const MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64 now_ns)
 {
-    if (!server->tcp && link->sending && now_ns - link->moved_ns >= LATE_NS)
-        link->type->give_up(link);
+    if (!is_tcp(server) && link->sending && now_ns - link->moved_ns >= LATE_NS)
+        ModbusLinkType(link)->give_up(link);
 }
 
 bool ModbusServerPoll(MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64 now_ns)
 {
-    RTS_UI32 size = link->type->receive(link, now_ns);
+    RTS_UI32 size = ModbusLinkType(link)->receive(link, now_ns);
     RTS_UI8 unit = link->frame[MODBUS_AT_UNIT];
     RTS_UI8 *pdu = link->frame + MODBUS_AT_PDU;
 
@@ -350,9 +354,9 @@ bool ModbusServerPoll(MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64 now_ns)
     if (is_for(server, unit, ModbusTunnelIsRequest(pdu, size)))
         size = ModbusServerReply(server, pdu, size);
     else
-        size = server->tcp ? reply_no_target(pdu) : 0;
+        size = is_tcp(server) ? reply_no_target(pdu) : 0;
     if (size != 0 && wants_reply(server, unit))
-        link->type->send(link, size, now_ns);
+        ModbusLinkType(link)->send(link, size, now_ns);
     else
         ModbusLinkDrop(link);
     return true;

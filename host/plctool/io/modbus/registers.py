@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from plctool.core import lib
-from plctool.iec.types import BOOL, ArrayType, Elementary, StringType, StructType, Type, base_of
+from plctool.iec.types import BOOL, ArrayType, Elementary, Kind, StringType, StructType, Type, base_of
 from plctool.io.model import Channel, bits_of, holds_bools
 
 COILS, DISCRETE = int(lib.MODBUS_COILS), int(lib.MODBUS_DISCRETE_INPUTS)
@@ -87,6 +87,15 @@ def element_size(t: Type) -> int:
 def registers_of(t: Type) -> int:
     """How many registers a variable takes."""
     return 1 if element_size(t) == 1 else -(-t.size // 2)
+
+
+def registers_of_number(t: Type) -> int:
+    """How many registers are one number, of which none may be written alone; those of DWORD and LWORD are words of bits."""
+    inner = base_of(t)
+    while isinstance(inner, ArrayType):
+        inner = base_of(inner.element)
+    is_number = isinstance(inner, Elementary) and inner.kind is not Kind.BIT
+    return max(1, element_size(t) // 2) if is_number else 1
 
 
 def fits_coils(t: Type) -> bool:

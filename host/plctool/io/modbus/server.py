@@ -28,6 +28,7 @@ from plctool.io.modbus.registers import (
     fits_coils,
     place,
     registers_of,
+    registers_of_number,
     reverse_for,
     wire_address,
     wrong_reference,
@@ -133,7 +134,8 @@ class ModbusServer(Connector):
             tables |= COILS if first.table == HOLDING else DISCRETE
         return {
             "tables": tables,
-            "flags": int(lib.MODBUS_RANGE_WRITABLE) * first.writable,
+            "flags": int(lib.MODBUS_RANGE_WRITABLE) * first.writable
+            | registers_of_number(t) - 1 << int(lib.MODBUS_RANGE_NUMBER_SHIFT),
             "first_register": first.first,
             "first_bit": first.first * REGISTER_BITS if tables != first.table else 0,
             "reverse": reverse,
