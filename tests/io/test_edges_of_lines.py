@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from io_support import build
+from io_support import build, messages
 
 from plctool.compiler.build import BuildResult
 from plctool.sim import Simulator
@@ -93,3 +95,18 @@ def test_lines_that_are_not_there_have_no_edges(plc: Simulator) -> None:
     plc.set_input("DI0", False)
     plc.set_input("DI0", True)
     assert counted(plc) == [1, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("event", "hint"),
+    [("other", ": write for example TASK Fast(EVENT := 'other')"), ("rize", "; did you mean rise?"),
+     ("Rise", "; did you mean rise?")],
+)  # fmt: skip
+def test_event_that_no_task_waits_for_is_warned_of(tmp_path: Path, event: str, hint: str) -> None:
+    found = messages(tmp_path, PROGRAM, DESCRIPTION.replace('"other"', f'"{event}"'))
+    assert [m for m in found if "no task waits" in m] == [f"6: no task waits for the event '{event}'{hint}"]
+
+
+def test_event_of_a_device_that_is_not_used_is_no_warning(tmp_path: Path) -> None:
+    description = DESCRIPTION.replace("[gpio.in]", "[gpio]\nenabled = false\n[gpio.in]")
+    assert not any("no task waits" in m for m in messages(tmp_path, PROGRAM, description))

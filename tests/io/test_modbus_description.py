@@ -358,6 +358,43 @@ def test_another_unit_or_order_of_bytes_is_no_warning(tmp_path: Path, key: str) 
     assert not any("has the unit" in message for message in messages(tmp_path, PROGRAM, second_device(key)))
 
 
+def two_writes(*jobs: tuple[int, int, str], second: str = "") -> str:
+    """Writes (function, address, variable) of one device, or the last one of a `second` one."""
+    head, _, _ = device("word_1").partition("[[modbus.rs485.device.read]]")
+    tables = [f"[[modbus.rs485.device.write]]\nfunction = {f}\naddress = {a}\non_change = true\nvar = 'Main.{v}'\n"
+              for f, a, v in jobs]  # fmt: skip
+    extra = f'[[modbus.rs485.device]]\nname = "Second"\n{second}\n' if second else ""
+    return head + "".join(tables[:-1]) + extra + tables[-1]
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (two_writes((16, 40001, "real_1"), (6, 40002, "word_1")), "holding registers 40002 of Meter"),
+        (two_writes((16, 40001, "real_1"), (16, 40001, "words")), "holding registers 40001 to 40002 of Meter"),
+        (two_writes((6, 40005, "word_1"), (22, 40005, "small")), "holding registers 40005 of Meter"),
+        (two_writes((15, 1, "word_1"), (5, 16, "on")), "coils 16 of Meter"),
+        (two_writes((16, 410000, "real_1"), (6, 410001, "word_1"), second='unit = 3\norder = "CDAB"'),
+         "holding registers 410001 of Second"),
+    ],
+)  # fmt: skip
+def test_two_writes_of_one_register_are_a_warning(tmp_path: Path, text: str, what: str) -> None:
+    found = [m for m in messages(tmp_path, PROGRAM, text) if "undoes" in m]
+    assert len(found) == 1 and f"{what} are written by line 8 as well: each undoes what the other wrote" in found[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        two_writes((16, 40001, "real_1"), (6, 40003, "word_1")),
+        two_writes((6, 40001, "word_1"), (5, 1, "on")),
+        two_writes((6, 40001, "word_1"), (6, 40001, "word_2"), second="unit = 4"),
+    ],
+)
+def test_writes_of_other_registers_are_no_warning(tmp_path: Path, text: str) -> None:
+    assert not any("undoes" in m for m in messages(tmp_path, PROGRAM, text))
+
+
 @pytest.mark.parametrize("key", ["optional = true", "enabled = false"])
 def test_device_that_need_not_be_there_may_name_what_another_one_has(tmp_path: Path, key: str) -> None:
     tables = '[[modbus.rs485]]\nname = "A"\nport = "COM2"\n[[modbus.rs485]]\nname = "B"\nport = "COM2"\n'

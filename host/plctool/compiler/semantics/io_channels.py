@@ -216,6 +216,7 @@ class IoChannels:
             return
         if tasks is not None:
             _check_tasks(self.description, [task.name for task in tasks], diagnostics)
+            _check_events(self.description, [task.external for task in tasks if task.external], diagnostics)
         for _, channel in self.description.channels:
             if channel.at_address:
                 self._reserve(channel, allocation)
@@ -438,6 +439,18 @@ def _check_tasks(description: Description, tasks: Sequence[str], diagnostics: Di
         if connector.task is not None and connector.task.casefold() not in known:
             hint = did_you_mean(connector.task, tasks) or f"; the program has {', '.join(tasks)}"
             diagnostics.error(connector.task_pos or connector.pos, CODE, f"there is no task {connector.task}{hint}")
+
+
+def _check_events(description: Description, waited_for: Sequence[str], diagnostics: Diagnostics) -> None:
+    """Warns of events that no task waits for. Their names differ in case, too."""
+    for connector, channel in description.channels:
+        event = channel.event
+        if not event or event in waited_for or not connector.enabled:
+            continue
+        same = next((name for name in waited_for if name.casefold() == event.casefold()), None)
+        hint = did_you_mean(event, waited_for) if same is None else f"; did you mean {same}?"
+        hint = hint or f": write for example TASK Fast(EVENT := '{event}')"
+        diagnostics.warning(channel.pos, CODE, f"no task waits for the event '{event}'{hint}")
 
 
 def _check_limits(description: Description, allocation: Allocation, diagnostics: Diagnostics) -> None:

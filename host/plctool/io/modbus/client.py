@@ -17,12 +17,14 @@ from plctool.io.modbus.registers import (
     INPUT,
     LAST_ADDRESS,
     ORDERS,
+    TABLE_NAMES,
     Order,
     cannot_have,
     element_size,
     first_reference,
     fits_coils,
     place,
+    reference_of,
     registers_of,
     reverse_for,
     wire_address,
@@ -105,6 +107,11 @@ class Part:
     pos: Pos
     count: int = 0
 
+    @property
+    def end(self) -> int:
+        """The address after the last one."""
+        return self.first + self.count
+
 
 def _nothing() -> Part:
     return Part(0, [], Pos("", 0, 0))
@@ -112,7 +119,8 @@ def _nothing() -> Part:
 
 @dataclass
 class Job:
-    """A read or write of a device, or both at a time. `took_us`: on the line, with the device's reply."""
+    """A read or write of a device, or both at a time. `took_us`: on the line, with the device's reply; `mask`: the bits
+    that function 22 writes."""
 
     function: Function
     interval_us: int
@@ -122,6 +130,7 @@ class Job:
     read: Part = field(default_factory=_nothing)
     write: Part = field(default_factory=_nothing)
     took_us: float = 0.0
+    mask: int = 0
 
     @property
     def channels(self) -> list[Channel]:
@@ -154,6 +163,21 @@ class ModbusLine(Connector):
         for job in jobs:
             for channel in job.channels:
                 channel.age_us = round_us + max(job.interval_us, int(job.took_us))
+
+    def check_writes(self, mistakes: Mistakes) -> None:
+        """Warns of what two writes of one unit have in common: each undoes what the other wrote."""
+        seen: list[tuple[ModbusDevice, Job]] = []
+        for device in (d for d in self.devices if d.enabled):
+            for job in (j for j in device.jobs if j.write.count):
+                other = next((j for d, j in seen if d.unit == device.unit and _write_the_same(j, job)), None)
+                if other is not None:
+                    first = max(job.write.first, other.write.first)
+                    last = min(job.write.end, other.write.end) - 1
+                    what = f"{TABLE_NAMES[job.function.table]} {reference_of(first, job.function.table)}"
+                    what += f" to {reference_of(last, job.function.table)}" if last > first else ""
+                    message = f"{what} of {device.name} are written by line {other.write.pos.line} as well"
+                    mistakes.warning(job.write.pos, f"{message}: each undoes what the other wrote")
+                seen.append((device, job))
 
     def transaction_us(self, request: int, reply: int) -> float:
         """How long PDUs of these sizes take with all that is around them; 0 on a network."""
@@ -188,6 +212,7 @@ class ModbusDevice(Connector):
         line = self.parent
         if isinstance(line, ModbusLine) and self in line.devices[-1:]:
             line.note_ages()
+            line.check_writes(mistakes)
 
     def _bits(self, job: Job, mistakes: Mistakes) -> int | None:
         for part, _ in job.parts:
@@ -251,6 +276,8 @@ class ModbusDevice(Connector):
         return 1 if self.order.high_byte_first else 2
 
     def _add(self, number: int, job: Job, flags: int) -> None:
+        if job.function.code == lib.MODBUS_MASK_WRITE_REGISTER:
+            job.mask = self._mask(job)
         flags |= int(lib.MODBUS_JOB_ON_CHANGE) * job.on_change | int(lib.MODBUS_JOB_VERIFY) * job.verify
         value = ffi.new(
             "MODBUS_JOB *",
@@ -261,7 +288,7 @@ class ModbusDevice(Connector):
                 "read_count": job.read.count,
                 "write_address": job.write.first,
                 "write_count": job.write.count,
-                "mask": self._mask(job) if job.function.code == lib.MODBUS_MASK_WRITE_REGISTER else 0,
+                "mask": job.mask,
                 "interval_ms": job.interval_us // 1000,
             },
         )
@@ -289,6 +316,17 @@ class ModbusDevice(Connector):
         if before <= 1.0 < line.load:
             message = f"the line {line.name} is too slow for all that is asked on it: ask less often, or raise its baud"
             mistakes.warning(job.pos, message)
+
+
+def _write_the_same(one: Job, other: Job) -> bool:
+    """Whether two jobs write the same coils or registers; those of function 22 bits of them."""
+    both_masked = one.function.code == other.function.code == lib.MODBUS_MASK_WRITE_REGISTER
+    return (
+        one.function.table == other.function.table
+        and one.write.first < other.write.end
+        and other.write.first < one.write.end
+        and not (both_masked and one.mask & other.mask == 0)
+    )
 
 
 def _data_size(function: Function, count: int) -> int:

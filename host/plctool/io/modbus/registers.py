@@ -37,9 +37,15 @@ def place_of_reference(reference: int) -> tuple[int, int] | None:
     return next(((table, at) for table in tables if (at := wire_address(reference, table)) is not None), None)
 
 
+def reference_of(address: int, table: int) -> int:
+    """The reference of an address on the wire, in its short form if there is one."""
+    prefix = _PREFIX[table]
+    return prefix * (10000 if address < 9999 else 100000) + address + 1
+
+
 def first_reference(table: int) -> int:
     """The reference of the first one of a table, in its short form."""
-    return _PREFIX[table] * 10000 + 1
+    return reference_of(0, table)
 
 
 def wrong_reference(text: str, table: int) -> str:
