@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from plctool.controller import Controller, OtherTool
+from plctool.core import lib
 from plctool.debug.symbols import SymbolTable, load_symbols
 from plctool.debug.variables import Change, Reading, Symbol, unreachable
 from plctool.errors import DeviceError, LinkError, UsageError, did_you_mean
@@ -201,8 +202,8 @@ class Plc(Controller):
         devices = self.io_devices()
         found = next((d for d in devices if d.name.casefold() == name.casefold()), None)
         if found is None:
-            hint = did_you_mean(name, (d.name for d in devices)) or "; 'plctool io status' lists them"
-            raise UsageError(f"The program has no device {name}{hint}.", "unknown-device")
+            hint = did_you_mean(name, (d.name for d in devices)) or "; 'plctool io status' lists them."
+            raise UsageError(f"The program has no device {name}{hint}", "unknown-device")
         return found
 
     def io_read_parameter(self, device: str, number: int, t: Type) -> Any:
@@ -221,7 +222,15 @@ class Plc(Controller):
 
     def io_scan(self, bus: str) -> Iterator[IoModule]:
         """What is on a bus, whether the program uses it or not; each when it is found."""
-        return io_services.scan(self._session, self.io_device(bus).index)
+        found = self.io_device(bus)
+        try:
+            yield from io_services.scan(self._session, found.index)
+        except DeviceError as error:
+            if found.parent is None or error.result != lib.ERR_NOT_SUPPORTED:
+                raise
+            parent = next(d.name for d in self.io_devices() if d.index == found.parent)
+            message = f"{found.name} has no bus of its own; it is on {parent}: plctool io scan {parent}"
+            raise DeviceError(message, "no-bus", error.result) from None
 
     # ---- the application ----
 

@@ -92,8 +92,8 @@ class SimIo:
         if found:
             titles = " or ".join(c.title for c in found)
             raise UsageError(f"There are several channels {name}; write {titles}.", "ambiguous")
-        hint = did_you_mean(name, [c.title for c in self.channels]) or "; 'plctool io map' lists them"
-        raise UsageError(f"There is no channel {name}{hint}.", "unknown-channel")
+        hint = did_you_mean(name, [c.title for c in self.channels]) or "; 'plctool io map' lists them."
+        raise UsageError(f"There is no channel {name}{hint}", "unknown-channel")
 
     def _enabled(self, name: str) -> SimChannel:
         channel = self.find(name)

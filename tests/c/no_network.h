@@ -12,11 +12,14 @@
 
 enum { NO_NETWORK_LISTENER = 7 };
 
-static RTS_UI32 listeners; /* that are open */
+static RTS_UI32 listeners;       /* that are open */
+static RTS_RESULT listen_result; /* of the next ones; ERR_OK: they open */
 
 RTS_RESULT SysSockListen(const SOCKADDRESS *own, RTS_HANDLE *listener)
 {
     RTS_UNUSED(own);
+    if (listen_result != ERR_OK)
+        return listen_result;
     *listener = NO_NETWORK_LISTENER;
     listeners++;
     return ERR_OK;

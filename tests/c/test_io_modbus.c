@@ -108,6 +108,7 @@ static void begin(void)
     begin_io();
     memset(&line, 0, sizeof line);
     listeners = 0;
+    listen_result = ERR_OK;
     CHECK_EQUAL(IoDrvModbus_Hook(CH_INIT2), ERR_OK);
     io_init(&io);
     add_copying_task("Main", 10000, 0);
@@ -422,6 +423,27 @@ static void a_tcp_server_that_is_left_out_does_not_listen(void)
     CHECK_EQUAL(listeners, 1);
 }
 
+static void a_tcp_server_whose_port_is_in_use_says_so_and_tries_again(void)
+{
+    IO_DEVICE_STATE state;
+
+    begin();
+    listen_result = ERR_DUPLICATE;
+    (void)add_line(MODBUS_ROLE_TCP_SERVER);
+    add_range(0, 0, 10);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    run_passes(3);
+    CHECK(log_has("Line cannot listen: its port is in use"));
+    CHECK_EQUAL(IoMgrGetState(0, &state), ERR_OK);
+    CHECK_EQUAL(state.flags & CF_CONNECTOR_ERROR, CF_CONNECTOR_ERROR);
+    CHECK_EQUAL(state.errors, 1);
+    listen_result = ERR_OK;
+    run_long();
+    CHECK_EQUAL(listeners, 1);
+    CHECK_EQUAL(IoMgrGetState(0, &state), ERR_OK);
+    CHECK_EQUAL(state.ok, 1);
+}
+
 /* Its place in the tables is not what the server had that was left out. */
 static void a_server_comes_after_one_that_is_left_out(void)
 {
@@ -579,6 +601,7 @@ int main(void)
     RUN(an_optional_server_with_more_ranges_than_there_is_room_for_is_not_there);
     RUN(an_optional_server_with_a_channel_that_cannot_be_is_not_there);
     RUN(a_tcp_server_that_is_left_out_does_not_listen);
+    RUN(a_tcp_server_whose_port_is_in_use_says_so_and_tries_again);
     RUN(a_server_comes_after_one_that_is_left_out);
     return test_result();
 }

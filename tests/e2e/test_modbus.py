@@ -18,7 +18,7 @@ from pymodbus.client import ModbusTcpClient
 import plctool
 from plctool.compiler import compile_sources
 from plctool.device import Plc
-from plctool.errors import PlcError
+from plctool.errors import DeviceError, PlcError, UsageError
 from plctool.testing.plcrt import Plcrt
 
 CONNECTIONS = 32  # MODBUS_MAX_CONNECTIONS of plcrt
@@ -326,6 +326,43 @@ def test_scan_finds_the_devices_of_a_line(plant: Plant) -> None:
     found = next(plant.plc.io_scan(line.name))
     assert (found.slot, found.name) == (1, "")
     eventually(lambda: plant.meter.count(3) > asked + 20 and ok(plant, "Meter"))
+
+
+def test_scan_of_a_device_names_its_bus(plant: Plant) -> None:
+    with pytest.raises(DeviceError, match=r"Meter has no bus of its own; it is on .*: plctool io scan"):
+        list(plant.plc.io_scan("Meter"))
+
+
+def test_name_that_is_almost_one_of_a_device_is_a_question(plant: Plant) -> None:
+    with pytest.raises(UsageError, match=r"no device Metre; did you mean Meter\?$"):
+        plant.plc.io_device("Metre")
+
+
+def test_a_part_of_a_number_is_refused_and_all_of_it_is_written(plant: Plant) -> None:
+    """One register of a REAL, from a client that takes it for an INT."""
+    with plant.tcp() as client:
+        assert not client.write_registers(1, words(2.5)).isError()
+        assert client.write_register(1, 16000).exception_code == 2
+        assert client.write_registers(2, [1]).exception_code == 2
+        assert client.write_registers(0, [1, 0x4080]).exception_code == 2  # INT and half of the REAL
+        assert client.read_holding_registers(1, count=2).registers == words(2.5)
+        assert not client.write_registers(0, [1, *words(4.0)]).isError()
+        eventually(lambda: plant.plc.read("Main.ratio") == 4.0)
+
+
+def test_server_whose_port_is_in_use_says_so_until_it_is_free(plant: Plant, tmp_path: Path) -> None:
+    (tmp_path / "main.st").write_text("PROGRAM Main\nVAR n : INT; END_VAR\nEND_PROGRAM\n")
+    with socket.create_server(("127.0.0.1", 0)) as other, Plcrt(tmp_path / "flash") as plcrt:
+        port = other.getsockname()[1]
+        description = f'[modbus.server.tcp]\nname = "S"\naddress = "127.0.0.1"\nport = {port}\n'
+        (tmp_path / "main.io.toml").write_text(description + 'holding = { 40001 = "Main.n" }\n')
+        compile_sources([tmp_path / "main.st"]).write(tmp_path / "main.cdl")
+        with plctool.connect(f"serial:{plcrt.port}") as plc:
+            plc.flash(tmp_path / "main.cdl")
+            eventually(lambda: plc.io_device("S").state == "error")
+            assert any("S cannot listen: its port is in use" in entry.text for entry in plc.log())
+            other.close()
+            eventually(lambda: plc.io_device("S").state == "ok")
 
 
 def test_device_that_was_switched_off_comes_back_with_its_outputs(plant: Plant) -> None:

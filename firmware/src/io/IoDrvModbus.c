@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "AppState.h"
+#include "CmpLog.h"
 #include "CmpIoMgrEmbedded.h"
 #include "ModbusCalls.h"
 #include "ModbusDriver.h"
@@ -231,18 +232,30 @@ static void note_client(MODBUS_CLIENT_LINE *line)
     note_error(&line->noted, client->link.bad_frames, 0);
 }
 
+/* A server that cannot listen; only one on TCP is. */
+static void note_deaf(const IoConfigConnector *connector, RTS_RESULT why)
+{
+    const char *reason = why == ERR_DUPLICATE          ? "its port is in use"
+                         : why == ERR_NO_ACCESS_RIGHTS ? "there is no right to its port"
+                                                       : "its address is not one of this device";
+
+    IoMgrConfigSetDiagnosis(connector, CF_CONNECTOR_ERROR);
+    LogAdd(CMPID_CmpIoMgrEmbedded, LOG_WARNING, why, "%s cannot listen: %s", IoMgrConfigGetName(connector), reason);
+}
+
 /* The age of a server is that of what was written to it last. */
 static void note_server(MODBUS_SERVER_LINE *line, RTS_RESULT state)
 {
-    bool lost = state != ERR_OK;
+    bool good = state == ERR_OK;
+    bool lost = !good && state != ERR_PENDING;
     bool begins = line->noted.noted_ns == 0;
 
-    if (!lost && (begins || line->noted.noted_lost || line->server.written != (RTS_UI32)line->noted.noted_ns - 1)) {
+    if (good && (begins || line->noted.noted_lost || line->server.written != (RTS_UI32)line->noted.noted_ns - 1)) {
         IoMgrConfigNoteData(line->noted.connector);
         line->noted.noted_ns = (RTS_I64)line->server.written + 1;
     }
-    if (lost && state != ERR_PENDING && !line->noted.noted_lost)
-        IoMgrConfigSetDiagnosis(line->noted.connector, CF_CONNECTOR_BUS_ERROR);
+    if (lost && !line->noted.noted_lost)
+        note_deaf(line->noted.connector, state);
     line->noted.noted_lost = lost;
     note_error(&line->noted, line->server.errors + line->link.bad_frames, 0);
 }

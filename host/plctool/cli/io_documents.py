@@ -185,8 +185,8 @@ def _parameter(plc: Plc, device: str, parameter: str, type_name: str | None) -> 
     if number is not None and not 0 <= number <= _LAST_PARAMETER:
         raise UsageError(f"{parameter} is not the number of a parameter; they are of 32 bits.", "unknown-parameter")
     if found is None and number is None:
-        hint = did_you_mean(parameter, (p["name"] for p in known)) or "; give its number, and its type by --type"
-        raise UsageError(f"{device} has no parameter {parameter}{hint}.", "unknown-parameter")
+        hint = did_you_mean(parameter, (p["name"] for p in known)) or "; give its number, and its type by --type."
+        raise UsageError(f"{device} has no parameter {parameter}{hint}", "unknown-parameter")
     name = (type_name or (found["type"] if found else "UDINT")).upper()
     length = name.removeprefix("STRING[").removesuffix("]")
     t: Type | None = StringType(int(length)) if length.isdigit() else ELEMENTARY.get(name)

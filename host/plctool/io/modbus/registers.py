@@ -96,7 +96,7 @@ def registers_of(t: Type) -> int:
 
 
 def registers_of_number(t: Type) -> int:
-    """How many registers are one number, of which none may be written alone; those of DWORD and LWORD are words of bits."""
+    """How many registers are one number, of which none may be written alone; DWORD and LWORD are words of bits."""
     inner = base_of(t)
     while isinstance(inner, ArrayType):
         inner = base_of(inner.element)
