@@ -3,6 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#include "drivers.h"
+
 #define HAS_SysTime 1
 #define HAS_CmpLog 1
 #define HAS_CmpEventMgrEmbedded 1
@@ -25,5 +27,5 @@
 #define HAS_CmpBlkDrvTcp 1
 #define HAS_CmpBlkDrvUdp 1
 #define PORT_SYSTEM(X) X(SysTarget) X(SysLock) X(SysTimer)
-#define PORT_COMPONENTS(X) X(SysEvent) X(IoDrvSysfs)
+#define PORT_COMPONENTS(X) X(SysEvent) X(IoDrvSysfs) PLCRT_DRIVERS(X)
 #include "CmpList.h"

@@ -1,0 +1,67 @@
+"""A vendor's driver from the blank one, in a folder of its own, becomes a part of plcrt (docs/io-driver.md)."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from modbus_support import eventually
+
+import plctool
+from plctool.compiler import compile_sources
+from plctool.testing.plcrt import Plcrt
+
+ROOT = Path(__file__).resolve().parents[2]
+BLANK = ROOT / "firmware" / "port" / "baremetal" / "blank"
+DEVICE = """
+name = "Box"
+[[module]]
+name = "Analog"
+driver = "IoDrvAcmeAdc"
+in = { AI0 = { type = "INT", parameter = 1 } }
+out = { AO0 = { type = "INT", parameter = 2 } }
+[module.parameter]
+range = { id = 100, type = "USINT", choices = { "0..10V" = 0, "4..20mA" = 1 }, default = "4..20mA" }
+"""
+DESCRIPTION = """
+device = "device.toml"
+[local.Analog]
+name = "Analog"
+in = { AI0 = "Main.level" }
+out = { AO0 = "Main.out" }
+"""
+PROGRAM = """
+PROGRAM Main
+VAR level, out : INT; ok : BOOL; END_VAR
+out := level + 1;
+ok := Analog.ok;
+END_PROGRAM
+"""
+
+
+def test_driver_of_a_vendor_runs_in_plcrt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "docs" / "io-driver.md").read_text()
+    for name in ("IoDrvBlank.c", "IoDrvBlank.h"):
+        (tmp_path / name).write_text((BLANK / name).read_text())
+    for command in re.findall(r"^\$ (sed .*)$", text, re.MULTILINE):
+        subprocess.run(command, shell=True, cwd=tmp_path, check=True, timeout=60)
+    (option,) = re.findall(r"-Dplcrt_drivers=(?=\S*IoDrvAcmeAdc\.c)", text)
+    build = tmp_path / "build"
+    setup = ["setup", "-Dhost=false", f"{option}{tmp_path / 'IoDrvAcmeAdc.c'}", str(build), str(ROOT)]
+    for work in (setup, ["compile", "-C", str(build), "plcrt"]):
+        command_line = [sys.executable, "-m", "mesonbuild.mesonmain", *work]
+        done = subprocess.run(command_line, capture_output=True, text=True, timeout=900, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    monkeypatch.setenv("PLCRT", str(build / "firmware" / "port" / "linux" / "plcrt"))
+    program = tmp_path / "program"
+    program.mkdir()
+    for name, content in (("main.st", PROGRAM), ("main.io.toml", DESCRIPTION), ("device.toml", DEVICE)):
+        (program / name).write_text(content)
+    compile_sources([program / "main.st"]).write(program / "main.cdl")
+    with Plcrt(tmp_path / "flash") as plcrt, plctool.connect(f"serial:{plcrt.port}") as plc:
+        plc.flash(program / "main.cdl")
+        eventually(lambda: plc.read("Main.out", "Main.ok") == {"Main.out": 1, "Main.ok": True})
+        assert plc.io_device("Analog").driver == "IoDrvAcmeAdc"
