@@ -231,6 +231,30 @@ static void lines_may_move_to_another_group(void)
     end_lines();
 }
 
+/* All else is as it was: what a line is called, and its options. */
+static void a_line_that_becomes_another_is_opened_again(void)
+{
+    static const struct {
+        const char *name;
+        RTS_UI32 options;
+        RTS_UI32 input;
+    } lines[] = {{"DI0", 0, 1}, {"DI1", 0, 0}, {"DI1", GPIO_OPTION_ACTIVE_LOW, 1}, {"DI1", 0, 0}, {"DI0", 0, 1}};
+    RTS_UI32 i;
+
+    begin_lines();
+    CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
+    for (i = 0; i < RTS_COUNT(lines); i++) {
+        begin_lines_again();
+        add_connector_of(lines[i].name, lines[i].options);
+        io_add_channel(&io, 0, IO_MAP_INPUTS, 0, GPIO_INPUTS, 0, 0, 1);
+        start_io();
+        CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+        CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), lines[i].input);
+    }
+    CHECK_EQUAL(SimGpioSet("DI0", 0), ERR_OK);
+    end_lines();
+}
+
 /* The held output is the second group at first, then the only one. */
 static void a_held_output_stays_when_its_group_moves(void)
 {
@@ -315,6 +339,7 @@ int main(void)
     RUN(a_held_output_stays_over_a_download);
     RUN(groups_of_lines_may_be_removed_added_and_change_places);
     RUN(lines_may_move_to_another_group);
+    RUN(a_line_that_becomes_another_is_opened_again);
     RUN(a_held_output_stays_when_its_group_moves);
     RUN(a_refused_connector_leaves_its_group);
     RUN(lines_are_given_back_with_the_application);

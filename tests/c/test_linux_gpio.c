@@ -25,6 +25,7 @@ enum { CHIPS = 2, LINES = 4, FILES = 64, NO_CHIP = 0, CHIP = 1, REQUEST = 1 + CH
 static struct {
     RTS_UI8 file[FILES]; /* what a file is: CHIP + number, REQUEST + number */
     bool is_used;        /* line 3 of both chips is another's */
+    bool is_taken;       /* another process takes what is asked for just before */
     bool is_gone;
     struct gpio_v2_line_request asked[CHIPS];
     struct gpio_v2_line_values written[CHIPS];
@@ -72,6 +73,8 @@ static int get_lines(RTS_UI32 chip, struct gpio_v2_line_request *ask)
 {
     int ends[2];
 
+    if (kernel.is_taken)
+        return fail(EBUSY);
     kernel.asked[chip] = *ask;
     if (pipe(ends) != 0)
         return fail(EMFILE);
@@ -147,6 +150,8 @@ static void lines_that_are_taken(void)
     CHECK_EQUAL(add(0, "L3", 0), ERR_OPERATION_DENIED);
     CHECK_EQUAL(add(0, "L1", 0), ERR_OK);
     CHECK_EQUAL(add(1, "gpiochip1:1", 0), ERR_OPERATION_DENIED); /* the same line */
+    kernel.is_taken = true;
+    CHECK_EQUAL(SysGpioOpen(0, 0), ERR_OPERATION_DENIED);
 }
 
 /* The flags that the kernel was asked to give a line. */

@@ -169,6 +169,28 @@ static void a_request_does_not_begin_within_silence(void)
     }
 }
 
+/* Its frame begins some ms before ours is due. */
+static void a_request_waits_for_the_silence_of_another_master(void)
+{
+    static const RTS_UI8 frame[] = {9, 3, 0, 0, 0, 1};
+
+    begin(1);
+    add(0, read_job(50));
+    run_ms(60);
+    for (RTS_UI32 i = 0; i < 5; i++) {
+        RTS_I64 end_ns;
+        while (fakes.now_ns < states[0][0].due_ns - 3 * MS)
+            run_ms(1);
+        line_send_frame(frame, sizeof(frame));
+        end_ns = fakes.to_device.time_ns[fakes.to_device.size - 1];
+        while (fakes.from_device.size == 0)
+            run_ms(1);
+        CHECK(fakes.from_device.time_ns[0] - fakes.char_ns - end_ns >= client.link.silence_ns);
+        run_ms(20);
+    }
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
 /* ---- writing that is verified ---- */
 
 static void what_is_written_is_read_back(void)
@@ -237,6 +259,7 @@ int main(void)
     RUN(a_value_that_changes_all_the_time_leaves_time_for_reads);
     RUN(all_get_their_turn_on_a_slow_line);
     RUN(a_request_does_not_begin_within_silence);
+    RUN(a_request_waits_for_the_silence_of_another_master);
     RUN(what_is_written_is_read_back);
     RUN(what_is_not_kept_is_an_error_and_written_again);
     RUN(bits_that_are_not_written_are_not_verified);

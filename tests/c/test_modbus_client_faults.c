@@ -171,6 +171,24 @@ static void a_line_that_was_pulled_comes_back_with_all_devices(void)
         CHECK(ModbusDeviceIsGood(&devices[i]));
 }
 
+/* One that was dead before would be asked once a minute. */
+static void a_line_that_comes_back_asks_all_its_devices_at_once(void)
+{
+    begin(2);
+    add(0, read_job(50));
+    add(1, read_job(50));
+    remotes[1].fault = SILENT;
+    run_ms(20000);
+    CHECK(devices[1].retry_ns - fakes.now_ns > (RTS_I64)20000 * MS);
+    fakes.pulled = true;
+    run_ms(3000);
+    remotes[1].fault = WELL;
+    fakes.pulled = false;
+    run_ms(1500);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+    CHECK(ModbusDeviceIsGood(&devices[1]));
+}
+
 /* An adapter that was pulled: the port takes nothing more. */
 static void a_line_that_takes_no_bytes_is_lost_and_comes_back(void)
 {
@@ -310,6 +328,7 @@ int main(void)
     RUN(a_dead_device_costs_the_others_less_than_one_time_out_a_minute);
     RUN(a_short_loss_is_over_after_some_seconds);
     RUN(a_line_that_was_pulled_comes_back_with_all_devices);
+    RUN(a_line_that_comes_back_asks_all_its_devices_at_once);
     RUN(a_line_that_takes_no_bytes_is_lost_and_comes_back);
     RUN(a_broadcast_that_does_not_leave_is_no_success);
     RUN(a_slow_line_is_not_late);

@@ -110,10 +110,13 @@ static RTS_UI32 find(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 addres
     return 0;
 }
 
-/* Moves them between memory and a PDU, locked; `data` NULL: none yet. False: they are not all there. */
-static bool exchange(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 address, RTS_UI32 count, RTS_UI8 *data,
-                     bool to_write)
+/* Moves what a request reads or writes between memory and a PDU, locked; `data` NULL: nothing yet. False: it is not all
+ * there. */
+static bool exchange(const MODBUS_SERVER *server, const MODBUS_REQUEST *request, bool to_write, RTS_UI8 *data)
 {
+    RTS_UI8 table = request->function->table;
+    RTS_UI32 address = to_write ? request->write_address : request->read_address;
+    RTS_UI32 count = to_write ? request->write_count : request->read_count;
     BITS pdu = {data, 0, is_of_registers(table)};
     BITS found = {NULL, 0, 0};
 
@@ -131,33 +134,35 @@ static bool exchange(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 addres
 
 /* ---- reading and writing ---- */
 
-static void mask_register(const MODBUS_SERVER *server, const MODBUS_REQUEST *request)
+/* Of function 22 the data are two masks: the register is read, and written. */
+static void mask_register(const MODBUS_SERVER *server, MODBUS_REQUEST *request)
 {
     RTS_UI8 value[REGISTER_SIZE];
 
-    (void)exchange(server, request->function->table, request->write_address, 1, value, false);
+    request->read_address = request->write_address;
+    request->read_count = 1;
+    (void)exchange(server, request, false, value);
+    request->read_count = 0;
     for (RTS_UI32 i = 0; i < REGISTER_SIZE; i++) {
         RTS_UI8 and_mask = request->data[i];
         RTS_UI8 or_mask = request->data[REGISTER_SIZE + i];
         value[i] = (RTS_UI8)((value[i] & and_mask) | (or_mask & ~and_mask));
     }
-    (void)exchange(server, request->function->table, request->write_address, 1, value, true);
+    (void)exchange(server, request, true, value);
 }
 
-static RTS_UI8 access(MODBUS_SERVER *server, const MODBUS_REQUEST *request, RTS_UI8 *pdu)
+static RTS_UI8 access(MODBUS_SERVER *server, MODBUS_REQUEST *request, RTS_UI8 *pdu)
 {
-    RTS_UI8 table = request->function->table;
     RTS_UI32 lock;
 
-    if (!exchange(server, table, request->read_address, request->read_count, NULL, false) ||
-        !exchange(server, table, request->write_address, request->write_count, NULL, true))
+    if (!exchange(server, request, false, NULL) || !exchange(server, request, true, NULL))
         return MODBUS_ILLEGAL_ADDRESS;
     lock = SysLockEnter();
     if (request->function->function == MODBUS_MASK_WRITE_REGISTER)
         mask_register(server, request);
     else
-        (void)exchange(server, table, request->write_address, request->write_count, request->data, true);
-    (void)exchange(server, table, request->read_address, request->read_count, pdu + 2, false);
+        (void)exchange(server, request, true, request->data);
+    (void)exchange(server, request, false, pdu + 2);
     SysLockLeave(lock);
     if (request->write_count != 0)
         server->written++;
@@ -191,7 +196,7 @@ static RTS_UI32 reply_access(MODBUS_SERVER *server, MODBUS_REQUEST *request, RTS
 
 /* ---- what the device is ---- */
 
-static RTS_UI32 put_text(const MODBUS_SERVER *server, RTS_UI32 object, RTS_UI8 *place)
+static RTS_NOINLINE RTS_UI32 put_text(const MODBUS_SERVER *server, RTS_UI32 object, RTS_UI8 *place)
 {
     const char *text = server->object[object];
     RTS_UI32 length = text != NULL ? CMUtlStrNLen(text, TEXT_MAX) : 0;
