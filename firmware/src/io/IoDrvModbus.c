@@ -195,9 +195,9 @@ static void note_device(MODBUS_NOTED *noted, const MODBUS_DEVICE *device)
     bool lost = ModbusDeviceIsLost(device);
     bool good = ModbusDeviceIsGood(device);
 
-    if (device->good_ns != noted->noted_ns && good)
+    if ((RTS_UI32)device->good_ns != noted->noted_data && good)
         IoMgrConfigNoteData(noted->connector);
-    noted->noted_ns = device->good_ns;
+    noted->noted_data = (RTS_UI32)device->good_ns;
     if (lost)
         note_error(noted, errors_of(device), CF_CONNECTOR_BUS_ERROR);
     else
@@ -248,11 +248,10 @@ static void note_server(MODBUS_SERVER_LINE *line, RTS_RESULT state)
 {
     bool good = state == ERR_OK;
     bool lost = !good && state != ERR_PENDING;
-    bool begins = line->noted.noted_ns == 0;
 
-    if (good && (begins || line->noted.noted_lost || line->server.written != (RTS_UI32)line->noted.noted_ns - 1)) {
+    if (good && (line->noted.noted_lost || line->noted.noted_data != line->server.written + 1)) {
         IoMgrConfigNoteData(line->noted.connector);
-        line->noted.noted_ns = (RTS_I64)line->server.written + 1;
+        line->noted.noted_data = line->server.written + 1;
     }
     if (lost && !line->noted.noted_lost)
         note_deaf(line->noted.connector, state);

@@ -18,7 +18,7 @@
 typedef struct {
     const IoConfigConnector *connector;
     RTS_UI32 noted_errors; /* what the manager knows */
-    RTS_I64 noted_ns;
+    RTS_UI32 noted_data; /* of a device, when its data came last: the lower half of that; of a server, how often + 1 */
     bool noted_lost;
 } MODBUS_NOTED;
 
