@@ -101,7 +101,7 @@ static void a_task_that_waits_for_an_event_of_no_line(void)
     begin_lines();
     add_lines(0, 0);
     add_task(&spec, "OnDoor", KIND_EXTERNAL, 0, 0)->event_offset = 77;
-    check_refused(ERR_NO_OBJECT, "Task OnDoor waits for an event that is not here.");
+    check_refused(ERR_NO_OBJECT, "Task OnDoor waits for an event that nothing posts.");
 }
 
 static void a_line_that_the_board_has_not(void)

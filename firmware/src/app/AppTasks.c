@@ -16,7 +16,7 @@ RTS_RESULT AppTasksCheckEvent(const CDL_TASK *task, APP_REFUSAL *refusal)
 {
     if (task->kind != KIND_EXTERNAL || SchedHasExternalEvent(task->event_offset))
         return ERR_OK;
-    return APP_REFUSE(refusal, ERR_NO_OBJECT, "Task %s waits for an event that is not here.", task->name);
+    return APP_REFUSE(refusal, ERR_NO_OBJECT, "Task %s waits for an event that nothing posts.", task->name);
 }
 
 #if IO_MAX_CONNECTORS > 0

@@ -21,29 +21,51 @@ enum { CONNECTORS, PARAMETERS, TASK_MAPS, CONNECTOR_MAPS, CHANNEL_MAPS, TABLES }
 typedef struct {
     LOADER *l;
     RTS_UI32 at[TABLES + 1]; /* where the tables are in the image, and then the data */
-    RTS_UI16 count[TABLES + 1];
-    RTS_UI16 next[TABLES + 1]; /* entry that is read next */
+    RTS_UI16 count[TABLES];
+    RTS_UI16 next[TABLES]; /* entry that is read next */
     RTS_UI32 data_size;
-    RTS_UI32 least_id;               /* of the next parameter of the connector */
-    RTS_UI32 area_size;              /* of the area of the task map */
     RTS_UI32 maps_seen;              /* a bit for each task and type */
     char name[IO_CONFIG_MAX_NAME];   /* of the connector */
     char driver[IO_CONFIG_MAX_NAME]; /* that it names */
 } IO_CHECK;
 
-typedef union {
-    IoConfigConnector connector;
-    IoConfigParameter parameter;
-    IoConfigTaskMap task_map;
-    IoConfigConnectorMap connector_map;
-    IoConfigChannelMap channel;
-    RTS_UI16 words[14]; /* the last two are not there, and zero */
-} ENTRY;
+static const RTS_UI8 entry_size[TABLES] = {
+    sizeof(IoConfigConnector),    sizeof(IoConfigParameter),  sizeof(IoConfigTaskMap),
+    sizeof(IoConfigConnectorMap), sizeof(IoConfigChannelMap),
+};
 
 /* A compiler never writes such a configuration: which entry says enough. Table TABLES is the head, or where it is. */
 static RTS_RESULT refuse_damaged(LOADER *l, RTS_RESULT result, RTS_UI32 table, RTS_UI32 entry)
 {
     return refuse(l, result, "The I/O configuration is damaged (table %u, entry %u): build again.", U(table), U(entry));
+}
+
+static RTS_RESULT damaged(const IO_CHECK *c, RTS_UI32 table)
+{
+    return refuse_damaged(c->l, ERR_INVALID_REFERENCE, table, c->next[table] - 1u);
+}
+
+static RTS_RESULT read_next(IO_CHECK *c, RTS_UI32 table, void *entry)
+{
+    RTS_UI32 size = entry_size[table];
+
+    return LoaderRead(c->l, c->at[table] + size * c->next[table]++, entry, size);
+}
+
+/* Whether an entry has `count` of those of `table` that come next. */
+static bool has_next(const IO_CHECK *c, RTS_UI32 table, RTS_UI32 first, RTS_UI32 count)
+{
+    return first == c->next[table] && count <= (RTS_UI32)c->count[table] - first;
+}
+
+/* Has that many entries of a table checked, which are there. */
+static RTS_RESULT check_entries(IO_CHECK *c, RTS_UI32 count, RTS_RESULT (*check_entry)(IO_CHECK *c))
+{
+    RTS_RESULT result = ERR_OK;
+
+    for (; count > 0 && result == ERR_OK; count--)
+        result = check_entry(c);
+    return result;
 }
 
 /* ---- connectors and their parameters ---- */
@@ -71,14 +93,20 @@ static bool is_value(const IO_CHECK *c, const IoConfigParameter *parameter)
            size <= c->data_size - parameter->value;
 }
 
-/* Numbers of parameters ascend. */
-static bool is_parameter(IO_CHECK *c, const ENTRY *entry)
+static RTS_RESULT check_parameters(IO_CHECK *c, RTS_UI32 count)
 {
-    const IoConfigParameter *parameter = &entry->parameter;
-    bool good = parameter->id >= c->least_id && parameter->id != 0xFFFFFFFFu && is_value(c, parameter);
+    RTS_UI32 least = 0; /* id, as they ascend */
 
-    c->least_id = parameter->id + 1;
-    return good;
+    for (; count > 0; count--) {
+        IoConfigParameter parameter;
+        RTS_RESULT result = read_next(c, PARAMETERS, &parameter);
+        if (result != ERR_OK)
+            return result;
+        if (parameter.id < least || parameter.id == 0xFFFFFFFFu || !is_value(c, &parameter))
+            return damaged(c, PARAMETERS);
+        least = parameter.id + 1;
+    }
+    return ERR_OK;
 }
 
 static bool is_place_of_state(const IO_CHECK *c, RTS_UI32 offset)
@@ -89,24 +117,37 @@ static bool is_place_of_state(const IO_CHECK *c, RTS_UI32 offset)
            (offset % 4 == 0 && size >= sizeof(IO_DEVICE_STATE) && offset <= size - sizeof(IO_DEVICE_STATE));
 }
 
-static bool is_connector(IO_CHECK *c, const ENTRY *entry)
+static bool is_connector(IO_CHECK *c, const IoConfigConnector *connector)
 {
-    const IoConfigConnector *connector = &entry->connector;
     RTS_UI32 index = c->next[CONNECTORS] - 1u;
 
-    c->least_id = 0;
     return (connector->parent < index || connector->parent == IO_CONFIG_NONE) &&
            (connector->flags & ~(CF_ENABLE | CF_OPTIONAL)) == 0 &&
            (connector->bus_task < c->l->image->task_count || connector->bus_task == IO_CONFIG_NONE) &&
+           has_next(c, PARAMETERS, connector->first_parameter, connector->parameter_count) &&
            read_name(c, connector->name, c->name) && read_name(c, connector->driver, c->driver) &&
            is_place_of_state(c, connector->state);
 }
 
+static RTS_RESULT check_connector(IO_CHECK *c)
+{
+    IoConfigConnector connector;
+    RTS_RESULT result = read_next(c, CONNECTORS, &connector);
+
+    if (result != ERR_OK)
+        return result;
+    if (!is_connector(c, &connector))
+        return damaged(c, CONNECTORS);
+    if ((connector.flags & (CF_ENABLE | CF_OPTIONAL)) == CF_ENABLE && !AppIoGet()->has_driver(c->driver))
+        return refuse(c->l, ERR_NO_OBJECT, "%s needs the driver %s, which this device does not have.", c->name,
+                      c->driver);
+    return check_parameters(c, connector.parameter_count);
+}
+
 /* ---- maps ---- */
 
-static bool is_channel(IO_CHECK *c, const ENTRY *entry)
+static bool is_channel(const IoConfigChannelMap *channel, RTS_UI32 area_size)
 {
-    const IoConfigChannelMap *channel = &entry->channel;
     RTS_UI32 at = channel->area_bit;
     RTS_UI32 from = channel->parameter_bit;
     RTS_UI32 bits = channel->bits;
@@ -114,81 +155,60 @@ static bool is_channel(IO_CHECK *c, const ENTRY *entry)
 
     return bits > 0 && (channel->flags & ~(IO_CHANNEL_ON_STOP | IO_CHANNEL_BIG_ENDIAN)) == 0 &&
            (channel->flags & IO_CHANNEL_ON_STOP) <= IO_VALUE &&
-           (in_bytes || ((at & 7) + bits <= 8 && (from & 7) + bits <= 8)) && from >> 31 == 0 && at / 8 < c->area_size &&
-           (bits + 7) / 8 <= c->area_size - at / 8;
+           (in_bytes || ((at & 7) + bits <= 8 && (from & 7) + bits <= 8)) && from >> 31 == 0 && at / 8 < area_size &&
+           (bits + 7) / 8 <= area_size - at / 8;
 }
 
-static bool is_connector_map(IO_CHECK *c, const ENTRY *entry)
+static RTS_RESULT check_channels(IO_CHECK *c, RTS_UI32 count, RTS_UI32 area_size)
 {
-    return entry->connector_map.connector < c->count[CONNECTORS];
+    for (; count > 0; count--) {
+        IoConfigChannelMap channel;
+        RTS_RESULT result = read_next(c, CHANNEL_MAPS, &channel);
+        if (result != ERR_OK)
+            return result;
+        if (!is_channel(&channel, area_size))
+            return damaged(c, CHANNEL_MAPS);
+    }
+    return ERR_OK;
+}
+
+static RTS_RESULT check_connector_maps(IO_CHECK *c, RTS_UI32 count, RTS_UI32 area_size)
+{
+    for (; count > 0; count--) {
+        IoConfigConnectorMap map;
+        RTS_RESULT result = read_next(c, CONNECTOR_MAPS, &map);
+        if (result == ERR_OK && (map.connector >= c->count[CONNECTORS] ||
+                                 !has_next(c, CHANNEL_MAPS, map.first_channel_map, map.channel_map_count)))
+            result = damaged(c, CONNECTOR_MAPS);
+        if (result == ERR_OK)
+            result = check_channels(c, map.channel_map_count, area_size);
+        if (result != ERR_OK)
+            return result;
+    }
+    return ERR_OK;
 }
 
 RTS_STATIC_ASSERT(2 * APP_MAX_TASKS <= 32, task_maps_have_a_bit_each);
+
+static RTS_RESULT check_task_map(IO_CHECK *c)
+{
+    IoConfigTaskMap map;
+    RTS_UI32 bit;
+    RTS_RESULT result = read_next(c, TASK_MAPS, &map);
+
+    if (result != ERR_OK)
+        return result;
+    if (map.task >= c->l->image->task_count || map.type > IO_MAP_OUTPUTS ||
+        !has_next(c, CONNECTOR_MAPS, map.first_connector_map, map.connector_map_count))
+        return damaged(c, TASK_MAPS);
+    bit = 1u << (2 * map.task + map.type);
+    if ((c->maps_seen & bit) != 0)
+        return damaged(c, TASK_MAPS);
+    c->maps_seen |= bit;
+    return check_connector_maps(c, map.connector_map_count, c->l->image->area_size[APP_AREA_INPUT + map.type]);
+}
+
 RTS_STATIC_ASSERT(APP_AREA_INPUT + IO_MAP_OUTPUTS == APP_AREA_OUTPUT, areas_are_in_the_order_of_maps);
-
-static bool is_task_map(IO_CHECK *c, const ENTRY *entry)
-{
-    const IoConfigTaskMap *map = &entry->task_map;
-    RTS_UI32 seen = c->maps_seen;
-
-    if (map->task >= c->l->image->task_count || map->type > IO_MAP_OUTPUTS)
-        return false;
-    c->maps_seen |= 1u << (2 * map->task + map->type);
-    c->area_size = c->l->image->area_size[APP_AREA_INPUT + map->type];
-    return c->maps_seen != seen;
-}
-
-/* ---- tables ---- */
-
-/* What the entries of a table are. Those of `children` that an entry has are two of its words: the first one, and how many;
- * none in TABLES. */
-typedef struct {
-    bool (*is_good)(IO_CHECK *c, const ENTRY *entry);
-    RTS_UI8 size;
-    RTS_UI8 children;
-    RTS_UI8 word;
-} KIND;
-
-#define HAS(children, type, first) sizeof(type), children, offsetof(type, first) / 2
-
-static const KIND kinds[TABLES] = {
-    {is_connector, HAS(PARAMETERS, IoConfigConnector, first_parameter)},
-    {is_parameter, sizeof(IoConfigParameter), TABLES, 12},
-    {is_task_map, HAS(CONNECTOR_MAPS, IoConfigTaskMap, first_connector_map)},
-    {is_connector_map, HAS(CHANNEL_MAPS, IoConfigConnectorMap, first_channel_map)},
-    {is_channel, sizeof(IoConfigChannelMap), TABLES, 12},
-};
-
-static RTS_RESULT check_driver(const IO_CHECK *c, const IoConfigConnector *connector)
-{
-    if ((connector->flags & (CF_ENABLE | CF_OPTIONAL)) != CF_ENABLE || AppIoGet()->has_driver(c->driver))
-        return ERR_OK;
-    return refuse(c->l, ERR_NO_OBJECT, "%s needs the driver %s, which this device does not have.", c->name, c->driver);
-}
-
-/* That many entries of a table come next, which are there, each with its own of the next table. */
-static RTS_RESULT check_entries(IO_CHECK *c, RTS_UI32 table, RTS_UI32 count)
-{
-    const KIND *kind = &kinds[table];
-    RTS_RESULT result = ERR_OK;
-
-    for (; count > 0 && result == ERR_OK; count--) {
-        RTS_UI32 number = c->next[table]++;
-        ENTRY entry = {.words = {0}};
-        const RTS_UI16 *has = entry.words + kind->word; /* the first, and how many */
-        result = LoaderRead(c->l, c->at[table] + kind->size * number, &entry, kind->size);
-        if (result != ERR_OK)
-            return result;
-        if (!kind->is_good(c, &entry) || has[0] != c->next[kind->children] ||
-            has[1] > c->count[kind->children] - has[0])
-            return refuse_damaged(c->l, ERR_INVALID_REFERENCE, table, number);
-        if (table == CONNECTORS)
-            result = check_driver(c, &entry.connector);
-        if (result == ERR_OK)
-            result = check_entries(c, kind->children, has[1]);
-    }
-    return result;
-}
 
 /* ---- the whole ---- */
 
@@ -206,11 +226,11 @@ static RTS_RESULT open_tables(IO_CHECK *c)
     if (head.version != IO_CONFIG_VERSION)
         return refuse(c->l, ERR_VERSION_MISMATCH, "The I/O configuration has version %u, this device knows %u.",
                       U(head.version), U(IO_CONFIG_VERSION));
-    memcpy(c->count, &head.connectors, TABLES * sizeof c->count[0]);
+    memcpy(c->count, &head.connectors, sizeof c->count);
     at += (RTS_UI32)sizeof head;
     for (i = 0; i < TABLES; i++) {
         c->at[i] = at;
-        at += (RTS_UI32)kinds[i].size * c->count[i];
+        at += (RTS_UI32)entry_size[i] * c->count[i];
     }
     c->at[TABLES] = at;
     c->data_size = head.data_size;
@@ -240,9 +260,9 @@ RTS_RESULT LoaderCheckIo(LOADER *l)
     c.l = l;
     result = open_tables(&c);
     if (result == ERR_OK)
-        result = check_entries(&c, CONNECTORS, c.count[CONNECTORS]);
+        result = check_entries(&c, c.count[CONNECTORS], check_connector);
     if (result == ERR_OK)
-        result = check_entries(&c, TASK_MAPS, c.count[TASK_MAPS]);
+        result = check_entries(&c, c.count[TASK_MAPS], check_task_map);
     return result;
 }
 
