@@ -268,6 +268,30 @@ static void a_broadcast_waits_for_no_reply(void)
     CHECK_EQUAL(devices[0].counters.timeouts, 0);
 }
 
+/* None replies, and the line is left to them for less than the silence that ends a frame. */
+static void frames_after_a_broadcast_are_apart(void)
+{
+    RTS_I64 first_ns = 0;
+    RTS_I64 end_ns = 0;
+    RTS_UI32 frames = 0;
+
+    begin(1);
+    devices[0].unit = MODBUS_BROADCAST;
+    devices[0].timeout_ms = 1;
+    add(0, write_job(0, 1));
+    states[0][0].has_out = true;
+    for (RTS_UI32 i = 0; i < 200; i++) {
+        run_ms(1);
+        if (fakes.from_device.size == 0 || fakes.from_device.time_ns[0] == first_ns)
+            continue;
+        first_ns = fakes.from_device.time_ns[0];
+        CHECK(end_ns == 0 || first_ns - fakes.char_ns - end_ns >= client.link.silence_ns);
+        end_ns = fakes.from_device.time_ns[fakes.from_device.size - 1];
+        frames++;
+    }
+    CHECK(frames > 10);
+}
+
 /* They are asked again at once when one of them replies, as if there were no broadcasts. */
 static void a_broadcast_says_nothing_of_devices_that_are_lost(void)
 {
@@ -334,6 +358,7 @@ int main(void)
     RUN(a_slow_line_is_not_late);
     RUN(a_device_that_comes_back_gets_all_outputs_again);
     RUN(a_broadcast_waits_for_no_reply);
+    RUN(frames_after_a_broadcast_are_apart);
     RUN(a_broadcast_says_nothing_of_devices_that_are_lost);
     RUN(data_are_taken_and_given_under_the_lock);
     RUN(what_has_got_no_reply_is_taken_back_from_the_port);
