@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "drivers.h"
+#include "PortDrivers.h"
 
 #define HAS_SysTime 1
 #define HAS_CmpLog 1
@@ -27,5 +27,5 @@
 #define HAS_CmpBlkDrvTcp 1
 #define HAS_CmpBlkDrvUdp 1
 #define PORT_SYSTEM(X) X(SysTarget) X(SysLock) X(SysTimer)
-#define PORT_COMPONENTS(X) X(SysEvent) X(IoDrvSysfs) PLCRT_DRIVERS(X)
+#define PORT_COMPONENTS(X) X(SysEvent) X(IoDrvSysfs) PORT_DRIVERS(X)
 #include "CmpList.h"
