@@ -65,6 +65,9 @@ typedef struct {
     RTS_UI32 last_received;
     RTS_UI32 last_sent;
     RTS_UI32 anonymous_since; /* without a login; with COMM_ENDPOINTS only */
+#if COMM_ENDPOINTS
+    RTS_UI32 guessed_at; /* the last package in the name of the peer that cannot be its */
+#endif
     CHANNEL_RECEIVER rx;
     CHANNEL_SENDER tx;
     ROUTER_PEER peer;

@@ -121,6 +121,15 @@ void client_send_close(const CLIENT *client)
     client_send_package(client, package, sizeof(package));
 }
 
+void client_send_guess_and_close(const CLIENT *client)
+{
+    CLIENT wrong = *client;
+
+    wrong.channel ^= 1;
+    client_send_close(&wrong);
+    client_send_close(client);
+}
+
 void client_send_block(const CLIENT *client, RTS_UI32 number, RTS_UI8 flags, const RTS_UI8 *message, RTS_UI32 length,
                        RTS_UI32 offset, RTS_UI32 size)
 {

@@ -66,6 +66,8 @@ int client_take_open(CLIENT *client);
 /* Both; request id 7, buffer NETSERVER_MESSAGE_SIZE. */
 bool client_open(CLIENT *client);
 void client_send_close(const CLIENT *client);
+/* The same, with a wrong id before it, as one does that tries ids in the client's name. */
+void client_send_guess_and_close(const CLIENT *client);
 /* Sends one block; flags as on the wire, first ones with length and crc of the message. */
 void client_send_block(const CLIENT *client, RTS_UI32 number, RTS_UI8 flags, const RTS_UI8 *message, RTS_UI32 length,
                        RTS_UI32 offset, RTS_UI32 size);

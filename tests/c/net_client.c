@@ -7,6 +7,7 @@
 #include "net_client.h"
 
 #include <arpa/inet.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -109,8 +110,10 @@ int net_dial(void)
 {
     struct sockaddr_in device = make_address(net_device(SYSSOCK_TCP));
     int file = socket(AF_INET, SOCK_STREAM, 0);
+    int on = 1;
 
     REQUIRE(file >= 0 && connect(file, (struct sockaddr *)&device, sizeof(device)) == 0);
+    REQUIRE(setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on)) == 0);
     return file;
 }
 

@@ -255,6 +255,18 @@ static void a_tool_that_stops_in_the_middle_blocks_no_other(void)
     can_end();
 }
 
+static void ids_tried_in_the_name_of_a_tool_close_nothing(void)
+{
+    CLIENT client;
+
+    can_start(500 * KBIT, 0);
+    CHECK(can_connect(&client, can_tool(200)));
+    client_send_guess_and_close(&client);
+    can_settle();
+    CHECK(ask(&client));
+    can_end();
+}
+
 /* On classic CAN a packet needs flow control, which a tool that has ended does not send. */
 static void tools_that_have_vanished_give_way_in_less_than_a_second(void)
 {
@@ -540,6 +552,7 @@ int main(void)
     RUN(packets_of_several_tools_arrive_at_the_same_time);
     RUN(more_packets_than_there_is_room_for_are_sent_again);
     RUN(a_tool_that_stops_in_the_middle_blocks_no_other);
+    RUN(ids_tried_in_the_name_of_a_tool_close_nothing);
     RUN(tools_that_have_vanished_give_way_in_less_than_a_second);
     RUN(a_tool_that_is_many_leaves_a_channel_to_others);
     RUN(a_scan_of_all_or_of_one_is_answered);

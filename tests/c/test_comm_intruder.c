@@ -13,6 +13,42 @@ enum { ADDRESS = 0x0102, INTRUDER = 0x0666, STORM = 3 };
 
 static REPLY answer;
 
+/* ---- a line with several peers, one for each address; SimLink is a line with one ---- */
+
+static BLK_DRV bus;
+
+static void bus_send(void *instance, const RTS_UI8 *packet, RTS_UI32 size)
+{
+    RTS_UI16 sender = (RTS_UI16)(packet[8] << 8 | packet[9]);
+
+    RTS_UNUSED(instance);
+    RouterHandleDataFrom(&bus, sender, packet, size);
+}
+
+static RTS_UI32 bus_receive(void *instance, RTS_UI8 *packet, RTS_UI32 capacity)
+{
+    RTS_UNUSED(instance);
+    return SimLinkReceive(packet, capacity);
+}
+
+static const CLIENT_LINK to_bus = {bus_send, bus_receive, NULL};
+
+/* A client on the bus. */
+static void join(CLIENT *who, RTS_UI16 address)
+{
+    client_init(who, address);
+    who->link = &to_bus;
+}
+
+/* Replies to what comes over the bus are where those of SimLink are. */
+static void make_bus(void)
+{
+    setup();
+    bus = *ChannelGetClient(0)->channel.peer.driver;
+}
+
+/* ---- tests ---- */
+
 static void a_device_whose_ids_might_be_guessed_says_so(void)
 {
     fakes_start();
@@ -49,19 +85,25 @@ static bool comes_in(CLIENT *who)
     return result == CHANNEL_OPEN_OK;
 }
 
-/* A client that is logged in. */
+/* The client logs in. */
+static void log_client_in(void)
+{
+    CHECK(client_open(&client) && client_login(&client) && client_login_app(&client) && is_served(&client));
+    pass(CHANNEL_COMPLAINT_MS);
+}
+
+/* A client that is logged in, on the bus. */
 static void start(void)
 {
     fakes_start();
-    client_init(&client, ADDRESS);
-    CHECK(client_connect(&client) && is_served(&client));
-    pass(CHANNEL_COMPLAINT_MS);
+    join(&client, ADDRESS);
+    log_client_in();
 }
 
 /* All ids as quickly as the line has them, from `address`, in packages of this type. */
 static void guess_all_ids(RTS_UI16 address, RTS_UI8 type)
 {
-    CLIENT guess = {.address = address};
+    CLIENT guess = {.address = address, .link = client.link};
 
     for (RTS_UI32 id = 1; id <= CHANNEL_ID_MAX; id++) {
         guess.channel = (RTS_UI16)id;
@@ -102,7 +144,7 @@ static void a_close_request_works_again_when_the_guessing_has_ended(void)
 static void a_close_request_in_vain_does_not_make_the_next_one_vain(void)
 {
     start();
-    guess_all_ids(INTRUDER, CHANNEL_PKG_CLOSE_REQ);
+    guess_all_ids(ADDRESS, CHANNEL_PKG_CLOSE_REQ);
     RTS_UI32 foreign = counters()->foreign;
     pass(CHANNEL_COMPLAINT_MS - 1);
     client_send_close(&client);
@@ -118,8 +160,8 @@ static void right_after_the_start_nothing_has_been_guessed(void)
     fakes_init();
     fakes.now_ms = 1;
     fakes_run_init_hooks();
-    client_init(&client, ADDRESS);
-    CHECK(client_connect(&client));
+    join(&client, ADDRESS);
+    CHECK(client_open(&client) && client_login(&client));
     client_send_close(&client);
     CHECK(!is_served(&client));
 }
@@ -146,6 +188,56 @@ static void send_request(CLIENT *who, RTS_UI32 spoiled)
     client_send_package(who, block, 20 + size);
 }
 
+/* A message without a layer-7 header: no reply can be made. */
+static bool is_closed_by_what_cannot_be_answered(void)
+{
+    memset(message, 0, 8);
+    client_send_message(&client, message, 8);
+    return is_close(ERR_CHS_REQNOTHANDLED);
+}
+
+static void a_client_that_has_gone_does_not_delay_the_end_of_another_channel(void)
+{
+    start();
+    guess_all_ids(INTRUDER, CHANNEL_PKG_DATA);
+    SimLinkReset();
+    CHECK(is_closed_by_what_cannot_be_answered());
+}
+
+static void what_was_left_of_a_channel_does_not_delay_the_end_of_the_next_one_of_its_client(void)
+{
+    start();
+    CLIENT before = client;
+    client_send_close(&client);
+    client_send_block(&before, before.sent + 1, NEXT, message, 8, 0, 8);
+    SimLinkReset();
+    CHECK(client_open(&client));
+    CHECK(is_closed_by_what_cannot_be_answered());
+}
+
+static void on_a_line_with_one_peer_nobody_pretends_so_packages_end_channels(void)
+{
+    fakes_start();
+    client_init(&client, ADDRESS);
+    log_client_in();
+    CLIENT wrong = client;
+    wrong.channel ^= 1;
+    client_send_close(&wrong);
+    CHECK(is_closed_by_what_cannot_be_answered());
+    log_client_in();
+    client_send_guess_and_close(&client);
+    CHECK(!is_served(&client));
+}
+
+static void on_a_line_with_one_peer_a_wrong_crc_ends_the_channel(void)
+{
+    fakes_start();
+    client_init(&client, ADDRESS);
+    log_client_in();
+    send_request(&client, 1);
+    CHECK(is_close(ERR_CHS_CHECKSUM));
+}
+
 static void wrong_crcs_in_the_name_of_the_client_close_nothing(void)
 {
     start();
@@ -164,7 +256,7 @@ static void a_channel_without_login_ends(void)
     CLIENT idle;
 
     start();
-    client_init(&idle, INTRUDER);
+    join(&idle, INTRUDER);
     CHECK(client_open(&idle));
     for (RTS_UI32 ms = 0; ms < CHANNEL_LOGIN_MS; ms += CHANNEL_KEEPALIVE_MS) {
         CHECK(works(&idle)); /* what it says without a login does not help */
@@ -201,8 +293,8 @@ static void a_storm_of_open_requests_does_not_end_a_login(void)
 
     fakes_start();
     for (RTS_UI16 i = 0; i < RTS_COUNT(crowd); i++)
-        client_init(&crowd[i], (RTS_UI16)(INTRUDER + i));
-    client_init(&newcomer, ADDRESS);
+        join(&crowd[i], (RTS_UI16)(INTRUDER + i));
+    join(&newcomer, ADDRESS);
     for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS; i++)
         client_send_open(&crowd[i], 1, NETSERVER_MESSAGE_SIZE);
     pass(0);
@@ -218,7 +310,7 @@ static void take_all_channels(CLIENT *crowd)
 {
     fakes_start();
     for (RTS_UI16 i = 0; i < COMM_MAX_CLIENTS; i++) {
-        client_init(&crowd[i], (RTS_UI16)(INTRUDER + i));
+        join(&crowd[i], (RTS_UI16)(INTRUDER + i));
         CHECK(client_open(&crowd[i]) && works(&crowd[i]));
     }
 }
@@ -229,7 +321,7 @@ static void those_who_hold_channels_without_login_give_way_after_a_while(void)
     CLIENT newcomer;
 
     take_all_channels(crowd);
-    client_init(&newcomer, ADDRESS);
+    join(&newcomer, ADDRESS);
     CHECK(!comes_in(&newcomer));
     pass(CHANNEL_SETTLE_MS);
     CHECK(comes_in(&newcomer) && client_login(&newcomer));
@@ -241,7 +333,7 @@ static void those_who_open_again_and_again_give_way_after_a_while(void)
     CLIENT newcomer;
 
     take_all_channels(crowd);
-    client_init(&newcomer, ADDRESS);
+    join(&newcomer, ADDRESS);
     for (RTS_UI32 ms = 0; ms < CHANNEL_SETTLE_MS; ms += 100) {
         CHECK(!comes_in(&newcomer));
         for (RTS_UI32 i = 0; i < RTS_COUNT(crowd); i++)
@@ -259,10 +351,10 @@ static void those_who_logged_in_and_went_without_a_word_give_way_after_a_while(v
 
     fakes_start();
     for (RTS_UI16 i = 0; i < RTS_COUNT(gone); i++) {
-        client_init(&gone[i], (RTS_UI16)(INTRUDER + i));
+        join(&gone[i], (RTS_UI16)(INTRUDER + i));
         CHECK(client_open(&gone[i]) && client_login(&gone[i]));
     }
-    client_init(&newcomer, ADDRESS);
+    join(&newcomer, ADDRESS);
     for (RTS_UI32 ms = 0; ms < CHANNEL_IDLE_MS; ms += 500) {
         CHECK(!comes_in(&newcomer));
         pass(500);
@@ -274,7 +366,7 @@ static void those_who_logged_in_and_went_without_a_word_give_way_after_a_while(v
 static void fill(CLIENT others[COMM_MAX_CLIENTS - 1])
 {
     for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS - 1; i++) {
-        client_init(&others[i], (RTS_UI16)(INTRUDER + i));
+        join(&others[i], (RTS_UI16)(INTRUDER + i));
         CHECK(client_open(&others[i]) && client_login(&others[i]));
     }
 }
@@ -286,16 +378,18 @@ static void those_who_cannot_be_reached_give_way_at_once_unless_they_are_heard_a
 
     start();
     fill(others);
-    client_init(&newcomer, INTRUDER - 1);
+    join(&newcomer, INTRUDER - 1);
     CHECK(!comes_in(&newcomer));
-    RouterUnreachable(ChannelGetClient(0)->channel.peer.driver, 0); /* to this driver all have one endpoint */
+    RouterUnreachable(&bus, ADDRESS);
+    for (RTS_UI32 i = 0; i < RTS_COUNT(others); i++)
+        RouterUnreachable(&bus, others[i].address);
     CHECK(is_served(&client));
     for (RTS_UI32 i = 1; i < RTS_COUNT(others); i++)
         CHECK(is_served(&others[i]));
     CHECK(comes_in(&newcomer) && client_login(&newcomer));
     CHECK(!is_served(&others[0]));
     CHECK(is_served(&client) && is_served(&newcomer));
-    client_init(&newcomer, INTRUDER - 2);
+    join(&newcomer, INTRUDER - 2);
     CHECK(!comes_in(&newcomer));
 }
 
@@ -316,7 +410,7 @@ static void those_who_are_silent_are_sent_something_when_another_one_finds_no_ch
 
     start();
     fill(others);
-    client_init(&newcomer, INTRUDER - 1);
+    join(&newcomer, INTRUDER - 1);
     pass(CHANNEL_PROBE_MS);
     for (RTS_UI32 i = 0; i < STORM; i++)
         client_send_open(&newcomer, i, NETSERVER_MESSAGE_SIZE);
@@ -356,6 +450,7 @@ static void every_service_survives_every_tag_of_every_size(void)
 
 int main(void)
 {
+    make_bus();
     RUN(a_device_whose_ids_might_be_guessed_says_so);
     RUN(guessing_all_ids_from_elsewhere_closes_nothing);
     RUN(guessing_all_ids_in_the_name_of_the_client_closes_nothing);
@@ -363,6 +458,10 @@ int main(void)
     RUN(a_close_request_in_vain_does_not_make_the_next_one_vain);
     RUN(right_after_the_start_nothing_has_been_guessed);
     RUN(blocks_in_the_name_of_the_client_close_nothing);
+    RUN(a_client_that_has_gone_does_not_delay_the_end_of_another_channel);
+    RUN(what_was_left_of_a_channel_does_not_delay_the_end_of_the_next_one_of_its_client);
+    RUN(on_a_line_with_one_peer_nobody_pretends_so_packages_end_channels);
+    RUN(on_a_line_with_one_peer_a_wrong_crc_ends_the_channel);
     RUN(wrong_crcs_in_the_name_of_the_client_close_nothing);
     RUN(a_channel_without_login_ends);
     RUN(a_channel_with_login_stays);

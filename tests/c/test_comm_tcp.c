@@ -249,6 +249,22 @@ static void a_reset_in_the_middle_of_a_reply_frees_the_channel(void)
     net_end();
 }
 
+static void a_wrong_id_does_not_keep_its_connection_from_ending_the_channel(void)
+{
+    CLIENT client;
+    CLIENT_LINK link;
+
+    net_start("@:0", "");
+    int file = net_dial();
+    net_client(&client, &link, &file);
+    CHECK(client_open(&client) && client_login(&client));
+    client_send_guess_and_close(&client);
+    net_settle();
+    CHECK(!ChannelIsOpen(ChannelGetClient(0)));
+    close(file);
+    net_end();
+}
+
 static void a_reply_is_not_repeated_because_time_passes(void)
 {
     CLIENT client;
@@ -297,6 +313,7 @@ int main(void)
     RUN(a_peer_that_does_not_read_loses_nothing);
     RUN(the_next_login_need_not_wait_for_those_that_ended_abruptly);
     RUN(a_reset_in_the_middle_of_a_reply_frees_the_channel);
+    RUN(a_wrong_id_does_not_keep_its_connection_from_ending_the_channel);
     RUN(a_reply_is_not_repeated_because_time_passes);
     RUN(the_end_of_the_runtime_is_told);
     return test_result();

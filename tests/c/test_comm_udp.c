@@ -201,6 +201,25 @@ static void a_channel_belongs_to_where_it_was_opened_from(void)
     net_end();
 }
 
+/* The sender's address may be a lie. */
+static void ids_tried_in_the_name_of_a_client_close_nothing(void)
+{
+    CLIENT owner;
+    REPLY reply;
+
+    net_start("", "@");
+    int file = net_udp(0);
+    CLIENT_LINK link = {send_packet, receive_packet, &file};
+    client_init(&owner, 0x0102);
+    owner.link = &link;
+    CHECK(client_open(&owner) && client_login(&owner));
+    client_send_guess_and_close(&owner);
+    net_settle();
+    CHECK(client_request(&owner, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &reply));
+    close(file);
+    net_end();
+}
+
 /* Their sockets are closed without a word. */
 static void clients_that_have_vanished_give_way_in_less_than_a_second(void)
 {
@@ -332,6 +351,7 @@ int main(void)
     RUN(what_is_sent_to_us_is_for_us_and_what_is_sent_to_all_need_not_be);
     RUN(it_reflects_nothing);
     RUN(a_channel_belongs_to_where_it_was_opened_from);
+    RUN(ids_tried_in_the_name_of_a_client_close_nothing);
     RUN(clients_that_have_vanished_give_way_in_less_than_a_second);
     RUN(what_is_no_packet_is_dropped);
     RUN(a_flood_is_worked_off_in_pieces);

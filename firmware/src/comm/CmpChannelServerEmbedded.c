@@ -27,7 +27,6 @@ static COMM_CLIENT clients[COMM_MAX_CLIENTS];
 /* What outlives a channel. */
 static struct {
     RTS_UI32 complained_at;
-    RTS_UI32 guessed_at; /* the last time a package had an id that is not its sender's; with COMM_ENDPOINTS only */
     RTS_UI16 last_id;
 } server;
 
@@ -329,7 +328,13 @@ static bool has_its_share(RTS_UI32 host)
     return count + 1 > COMM_HOST_CHANNELS; /* where there are no hosts it is 0 */
 }
 
-/* The one this peer has, or one that can be given to it; NULL when all are taken. */
+/* A peer has one channel at most. */
+static bool has_client(const ROUTER_PEER *peer, const COMM_CLIENT *client)
+{
+    return client->channel.id != 0 && RouterIsSamePeer(peer, &client->channel.peer);
+}
+
+/* The one that this peer has, or one that can be given to it; NULL when all are taken. */
 static COMM_CLIENT *claim_client(const ROUTER_PEER *peer, RTS_UI32 now_ms)
 {
     COMM_CLIENT *found = NULL;
@@ -337,7 +342,7 @@ static COMM_CLIENT *claim_client(const ROUTER_PEER *peer, RTS_UI32 now_ms)
     bool own_only = has_its_share(host);
 
     FOR_EACH_CLIENT (client) {
-        if (client->channel.id != 0 && RouterIsSamePeer(peer, &client->channel.peer))
+        if (has_client(peer, client))
             return client;
         if (own_only && !is_at_host(&client->channel, host))
             continue;
@@ -368,7 +373,7 @@ static bool is_repetition(const CHANNEL *channel, const ROUTER_PEER *peer, const
 static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPEN_REQUEST *request, RTS_UI32 now_ms)
 {
     CHANNEL *channel = &client->channel;
-    bool again = channel->id != 0 && RouterIsSamePeer(peer, &channel->peer);
+    bool again = has_client(peer, client);
     RTS_UI32 since = COMM_ENDPOINTS && again ? channel->anonymous_since : now_ms;
 
     if (channel->id != 0 && !again)
@@ -390,6 +395,9 @@ static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPE
 #endif
     if (COMM_ENDPOINTS)
         channel->anonymous_since = since; /* a peer that opens again and again is not protected for ever */
+#if COMM_ENDPOINTS
+    channel->guessed_at = now_ms - CHANNEL_COMPLAINT_MS;
+#endif
     COMM_COUNT(counters.opened);
 }
 
@@ -572,19 +580,42 @@ static RTS_RESULT accept_block(COMM_CLIENT *client, bool is_first, const RTS_UI8
     return rx->left == 0 ? handle_message(client) : ERR_OK;
 }
 
-/* A package had an id that is not its sender's. */
-static void note_guess(RTS_UI32 now_ms)
+/* On a line with several peers one may pretend to be another. What is at the end of a connection or of a serial line
+ * need not. */
+static bool may_be_another(const ROUTER_PEER *peer)
 {
-    COMM_COUNT(counters.foreign);
-    if (COMM_ENDPOINTS)
-        server.guessed_at = now_ms;
+#if COMM_ENDPOINTS
+    return peer->endpoint != 0;
+#else
+    RTS_UNUSED(peer);
+    return false;
+#endif
 }
 
-/* On a network a sender may pretend to be another one, and try all ids. So while wrong ids arrive, no package ends a
- * channel: a client that is honest then ends it by silence. */
-static bool is_guessing(RTS_UI32 now_ms)
+/* A package came that is not the channel's, as it seems of `peer`: another one may pretend to be it and try ids. */
+static void note_guess(const ROUTER_PEER *peer, RTS_UI32 now_ms)
 {
-    return COMM_ENDPOINTS && now_ms - server.guessed_at < CHANNEL_COMPLAINT_MS;
+    COMM_COUNT(counters.foreign);
+#if COMM_ENDPOINTS
+    FOR_EACH_CLIENT (client)
+        if (may_be_another(peer) && RouterIsSamePeer(peer, &client->channel.peer))
+            client->channel.guessed_at = now_ms;
+#else
+    RTS_UNUSED(peer);
+    RTS_UNUSED(now_ms);
+#endif
+}
+
+/* While they come no package ends the channel: a client that is honest then ends it by silence. */
+static bool is_guessing(const CHANNEL *channel, RTS_UI32 now_ms)
+{
+#if COMM_ENDPOINTS
+    return now_ms - channel->guessed_at < CHANNEL_COMPLAINT_MS;
+#else
+    RTS_UNUSED(channel);
+    RTS_UNUSED(now_ms);
+    return false;
+#endif
 }
 
 /* A block received before: its acknowledgement was lost, and perhaps the reply too. */
@@ -611,11 +642,11 @@ static void handle_gap(CHANNEL *channel, RTS_UI32 ahead)
     }
 }
 
-/* On a network a message with a wrong CRC comes from one who knows or guesses the id. If it was one block, the client's
- * own is taken in its place. */
+/* A message with a wrong CRC may come from one that knows or guesses the id. If it was one block, the client's own is
+ * taken in its place. */
 static void drop_message(CHANNEL *channel, bool is_one_block, RTS_UI32 now_ms)
 {
-    note_guess(now_ms);
+    note_guess(&channel->peer, now_ms);
     if (is_one_block)
         channel->rx.block--;
 }
@@ -635,9 +666,9 @@ static void handle_data(COMM_CLIENT *client, const CHANNEL_DATA *data, RTS_UI32 
         handle_duplicate(client, now_ms);
     else
         handle_gap(channel, ahead);
-    if (COMM_ENDPOINTS && result == ERR_CHS_CHECKSUM)
+    if (result == ERR_CHS_CHECKSUM && may_be_another(&channel->peer))
         drop_message(channel, is_first, now_ms);
-    else if (result != ERR_OK && !is_guessing(now_ms))
+    else if (result != ERR_OK && !is_guessing(channel, now_ms))
         close_channel(client, result);
 }
 
@@ -646,7 +677,6 @@ static void handle_data(COMM_CLIENT *client, const CHANNEL_DATA *data, RTS_UI32 
 /* Informs a peer that its channel does not exist (any more), so that it need not wait for a time-out. */
 static void complain(const ROUTER_PEER *peer, RTS_UI16 id, RTS_UI32 now_ms)
 {
-    note_guess(now_ms);
     if (now_ms - server.complained_at < CHANNEL_COMPLAINT_MS)
         return;
     server.complained_at = now_ms;
@@ -654,11 +684,14 @@ static void complain(const ROUTER_PEER *peer, RTS_UI16 id, RTS_UI32 now_ms)
 }
 
 /* The client of an open channel, for the peer that opened it; else NULL. */
-static COMM_CLIENT *find_owner(const ROUTER_PEER *peer, RTS_UI16 id)
+static COMM_CLIENT *find_owner(const ROUTER_PEER *peer, RTS_UI16 id, RTS_UI32 now_ms)
 {
     COMM_CLIENT *client = id != 0 ? find_client(id) : NULL;
 
-    return client != NULL && RouterIsSamePeer(peer, &client->channel.peer) ? client : NULL;
+    if (client != NULL && RouterIsSamePeer(peer, &client->channel.peer))
+        return client;
+    note_guess(peer, now_ms);
+    return NULL;
 }
 
 /* Some clients leave out the direction of their keepalives. */
@@ -684,7 +717,7 @@ static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data,
         COMM_COUNT(counters.malformed);
         return;
     }
-    COMM_CLIENT *client = find_owner(peer, BytesGet16(head->id));
+    COMM_CLIENT *client = find_owner(peer, BytesGet16(head->id), now_ms);
     if (client == NULL) {
         complain(peer, BytesGet16(head->id), now_ms);
         return;
@@ -705,10 +738,8 @@ static void handle_close(const ROUTER_PEER *peer, const CHANNEL_CLOSE *close, RT
         COMM_COUNT(counters.malformed);
         return;
     }
-    COMM_CLIENT *client = find_owner(peer, BytesGet16(close->id));
-    if (client == NULL)
-        note_guess(now_ms);
-    else if (!is_guessing(now_ms))
+    COMM_CLIENT *client = find_owner(peer, BytesGet16(close->id), now_ms);
+    if (client != NULL && !is_guessing(&client->channel, now_ms))
         forget_channel(client);
 }
 
@@ -819,8 +850,6 @@ static void reset_all(void)
 {
     CMP_CLEAR(clients);
     CMP_CLEAR(server);
-    if (COMM_ENDPOINTS)
-        server.guessed_at = SysTimeGetMs() - CHANNEL_COMPLAINT_MS;
     if (COMM_COUNTERS)
         CMP_CLEAR(counters);
 }
