@@ -52,6 +52,7 @@ class FakeLine:
         self.long_packet = simplecom.LONG_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
         self.point_to_point = False
+        self.heard_at = -math.inf
         self.peer_words = 1
         self.places = NO_PLACES
         self.rate = baud / BITS_PER_BYTE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 import secrets
 from collections.abc import Iterator
@@ -255,6 +256,48 @@ def test_a_bus_full_of_foreign_frames_does_not_hold_the_tool() -> None:
     begun = bus.now()
     assert tool.receive(0.1) is None
     assert bus.now() - begun < 1.0
+
+
+class LonelyBus(FullBus):
+    """A bus where time passes as one waits, and a frame now and then when there is one in `frames_in`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.time = 0.0
+        self.frames_in: list[can.Message] = []
+
+    def receive(self, timeout: float) -> can.Message | None:  # type: ignore[override]
+        if self.frames_in:
+            return self.frames_in.pop()
+        self.time += timeout
+        return None
+
+    def now(self) -> float:
+        return self.time
+
+
+def packet_to(tool: CanTransport, node: int) -> bytes:
+    return router.encode(router.Packet(int(lib.ROUTER_SVC_CHANNEL), bytes([0, node]), tool.local_address, bytes(100)))
+
+
+def test_a_device_that_sends_no_flow_control_is_waited_for_once_and_not_before_each_packet() -> None:
+    bus = LonelyBus()
+    tool = CanTransport("lonely", bus, 5)
+    begun = bus.now()
+    for _ in range(8):
+        tool.send(packet_to(tool, 5))
+    assert 0.9 < bus.now() - begun < 1.3
+
+
+def test_flow_control_shows_that_the_device_is_there() -> None:
+    bus = LonelyBus()
+    tool = CanTransport("lonely", bus, 5)
+    assert tool.heard_at == -math.inf
+    tool.send(packet_to(tool, 5))
+    identifier = lib.CAN_ID_BASE | tool.local_address[-1] << lib.CAN_TARGET_SHIFT | 5
+    bus.frames_in = [can.Message(arbitration_id=identifier, is_extended_id=True, data=b"\x31\0\0")]
+    assert tool.receive(0.1) is None
+    assert tool.heard_at > 0
 
 
 def test_an_interface_that_needs_more_than_a_channel_is_an_error() -> None:

@@ -445,6 +445,78 @@ def test_a_cut_line_is_noticed() -> None:
     assert 3.99 < line.now() - begin < 6
 
 
+@pytest.mark.parametrize("words", [0, 1])
+def test_a_device_that_is_gone_is_reported_within_about_five_seconds(words: int) -> None:
+    """With the look whether it has been started again, or another one is there."""
+    line = FakeLine(FakeDevice(reverse))
+    line.peer_words = words
+    connection = connect(line)
+    line.cut = True
+    begin = line.now()
+    with pytest.raises(ChannelLost):
+        connection.exchange(b"anybody?")
+    with pytest.raises(ChannelLost) as caught:
+        connection.open()
+    assert caught.value.code == "no-answer"
+    assert line.now() - begin < 5.5
+
+
+def test_a_device_that_is_back_is_found_again_and_waited_for_as_before() -> None:
+    line = FakeLine(FakeDevice(reverse))
+    connection = connect(line)
+    line.cut = True
+    with pytest.raises(ChannelLost):
+        connection.exchange(b"anybody?")
+    line.cut = False
+    connection.open()
+    assert connection.exchange(b"ab") == b"ba"
+    line.cut = True
+    begin = line.now()
+    with pytest.raises(ChannelLost):
+        connection.open()
+    assert line.now() - begin > 4.0  # it was heard before, so this may be a bad line
+
+
+def test_on_a_slow_line_the_time_of_a_block_and_its_reply_is_no_silence() -> None:
+    line = FakeLine(FakeDevice(reverse), baud=600)  # a block takes 8 s
+    assert connect(line).exchange(pattern(3000)) == pattern(3000)[::-1]
+
+
+class Stopped(FakeLine):
+    """The process of the tool stands still for 10 s after each packet; the line does not."""
+
+    def send(self, *packets: bytes) -> None:
+        super().send(*packets)
+        end = self.now() + 10.0
+        while self._advance(end):
+            pass
+
+
+def test_a_tool_that_stood_still_looks_at_what_has_arrived_before_it_gives_up() -> None:
+    assert connect(Stopped(FakeDevice(reverse))).exchange(b"ab") == b"ba"
+
+
+class Hearing(FakeLine):
+    """The line notices that the device is there, for 6 s."""
+
+    @property
+    def heard_at(self) -> float:
+        return min(self.now(), 6.0)
+
+    @heard_at.setter
+    def heard_at(self, _: float) -> None:
+        pass
+
+
+def test_a_device_that_only_the_line_hears_is_not_given_up() -> None:
+    line = Hearing(FakeDevice(reverse))
+    connection = connect(line)
+    line.cut = True
+    with pytest.raises(ChannelLost):
+        connection.exchange(b"anybody?", patience=4.0)
+    assert 7.9 < line.now() < 11.0  # twice the patience at most: nothing gets on
+
+
 def test_an_unplugged_adapter_is_noticed_at_once() -> None:
     line = FakeLine(FakeDevice(reverse))
     connection = connect(line)

@@ -577,7 +577,7 @@ def test_a_line_that_comes_back_is_waited_for_and_one_that_does_not_is_an_error(
         if outages and done > outages[0]:
             outages.pop()
             bench.line.cut = True
-            bench.line.after(15.0, lambda: setattr(bench.line, "cut", False))
+            bench.line.after(8.0, lambda: setattr(bench.line, "cut", False))
 
     services.download(bench.session, image, progress=cut)
     assert bench.plc.image == image
@@ -586,6 +586,17 @@ def test_a_line_that_comes_back_is_waited_for_and_one_that_does_not_is_an_error(
     bench = Bench(buffer_size=2048)
     with pytest.raises(LinkError):
         services.download(bench.session, image, progress=lambda done: setattr(bench.line, "cut", done > 20_000))
+
+
+@pytest.mark.parametrize("action", [services.stop, services.start, services.cycle, lambda s: services.reset(s, 0)])
+def test_what_takes_long_is_not_waited_for_on_a_line_that_was_cut_before(action: Callable[[Session], None]) -> None:
+    bench = Bench()
+    services.read_status(bench.session)
+    bench.session.application()
+    bench.line.cut, begin = True, bench.line.now()
+    with pytest.raises(LinkError):
+        action(bench.session)
+    assert bench.line.now() - begin < 5.5
 
 
 def test_a_lost_verdict_is_asked_for_again() -> None:

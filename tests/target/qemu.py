@@ -88,6 +88,7 @@ class SocketSerial:
     long_packet = simplecom.LONG_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     point_to_point = False
+    heard_at = -math.inf
     peer_words = 1
     places = NO_PLACES
     byte_rate = math.inf

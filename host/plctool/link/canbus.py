@@ -14,7 +14,7 @@ import random
 import re
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from types import MappingProxyType
 from typing import Protocol
@@ -49,6 +49,7 @@ _MAX_WAITS = 10  # flow control frames in a row that say wait
 _QUEUE = 2  # packets to a node that wait to be sent
 _TICK = 0.02  # longest wait while a packet is on its way [s]
 _SEND_PATIENCE = 5.0  # for room on the bus [s]
+_UNHEARD = 1.0  # a device that has sent no frame for so long is not waited for before the next packet [s]
 _FULL_WAIT = 0.001  # before a full queue of the system is tried again [s]
 
 
@@ -241,6 +242,7 @@ class CanTransport:
         self.is_slow = True
         self.is_bus = True
         self.point_to_point = False
+        self.heard_at = -math.inf
         self.peer_words = 0
         self.node = node
         self._places: dict[bytes, str] = {}
@@ -286,21 +288,24 @@ class CanTransport:
 
     def close(self) -> None:
         with suppress(LinkError):
-            self._flush(list(self._nodes.values()), _FLUSH_TIME)
+            self._flush()
         self._bus.close()
 
     # ---- sending ----
 
     def _send_to(self, number: int, data: bytes) -> None:
         node = self._node(number)
-        self._flush([node], _SEND_PATIENCE, _QUEUE)
+        if not node.waiting:
+            node.sending_since = self.now()
+        while node.waiting > _QUEUE and self.now() < max(node.sending_since, self.heard_at) + _UNHEARD:
+            self._pump(_TICK)
         node.isotp.send(data)
         self._serve()
 
-    def _flush(self, nodes: Iterable[_Node], patience: float, waiting: int = 0) -> None:
-        """Waits until no more than `waiting` packets are on their way to each node."""
-        end = self.now() + patience
-        while any(node.waiting > waiting for node in nodes) and self.now() < end:
+    def _flush(self) -> None:
+        """Waits for a moment until no packet is on its way any more."""
+        end = self.now() + _FLUSH_TIME
+        while any(node.waiting for node in self._nodes.values()) and self.now() < end:
             self._pump(_TICK)
 
     def _ask(self, payload: bytes) -> None:
@@ -360,6 +365,7 @@ class CanTransport:
         if source == self._address:
             self._notice(message.data)
         elif target == self._address and source < _FIRST_TOOL:
+            self.heard_at = self.now()
             node = self._node(source)
             node.inbox.append(message)
             self._packets.extend(node.serve())
@@ -436,6 +442,7 @@ class _Node:
 
     def __init__(self, number: int, base: int, own: int, fd: bool, send: Callable[[isotp.CanMessage], None]) -> None:
         self.number = number
+        self.sending_since = -math.inf
         self.inbox: deque[can.Message] = deque()
         address = isotp.Address(
             isotp.AddressingMode.Normal_29bits,

@@ -227,9 +227,11 @@ class Channel:
         """When `next_package` has to be asked again even if nothing arrives."""
         return min(self._timer, self._ready_at()) if self._has_block() else self._timer
 
-    def give_up_at(self, patience: float) -> float:
-        """When to give up: after `patience` seconds of silence, or much longer without progress."""
-        return min(self._heard + patience, self._progress + _NO_PROGRESS * patience)
+    def give_up_at(self, patience: float, heard_at: float = -math.inf) -> float:
+        """When to give up: after `patience` seconds of silence, or much longer without progress. On a slow line there
+        is time for a package and its reply on top. `heard_at`: when the line has heard the device."""
+        patience += self._round_trip.floor
+        return min(max(self._heard, heard_at) + patience, self._progress + _NO_PROGRESS * patience)
 
     def next_package(self, now: float) -> bytes | None:
         """The next package to send now; None when there is none until something arrives or `deadline` is reached."""

@@ -15,8 +15,9 @@ from plctool.link import names, router
 from plctool.link.channel import MAX_REQUESTS, MAX_SHARING, Channel, ChannelLost, Line, State
 from plctool.link.transport import BlockTransport
 
-PATIENCE = 8.0  # default time of silence after which a channel counts as lost [s]
+PATIENCE = 3.5  # default time of silence after which a channel counts as lost; most devices erase flash in less [s]
 _OPEN_PATIENCE = 5.0
+_AGAIN_PATIENCE = 1.5  # the same for a device that has been silent for too long just before [s]
 _BUSY_PATIENCE = 1.5  # in less a device notices that a tool has vanished which held a channel [s]
 _BUSY_PAUSE = 0.25  # between two requests for a channel [s]
 _AT_ONCE = 16  # packages sent before the next look at the input
@@ -117,6 +118,7 @@ class Connection:
         self._choice = choice
         self._peer: bytes | None = None
         self._channel: Channel | None = None
+        self._silent = False  # it was given up, and has not been heard since
 
     def __enter__(self) -> Connection:
         return self
@@ -153,7 +155,10 @@ class Connection:
 
     def open(self) -> None:
         """Opens a new channel. The first time it asks for the device's address before, unless there is one device
-        only, whose response has it. Raises LinkError if no device answers."""
+        only, whose response has it. The same if the device was silent before: there may be another one by now. Raises
+        LinkError if no device answers."""
+        if self._silent:
+            self._peer = None
         if self._peer is None and (self._choice is not None or not self.transport.peer_words):
             self._peer = self._find(self._choice).address
         peer = self._peer or bytes(2 * self.transport.peer_words)
@@ -169,18 +174,22 @@ class Connection:
         end = self.transport.now() + _BUSY_PATIENCE
         while (channel := self._open_channel(line, words, last=self.transport.now() >= end)) is None:
             self.wait(_BUSY_PAUSE)
-        self._channel = channel
+        self._channel, self._silent = channel, False
+
+    @property
+    def _open_patience(self) -> float:
+        again = _AGAIN_PATIENCE + 2 * self.transport.max_packet / self.transport.byte_rate
+        return min(again, _OPEN_PATIENCE) if self._silent else _OPEN_PATIENCE
 
     def _open_channel(self, line: Line, words: int, *, last: bool) -> Channel | None:
         """None if all channels of the device are in use and this is not the last time that it is asked."""
         channel = Channel(line, words, secrets.randbits(32))
         channel.open(self.transport.now())
         try:
-            self._run(channel, lambda: channel.state is State.OPEN, _OPEN_PATIENCE)
+            self._run(channel, lambda: channel.state is State.OPEN, self._open_patience)
         except ChannelLost:
             if self._peer is None:
                 raise no_answer(self.name) from None
-            self._peer = None  # there may be another device by now
             raise
         except LinkError as error:
             if last or error.code != "busy":
@@ -191,7 +200,7 @@ class Connection:
     def _find(self, choice: Choice | None) -> names.Node:
         """The device that is meant. Raises LinkError when it does not reply, or there are several."""
         if choice is None or choice.number is not None:
-            found = self.scan(_OPEN_PATIENCE, enough=1)
+            found = self.scan(self._open_patience, enough=1)
             if not found:
                 raise no_answer(self.name)
             return found[0]
@@ -206,7 +215,7 @@ class Connection:
     def _find_fitting(self, choice: Choice) -> list[names.Node]:
         """The devices that reply within the time that all need, or longer until one of them is meant."""
         found: dict[bytes, names.Node] = {}
-        end = self.now() + _OPEN_PATIENCE
+        end = self.now() + self._open_patience
         while self.now() < end and not any(map(choice.fits, found.values())):
             found |= {node.address: node for node in self.scan(_ALL_REPLIED)}
         return list(found.values())
@@ -309,17 +318,21 @@ class Connection:
             raise
 
     def _move(self, channel: Channel, patience: float) -> None:
-        """Sends some packages, and takes one or waits for it."""
+        """Sends some packages, and takes one or waits for it. What has arrived is taken before the device is given up:
+        this process may have had to wait, too."""
         sent = self._send_some(channel)
-        now = self.transport.now()
-        give_up = channel.give_up_at(patience)
-        if now >= give_up:
-            raise ChannelLost(f"The device on {self.name} does not answer any more; check the line.", "timeout")
-        packet = self._receive(0.0 if sent else max(0.0, min(channel.deadline(), give_up) - now))
+        wake_at = min(channel.deadline(), self._give_up_at(channel, patience))
+        packet = self._receive(0.0 if sent else max(0.0, wake_at - self.transport.now()))
         if packet and packet.service == lib.ROUTER_SVC_CHANNEL and self._is_from_peer(packet):
             channel.receive(packet.payload, self.transport.now())
             if self._peer is None and channel.state is State.OPEN:
                 self._peer = packet.sender
+        if self.transport.now() >= self._give_up_at(channel, patience):
+            self._silent = True
+            raise ChannelLost(f"The device on {self.name} does not answer any more; check the line.", "timeout")
+
+    def _give_up_at(self, channel: Channel, patience: float) -> float:
+        return channel.give_up_at(patience, self.transport.heard_at)
 
     def _send_some(self, channel: Channel) -> bool:
         """Sends the packages that are due, up to _AT_ONCE. False if there were none."""

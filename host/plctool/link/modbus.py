@@ -297,6 +297,7 @@ class ModbusTransport:
         self.is_slow = bus.byte_rate < math.inf
         self.is_bus = False  # each request has its reply
         self.point_to_point = False
+        self.heard_at = -math.inf
         self.peer_words = 1
         self.places = NO_PLACES
         self._bus = bus
@@ -365,7 +366,7 @@ class ModbusTransport:
         head, data = _REPLY.unpack(reply), reply[_REPLY.size :]
         left = self._request[_REQUEST.size + head.taken :]
         if data or head.taken:
-            self._moved_at = self.now()
+            self._moved_at = self.heard_at = self.now()
         self._sequence, self._request = head.sequence, b""
         self._out[:0] = left
         self._packets.extend(self._decoder.feed(data))

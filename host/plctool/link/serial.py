@@ -31,6 +31,7 @@ class SerialTransport:
         self.long_packet = simplecom.LONG_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
         self.point_to_point = False
+        self.heard_at = -math.inf
         self.peer_words = 1
         self.places = NO_PLACES
         real = is_real_line(url) if paced is None else paced

@@ -25,7 +25,7 @@ from plctool.link.session import Request, Session
 from plctool.link.wire import Layout, signed32
 
 _SLOW = 30.0  # patience for what may erase flash or run initialisation code [s]
-_TRANSFER_PATIENCE = 10.0  # longer than flash takes to erase a sector [s]
+_TRANSFER_PATIENCE = 5.0  # longer than flash takes to erase a sector [s]
 _DOWNLOAD_TRIES = 4  # without any progress
 
 _IDENT = Layout("DEV_IDENT")
@@ -239,7 +239,7 @@ def app_state(state: int, operating: int) -> AppState:
 def start(session: Session) -> None:
     """Starts the application. Not again when no reply came and it is stopped with an exception: a controller that went
     down with it, and came back, would start the previous one."""
-    read_status(session)  # a channel that was lost before is opened again here
+    _look(session)
     start_checked(session)
 
 
@@ -259,12 +259,20 @@ def start_checked(session: Session) -> Status:
     return read_status(session)
 
 
+def _look(session: Session) -> None:
+    """Before what is waited for longer: a channel that was lost is opened again here, and a device that is gone is
+    noticed."""
+    read_status(session)
+
+
 def stop(session: Session) -> None:
+    _look(session)
     _check_control(session.recover(partial(_control, session, lib.SRV_APP_STOP)), "stop")
 
 
 def cycle(session: Session) -> None:
     """Runs one cycle of each task of an application that is stopped. Not again when no reply came: it may have run."""
+    _look(session)
     try:
         reply = session.recover(partial(_control, session, lib.SRV_APP_SINGLE_CYCLE), repeatable=False)
     except DeviceError as error:
@@ -280,6 +288,7 @@ def cycle(session: Session) -> None:
 
 def reset(session: Session, option: int) -> None:
     """`option` is RESET_OPTION_*; origin deletes the application."""
+    _look(session)
     which = bintag.u32(lib.TAG_APP_OPTION, option)
     _check_control(session.recover(partial(_control, session, lib.SRV_APP_RESET, which)), "reset")
     session.forget_application()

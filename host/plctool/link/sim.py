@@ -23,6 +23,7 @@ class SimTransport:
     is_slow = False
     is_bus = False
     point_to_point = False
+    heard_at = -math.inf
     peer_words = 0
     places = NO_PLACES
 

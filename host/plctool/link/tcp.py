@@ -35,6 +35,7 @@ class TcpTransport:
         self.is_slow = False
         self.is_bus = False
         self.point_to_point = True  # with NAT the device knows this end by another address
+        self.heard_at = -math.inf
         self.peer_words = 0
         self.places = NO_PLACES
         self._place = network.find_host(host), port or int(lib.TCP_PORT)

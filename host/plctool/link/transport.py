@@ -25,6 +25,7 @@ class BlockTransport(Protocol):
     is_slow: bool  # it pays to pack what is sent
     is_bus: bool  # what the device sends takes the time of what is sent to it
     point_to_point: bool  # every packet is from the one device to this end, whatever its addresses
+    heard_at: float  # when the line last heard the device, other than by whole packets; -math.inf: it does not know
     peer_words: int  # length of the address of the one device on the line; 0: not known, or there may be several
     places: Mapping[bytes, str]  # of the devices that replied on a link to several, by router address
 

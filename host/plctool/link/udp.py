@@ -39,6 +39,7 @@ class UdpTransport:
         self.is_slow = False
         self.is_bus = False
         self.point_to_point = False
+        self.heard_at = -math.inf
         self.peer_words = 0
         self._places: dict[bytes, str] = {}
         self.places: Mapping[bytes, str] = MappingProxyType(self._places)

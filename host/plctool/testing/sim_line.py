@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 from plctool.core import ffi, lib
@@ -23,6 +24,7 @@ class SimSerial:
     long_packet = simplecom.LONG_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     point_to_point = False
+    heard_at = -math.inf
     peer_words = 1
     places = NO_PLACES
     is_slow = True
