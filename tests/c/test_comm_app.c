@@ -190,6 +190,17 @@ static void wrong_application_session_changes_nothing(void)
     CHECK_EQUAL(fakes.starts + fakes.stops + fakes.resets, 0);
 }
 
+/* Of a client that has not logged in to the application, the number of its session is 0. */
+static void session_0_is_that_of_no_application(void)
+{
+    setup();
+    SrvEndAppSession(ChannelGetClient(0));
+    put_descriptor(0, NULL);
+    CHECK(call(SRV_APP_START));
+    CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_APP_INVALID_SESSIONID);
+    CHECK_EQUAL(fakes.starts, 0);
+}
+
 static void reset_passes_its_option(void)
 {
     setup();
@@ -426,6 +437,7 @@ int main(void)
     RUN(start_and_stop_reach_the_application);
     RUN(refusal_of_the_application_is_the_result);
     RUN(wrong_application_session_changes_nothing);
+    RUN(session_0_is_that_of_no_application);
     RUN(reset_passes_its_option);
     RUN(status_needs_no_login_and_tells_state_and_image);
     RUN(status_tells_where_the_exception_was);

@@ -117,6 +117,33 @@ static void channel_ids_are_valid_and_change(void)
     }
 }
 
+/* From the same id: what comes next is of the entropy alone. */
+static void a_channel_id_does_not_follow_from_the_one_before(void)
+{
+    RTS_UI16 ids[64];
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(ids); i++) {
+        fakes_start();
+        fakes.random = i * 0x9E3779B9u;
+        client_init(&client, 0x0102);
+        CHECK(client_open(&client));
+        ids[i] = client.channel;
+        for (RTS_UI32 k = 0; k < i; k++)
+            CHECK(ids[k] != ids[i]);
+    }
+}
+
+static void id_zero_is_that_of_no_channel_not_even_of_the_last_one(void)
+{
+    setup();
+    client_send_close(&client);
+    client.channel = 0;
+    client_send_block(&client, 1, FIRST, message, echo_message(4), 0, 16);
+    CHECK(is_close(ERR_CHS_CHINVALID));
+    CHECK_EQUAL(counters()->foreign, 1);
+    CHECK(is_silent());
+}
+
 static void repeated_open_request_gets_the_same_channel(void)
 {
     CLIENT again;
@@ -286,6 +313,8 @@ int main(void)
     RUN(buffer_too_small_for_any_reply_opens_nothing);
     RUN(meta_packages_with_wrong_crc_version_or_length_are_dropped);
     RUN(channel_ids_are_valid_and_change);
+    RUN(a_channel_id_does_not_follow_from_the_one_before);
+    RUN(id_zero_is_that_of_no_channel_not_even_of_the_last_one);
     RUN(repeated_open_request_gets_the_same_channel);
     RUN(same_request_id_after_traffic_is_a_new_client);
     RUN(new_open_from_the_same_peer_replaces_its_channel);

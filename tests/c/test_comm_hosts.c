@@ -346,6 +346,24 @@ static void a_tool_whose_new_channel_was_taken_opens_again(void)
     CHECK(!client_open(&second->client)); /* busy: it waits, and says so */
 }
 
+/* A reply would reach many nodes, or none. */
+static void what_says_it_is_of_no_single_machine_is_not_answered(void)
+{
+    static const SOCKADDRESS nobody[] = {{0xFFFFFFFF, 1740}, {0xE0000001, 1740}, {0xEFFFFFFF, 1740},
+                                         {0xF0000001, 1740}, {0, 1740},          {OTHER_IP, 0}};
+    TOOL tool;
+
+    start();
+    place_tool(&tool, OTHER_IP, 0);
+    CHECK(client_open(&tool.client));
+    for (RTS_UI32 i = 0; i < RTS_COUNT(nobody); i++) {
+        tool.at = nobody[i];
+        client_send_open(&tool.client, 8 + i, NETSERVER_MESSAGE_SIZE);
+    }
+    CHECK_EQUAL(net.out_count, 0);
+    CHECK_EQUAL(ChannelGetCounters()->opened, 1);
+}
+
 /* ---- connections ---- */
 
 static RTS_UI32 dial(RTS_UI32 ip)
@@ -380,6 +398,7 @@ int main(void)
     RUN(tools_on_the_machine_of_the_device_may_have_all_channels);
     RUN(what_is_on_a_serial_line_leaves_a_channel_to_others);
     RUN(a_tool_whose_new_channel_was_taken_opens_again);
+    RUN(what_says_it_is_of_no_single_machine_is_not_answered);
     RUN(connections_of_one_machine_displace_its_own);
     return test_result();
 }

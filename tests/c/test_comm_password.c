@@ -137,6 +137,20 @@ static void a_proof_is_good_once(void)
     CHECK_EQUAL(password_answer(&other, &proof), ERR_NO_ACCESS_RIGHTS);
 }
 
+/* The session lasts, and so does what it knows of the challenge. */
+static void a_proof_is_good_once_in_one_session(void)
+{
+    DEV_CHALLENGE challenge;
+
+    setup();
+    CHECK(client_request(&client, SG_DEVICE, SRV_DEV_SESSION_CREATE, NULL, 0, &reply));
+    client.session = reply_number(&reply, TAG_DEV_SESSION_ID);
+    CHECK_EQUAL(password_ask(&client, &challenge), ERR_PENDING);
+    DEV_PROOF proof = password_proof(right, &challenge);
+    CHECK_EQUAL(password_answer(&client, &proof), ERR_OK);
+    CHECK_EQUAL(password_answer(&client, &proof), ERR_NO_ACCESS_RIGHTS);
+}
+
 static void a_proof_for_one_channel_is_none_for_another(void)
 {
     DEV_CHALLENGE challenge;
@@ -313,6 +327,7 @@ int main(void)
     RUN(a_session_says_which_login_is_needed);
     RUN(a_login_keeps_the_session_that_was_created);
     RUN(a_proof_is_good_once);
+    RUN(a_proof_is_good_once_in_one_session);
     RUN(a_proof_for_one_channel_is_none_for_another);
     RUN(a_new_challenge_replaces_the_one_before);
     RUN(a_challenge_ends_with_its_channel);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpChannelServerEmbedded.h"
 #include "CmpSrv.h"
 #include "comm_client.h"
 #include "comm_fakes.h"
@@ -97,6 +98,15 @@ static void the_state_has_its_exception(void)
     fakes.status.state = AS_STOP;
     fakes.status.exception.code = 0x101;
     CHECK(strcmp(ask("getprgstat"), "stop\r\nexception 0x00000101\r\n") == 0);
+}
+
+static void commands_that_change_something_need_the_right_to(void)
+{
+    setup();
+    ChannelGetClient(0)->session.rights = RIGHT_VIEW;
+    CHECK(strcmp(ask("startprg"), "You may not do this.\r\n") == 0);
+    CHECK(strcmp(ask("applist"), "Application\r\n") == 0);
+    CHECK_EQUAL(fakes.starts, 0);
 }
 
 static void commands_that_change_something_do_it_once(void)
@@ -211,6 +221,7 @@ int main(void)
     RUN(an_unknown_command_says_where_the_list_is);
     RUN(without_application_it_says_so);
     RUN(the_state_has_its_exception);
+    RUN(commands_that_change_something_need_the_right_to);
     RUN(commands_that_change_something_do_it_once);
     RUN(an_error_is_said);
     RUN(it_needs_a_login);

@@ -3,12 +3,15 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#include "FileStore.h"
 #include "SysFileFlash.h"
+#include "SysFlashLog.h"
 #include "app_image.h"
 #include "files_client.h"
 #include "tag_sweep.h"
 #include "test.h"
 
+enum { CATALOG_TAG = 0x454C4946 }; /* FileStore.c's own */
 enum { SECTOR = 1024, STORE = 16 * SECTOR, MOST = 14 * SECTOR };
 
 static RTS_UI8 pattern[64 * 1024];
@@ -218,6 +221,24 @@ static void past_the_end_there_is_nothing(void)
     CHECK_EQUAL(end_file(SRV_FILE_END, handle), ERR_OK);
     CHECK_EQUAL(get_part(handle, 0, got, &count), ERR_INVALID_HANDLE);
     CHECK_EQUAL(get_part(0, 0, got, &count), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(get_begin("PlcLog.txt", &handle), ERR_OK);
+    CHECK_EQUAL(get_part(handle, number_in(TAG_FILE_STARTED, TAG_FILE_CONTENT) + 100000, got, &count),
+                ERR_OUT_OF_LIMITS);
+}
+
+static void a_handle_that_is_another_one_changes_nothing(void)
+{
+    RTS_UI32 handle;
+
+    setup();
+    CHECK_EQUAL(put_begin("a", pattern, 40, &handle), ERR_OK);
+    CHECK_EQUAL(put_part(handle ^ 1, 0, pattern, 40), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(put_part(0, 0, pattern, 40), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(end_file(SRV_FILE_CANCEL, handle ^ 1), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(put_part(handle, 0, pattern, 40), ERR_OK);
+    CHECK_EQUAL(end_file(SRV_FILE_END, handle ^ 1), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(end_file(SRV_FILE_END, handle), ERR_OK);
+    CHECK(has("a", pattern, 40));
 }
 
 static void a_file_that_is_not_what_was_said_is_not_taken(void)
@@ -323,6 +344,34 @@ static void a_catalog_of_garbage_is_an_empty_store(void)
     CHECK(has("a", pattern, 40));
 }
 
+/* Of a device that was tampered with: the record is whole, what it says cannot be. */
+static void entries_of_a_catalog_that_cannot_be_are_left_out(void)
+{
+    static const FILE_ENTRY bad[] = {
+        {"../up", 0, 40, 0},          {"", 0, 40, 0},
+        {"a", 0, STORE + 1, 0},       {"a", STORE, 1, 0},
+        {"a", 0xFFFFFC00, 2048, 0},   {"a", 0, 0xFFFFFFFF, 0},
+        {"a", SECTOR / 2, SECTOR, 0}, {"12345678901234567890123456789012345", 0, 40, 0},
+    };
+    struct {
+        FILE_ENTRY file[FILE_STORE_FILES];
+    } catalog;
+    FLASH_LOG log;
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(bad); i++) {
+        setup();
+        CHECK_EQUAL(put("b", pattern, 40), ERR_OK);
+        CHECK_EQUAL(FlashLogOpen(&log, FILE_CATALOG), ERR_OK);
+        CHECK_EQUAL(FlashLogReadNewest(&log, CATALOG_TAG, &catalog, sizeof(catalog)), ERR_OK);
+        catalog.file[1] = bad[i];
+        CHECK_EQUAL(FlashLogAppend(&log, CATALOG_TAG, &catalog, sizeof(catalog)), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK(reconnect());
+        CHECK(FileStoreGet(0) != NULL && FileStoreGet(1) == NULL);
+        CHECK(has("b", pattern, 40));
+    }
+}
+
 /* ---- power cuts ---- */
 
 static RTS_UI32 story_result;
@@ -387,6 +436,7 @@ int main(void)
     RUN(a_folder_that_is_none_is_refused);
     RUN(a_file_that_changes_while_it_is_read_is_an_error);
     RUN(past_the_end_there_is_nothing);
+    RUN(a_handle_that_is_another_one_changes_nothing);
     RUN(a_file_that_is_not_what_was_said_is_not_taken);
     RUN(a_part_that_comes_twice_counts_once);
     RUN(a_client_that_vanishes_leaves_the_previous_file);
@@ -394,6 +444,7 @@ int main(void)
     RUN(the_program_and_the_log_are_files);
     RUN(a_device_without_store_has_the_program_and_the_log);
     RUN(a_catalog_of_garbage_is_an_empty_store);
+    RUN(entries_of_a_catalog_that_cannot_be_are_left_out);
     RUN(every_service_survives_every_tag_of_every_size);
     RUN(a_power_cut_leaves_the_previous_file_or_the_new_one);
     return test_result();
