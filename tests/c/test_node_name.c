@@ -70,6 +70,9 @@ static void the_longest_name_has_49_characters_of_ascii(void)
     CHECK_EQUAL(give("M\xFCller", 6), ERR_PARAMETER);
     CHECK_EQUAL(give("a\nb", 3), ERR_PARAMETER);
     CHECK_EQUAL(give("a\x7F", 2), ERR_PARAMETER);
+    CHECK(client_request(&client, SG_DEVICE, SRV_DEV_SET_NODE_NAME, (const RTS_UI8 *)"\x58\x04\x41\x01\x00\x00", 6,
+                         &reply)); /* U+0141, of which the lower byte is a letter */
+    CHECK_EQUAL(number_in(0, TAG_SERVICE_RESULT), ERR_PARAMETER);
     CHECK(is_called(longest));
 }
 
