@@ -341,6 +341,24 @@ static void a_scan_of_all_or_of_one_is_answered(void)
     can_end();
 }
 
+static void a_scan_that_is_cut_is_not_answered(void)
+{
+    const RTS_UI8 cut[sizeof(CAN_SCAN)] = {CAN_FRAME_SCAN};
+
+    can_start(250 * KBIT, 0);
+    CAN_TOOL *tool = can_tool(222);
+    scan(tool, CAN_TO_ALL, 0, 1); /* what is left of it in the device would make the next one whole */
+    can_pass(100);
+    CHECK(is_reply(can_take(tool, packet, sizeof(packet)), 1));
+    for (RTS_UI8 size = 1; size < sizeof(cut); size++) {
+        can_frame(tool, CAN_TO_ALL, cut, size);
+        can_pass(100);
+        CHECK_EQUAL(can_take(tool, packet, sizeof(packet)), 0);
+    }
+    CHECK_EQUAL(BlkDrvCanGetCounters()->scans, 1);
+    can_end();
+}
+
 static void the_answer_comes_at_a_random_moment_of_the_window(void)
 {
     enum { WINDOW = 20, RUNS = 40 };
@@ -556,6 +574,7 @@ int main(void)
     RUN(tools_that_have_vanished_give_way_in_less_than_a_second);
     RUN(a_tool_that_is_many_leaves_a_channel_to_others);
     RUN(a_scan_of_all_or_of_one_is_answered);
+    RUN(a_scan_that_is_cut_is_not_answered);
     RUN(the_answer_comes_at_a_random_moment_of_the_window);
     RUN(scans_of_two_tools_are_both_answered);
     RUN(frames_of_others_are_left_alone);

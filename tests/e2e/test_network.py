@@ -18,7 +18,7 @@ import pytest
 
 import plctool
 from plctool.device import Plc
-from plctool.errors import LinkError, PlcError
+from plctool.errors import LinkError, PlcError, UsageError
 from plctool.link import services
 from plctool.link.connection import Connection
 from plctool.link.session import Session
@@ -50,6 +50,21 @@ def test_it_listens_on_the_loopback_address_unless_told_otherwise(plcrt: Plcrt, 
     assert _listens_on(plcrt.tcp) == {"127.0.0.1"}
     with Plcrt(tmp_path / "open.flash", "--tcp", "0.0.0.0:0") as told:
         assert _listens_on(told.tcp) == {"0.0.0.0"}
+
+
+@pytest.mark.parametrize("kind", ["tcp", "udp"])
+def test_without_a_place_it_is_the_loopback_address(kind: str, tmp_path: Path) -> None:
+    """At the ports of the protocol, which another program may have."""
+    running = Plcrt(tmp_path / "plc.flash", f"--{kind}")
+    try:
+        running.start()
+    except UsageError as error:
+        assert "in use" in str(error)
+        pytest.skip(str(error))
+    try:
+        assert getattr(running, kind).startswith("127.0.0.1:")
+    finally:
+        running.stop()
 
 
 def _listens_on(place: str) -> set[str]:
