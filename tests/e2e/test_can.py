@@ -305,7 +305,7 @@ def test_a_download_whose_frames_get_lost_arrives_whole(lossy: CanHub, tool: Any
 def test_a_bus_that_dies_during_a_download_leaves_the_previous_program(
     lossy: CanHub, tool: Any, counter: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("plctool.link.services._TRANSFER_PATIENCE", 1.0)
+    monkeypatch.setattr("plctool.link.services.ERASE_PATIENCE", 1.0)
     monkeypatch.setattr("plctool.link.connection._OPEN_PATIENCE", 2.0)  # the device waits 1 s for flow control
     image = big_program(tool, 4)
 

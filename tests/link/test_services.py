@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError
-from plctool.link import bintag, l7, monitoring, services
+from plctool.link import bintag, file_services, l7, monitoring, services
 from plctool.link.connection import Connection
 from plctool.link.monitoring import AreaRange, Write
 from plctool.link.services import AppException, AppState
@@ -588,15 +588,42 @@ def test_a_line_that_comes_back_is_waited_for_and_one_that_does_not_is_an_error(
         services.download(bench.session, image, progress=lambda done: setattr(bench.line, "cut", done > 20_000))
 
 
-@pytest.mark.parametrize("action", [services.stop, services.start, services.cycle, lambda s: services.reset(s, 0)])
-def test_what_takes_long_is_not_waited_for_on_a_line_that_was_cut_before(action: Callable[[Session], None]) -> None:
+def takes(action: Callable[[Session], object]) -> float:
+    """Seconds until an action fails on a line that was cut before."""
     bench = Bench()
     services.read_status(bench.session)
     bench.session.application()
     bench.line.cut, begin = True, bench.line.now()
     with pytest.raises(LinkError):
         action(bench.session)
-    assert bench.line.now() - begin < 5.5
+    return bench.line.now() - begin
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        services.start,
+        services.stop,
+        services.cycle,
+        lambda session: services.reset(session, 0),
+        lambda session: services.set_password(session, None),
+        lambda session: file_services.delete_file(session, "a"),
+    ],
+)
+def test_what_takes_long_is_not_waited_for_on_a_line_that_was_cut_before(action: Callable[[Session], object]) -> None:
+    assert takes(action) < 5.5
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        file_services.list_files,
+        lambda session: file_services.read_file(session, "a"),
+        lambda session: file_services.write_file(session, "a", b"1"),
+    ],
+)
+def test_files_are_not_waited_for_longer_than_flash_takes(action: Callable[[Session], object]) -> None:
+    assert takes(action) < 7.0
 
 
 def test_a_lost_verdict_is_asked_for_again() -> None:

@@ -16,6 +16,8 @@ from plctool.link.channel import MAX_REQUESTS, MAX_SHARING, Channel, ChannelLost
 from plctool.link.transport import BlockTransport
 
 PATIENCE = 3.5  # default time of silence after which a channel counts as lost; most devices erase flash in less [s]
+ERASE_PATIENCE = 5.0  # for what may erase a sector of flash [s]
+SLOW_PATIENCE = 30.0  # for what may erase much of it or run initialisation code [s]
 _OPEN_PATIENCE = 5.0
 _AGAIN_PATIENCE = 1.5  # the same for a device that has been silent for too long just before [s]
 _BUSY_PATIENCE = 1.5  # in less a device notices that a tool has vanished which held a channel [s]

@@ -6,12 +6,15 @@ import re
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 from plctool.core import lib
 from plctool.errors import DeviceError, UsageError
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
+from plctool.link.connection import ERASE_PATIENCE, SLOW_PATIENCE
+from plctool.link.services import look
 from plctool.link.session import Session
 from plctool.link.wire import Layout
 
@@ -21,7 +24,6 @@ SYMBOLS_NAME = "Application.sym.gz"
 _T = TypeVar("_T")
 _CONTENT = Layout("FILE_CONTENT")
 _POSITION = Layout("FILE_POSITION")
-_SLOW = 30.0  # patience for what may erase flash [s]
 _TRIES = 4  # of a file whose channel was lost, or that changed while it was read
 _BLOCK_OVERHEAD = 48  # layer 7 header and tags around a part, bytes
 _MOST_BYTES = 1 << 28  # of a file, whatever a device says
@@ -63,7 +65,8 @@ def list_files(session: Session) -> FileList:
     found: dict[str, DeviceFile] = {}
     start = 0
     while True:
-        tags = _recovered(session, lib.SRV_FILE_DIRECTORY, bintag.u32(lib.TAG_FILE_START, start))
+        position = bintag.u32(lib.TAG_FILE_START, start)
+        tags = session.recover(partial(_call, session, lib.SRV_FILE_DIRECTORY, position))
         _check(tags, "list of files")
         for batch in tags.containers(lib.TAG_FILE_LIST):
             for entry in batch.containers(lib.TAG_FILE_ENTRY):
@@ -123,12 +126,16 @@ def _write_once(session: Session, name: str, data: bytes, progress: Progress) ->
         position = _POSITION.pack(handle=handle, offset=offset)
         _check(_call(session, lib.SRV_FILE_DOWNLOAD, bintag.raw(lib.TAG_FILE_POSITION, position + part)), action)
         progress(offset + len(part), len(data))
-    _check(_call(session, lib.SRV_FILE_END, bintag.u32(lib.TAG_FILE_END, handle)), action)
+    end = bintag.u32(lib.TAG_FILE_END, handle)
+    _check(_call(session, lib.SRV_FILE_END, end, patience=SLOW_PATIENCE), action)
 
 
 def delete_file(session: Session, name: str) -> None:
     _check_name(name)
-    _check(_recovered(session, lib.SRV_FILE_DELETE, bintag.text(lib.TAG_FILE_NAME, name)), f"deleting of {name}")
+    look(session)
+    named = bintag.text(lib.TAG_FILE_NAME, name)
+    reply = session.recover(partial(_call, session, lib.SRV_FILE_DELETE, named, patience=SLOW_PATIENCE))
+    _check(reply, f"deleting of {name}")
 
 
 def _check_name(name: str) -> None:
@@ -151,13 +158,9 @@ def _again(session: Session, action: Callable[[], _T]) -> _T:
     raise AssertionError("the last try returns or raises")
 
 
-def _recovered(session: Session, service: int, *tags: bintag.Tag) -> bintag.Tags:
-    return session.recover(lambda: _call(session, service, *tags))
-
-
-def _call(session: Session, service: int, *tags: bintag.Tag) -> bintag.Tags:
+def _call(session: Session, service: int, *tags: bintag.Tag, patience: float = ERASE_PATIENCE) -> bintag.Tags:
     try:
-        return session.call(lib.SG_FILE_TRANSFER, service, tags, _SLOW)
+        return session.call(lib.SG_FILE_TRANSFER, service, tags, patience)
     except DeviceError as error:
         if error.result not in (lib.ERR_L7_UNKNOWNCMDGROUP, lib.ERR_L7_UNKNOWNCMD):
             raise

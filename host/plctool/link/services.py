@@ -18,14 +18,13 @@ from plctool.image.file import image_crc
 from plctool.link import bintag, l7
 from plctool.link.ahead import ahead
 from plctool.link.channel import ChannelLost
+from plctool.link.connection import ERASE_PATIENCE, SLOW_PATIENCE
 from plctool.link.names import version_text
 from plctool.link.packing import Packer
 from plctool.link.passwords import verifier_of
 from plctool.link.session import Request, Session
 from plctool.link.wire import Layout, signed32
 
-_SLOW = 30.0  # patience for what may erase flash or run initialisation code [s]
-_TRANSFER_PATIENCE = 5.0  # longer than flash takes to erase a sector [s]
 _DOWNLOAD_TRIES = 4  # without any progress
 
 _IDENT = Layout("DEV_IDENT")
@@ -181,9 +180,10 @@ def echo_request(data: bytes) -> Request:
 def set_password(session: Session, password: str | None) -> None:
     """Sets the password of the device, or removes it. Other logins end. Raises UsageError for a password that is too
     short or too long, DeviceError when the device does not take it, as one that has no passwords."""
+    look(session)
     tags = [bintag.raw(lib.TAG_USER_VERIFIER, verifier_of(password))]
     try:
-        call = partial(session.call, lib.SG_USERMGR, lib.SRV_USER_SET_CREDENTIALS, tags, _SLOW)
+        call = partial(session.call, lib.SG_USERMGR, lib.SRV_USER_SET_CREDENTIALS, tags, SLOW_PATIENCE)
         reply = session.recover(call, repeatable=False)
     except DeviceError as error:
         if error.result not in (lib.ERR_L7_UNKNOWNCMDGROUP, lib.ERR_L7_UNKNOWNCMD):
@@ -239,14 +239,14 @@ def app_state(state: int, operating: int) -> AppState:
 def start(session: Session) -> None:
     """Starts the application. Not again when no reply came and it is stopped with an exception: a controller that went
     down with it, and came back, would start the previous one."""
-    _look(session)
+    look(session)
     start_checked(session)
 
 
 def start_checked(session: Session) -> Status:
     """As `start`, on a channel that has just been used. Returns the status after it, which is asked for at once."""
     try:
-        started, status = session.call_each([_control_request(session, lib.SRV_APP_START), _READ_STATUS], _SLOW)
+        started, status = session.call_each([_control_request(session, lib.SRV_APP_START), _READ_STATUS], SLOW_PATIENCE)
         _check_control(started, "start")
         return _status_of(status)
     except ChannelLost:
@@ -259,20 +259,20 @@ def start_checked(session: Session) -> Status:
     return read_status(session)
 
 
-def _look(session: Session) -> None:
+def look(session: Session) -> None:
     """Before what is waited for longer: a channel that was lost is opened again here, and a device that is gone is
     noticed."""
     read_status(session)
 
 
 def stop(session: Session) -> None:
-    _look(session)
+    look(session)
     _check_control(session.recover(partial(_control, session, lib.SRV_APP_STOP)), "stop")
 
 
 def cycle(session: Session) -> None:
     """Runs one cycle of each task of an application that is stopped. Not again when no reply came: it may have run."""
-    _look(session)
+    look(session)
     try:
         reply = session.recover(partial(_control, session, lib.SRV_APP_SINGLE_CYCLE), repeatable=False)
     except DeviceError as error:
@@ -288,7 +288,7 @@ def cycle(session: Session) -> None:
 
 def reset(session: Session, option: int) -> None:
     """`option` is RESET_OPTION_*; origin deletes the application."""
-    _look(session)
+    look(session)
     which = bintag.u32(lib.TAG_APP_OPTION, option)
     _check_control(session.recover(partial(_control, session, lib.SRV_APP_RESET, which)), "reset")
     session.forget_application()
@@ -296,7 +296,7 @@ def reset(session: Session, option: int) -> None:
 
 def _control(session: Session, service: int, *options: bintag.Tag) -> bintag.Tags:
     request = _control_request(session, service, *options)
-    return session.call(request.group, request.service, request.tags, _SLOW)
+    return session.call(request.group, request.service, request.tags, SLOW_PATIENCE)
 
 
 def _control_request(session: Session, service: int, *options: bintag.Tag) -> Request:
@@ -437,7 +437,7 @@ class _Transfer:
         request = self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, b"")
         connection = self._session.connection
         messages = self._messages(start_at)
-        for reply in connection.stream(messages, _TRANSFER_PATIENCE, sharing=connection.is_bus, more=True):
+        for reply in connection.stream(messages, ERASE_PATIENCE, sharing=connection.is_bus, more=True):
             self._take(_arrived(l7.decode_reply(reply, request)))
         if self.arrived != len(self._image):
             raise DeviceError(f"The device took {self.arrived} of {len(self._image)} bytes; try again.", "incomplete")
