@@ -399,7 +399,8 @@ static void scans_of_two_tools_are_both_answered(void)
 
 /* ---- what is not for us ---- */
 
-static void frames_of_others_are_left_alone(void)
+/* Frames that look as if more of a packet were to come, and a scan, but not for us. */
+static void send_frames_of_others(void)
 {
     static const struct {
         RTS_UI32 id;
@@ -407,7 +408,8 @@ static void frames_of_others_are_left_alone(void)
     } frames[] = {
         {0x605, 0}, /* CANopen: SDO to node 5 */
         {0x705, 0},
-        {0x18DA05F1, CAN_FLAG_EXTENDED}, /* diagnostics of vehicles */
+        {0x18DA05F1, CAN_FLAG_EXTENDED},                             /* diagnostics of vehicles */
+        {(CAN_ID_BASE ^ 1 << 20) | 5 << 8 | 200, CAN_FLAG_EXTENDED}, /* with another base */
         {CAN_ID_BASE | 6 << 8 | 200, CAN_FLAG_EXTENDED},
         {CAN_ID_BASE | 5 << 8 | 200, CAN_FLAG_EXTENDED | CAN_FLAG_REMOTE},
         {CAN_ID_BASE | 5 << 8 | 255, CAN_FLAG_EXTENDED},
@@ -416,7 +418,6 @@ static void frames_of_others_are_left_alone(void)
         {CAN_ID_BASE | 255 << 8 | 200, CAN_FLAG_EXTENDED}, /* ISO-TP to all */
     };
 
-    can_start(500 * KBIT, 0);
     CAN_TOOL *tool = can_tool(200);
     RTS_UI32 before = SimCanFrames();
     for (RTS_UI32 i = 0; i < RTS_COUNT(frames); i++) {
@@ -425,6 +426,25 @@ static void frames_of_others_are_left_alone(void)
     }
     can_pass(50);
     CHECK_EQUAL(SimCanFrames(), before + RTS_COUNT(frames)); /* not one flow control frame */
+    scan(tool, DEVICE_NODE + 1, 0, 6);
+    can_pass(50);
+    CHECK_EQUAL(can_take(tool, packet, sizeof(packet)), 0);
+}
+
+static void frames_of_others_are_left_alone(void)
+{
+    can_start(500 * KBIT, 0);
+    send_frames_of_others();
+    can_end();
+}
+
+static void frames_of_others_are_left_alone_too_if_the_controller_has_too_few_filters(void)
+{
+    static const CAN_FILTER all[] = {{.extended = false}, {.extended = true}};
+
+    can_start(500 * KBIT, 0);
+    CHECK_EQUAL(SimCanSetFilters(SIM_CAN_DEVICE, all, RTS_COUNT(all)), ERR_OK);
+    send_frames_of_others();
     can_end();
 }
 
@@ -578,6 +598,7 @@ int main(void)
     RUN(the_answer_comes_at_a_random_moment_of_the_window);
     RUN(scans_of_two_tools_are_both_answered);
     RUN(frames_of_others_are_left_alone);
+    RUN(frames_of_others_are_left_alone_too_if_the_controller_has_too_few_filters);
     RUN(another_device_with_our_number_is_noticed);
     RUN(lost_frames_cost_time_but_no_data);
     RUN(destroyed_frames_are_not_even_noticed);
