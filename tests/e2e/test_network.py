@@ -133,6 +133,17 @@ class TestEveryLink:
             assert plc.identity().device_name == "plcrt"
 
 
+def test_a_start_does_not_give_the_ids_of_the_one_before(tmp_path: Path) -> None:
+    """The first session of each start: its number is from the entropy of the system."""
+    sessions = []
+    for _ in range(3):
+        with Plcrt(tmp_path / "plc.flash", "--tcp", "0") as running:
+            session = open_session(f"tcp:{running.tcp}")
+            sessions.append(session.ensure())
+            session.connection.close()
+    assert len(set(sessions)) == 3
+
+
 def test_all_lines_serve_at_once(plcrt: Plcrt, counter: Path) -> None:
     with ExitStack() as stack:
         plcs: list[Plc] = [stack.enter_context(plctool.connect(link_of(plcrt, kind))) for kind in KINDS]
