@@ -20,7 +20,7 @@ typedef struct {
 /* Writes why, and returns `result`. A macro, so that sentences that are never sent take no flash. */
 #define APP_REFUSE(refusal, result, ...) \
     (APP_REFUSAL_TEXT_SIZE > 1 ? AppRefuse(refusal, result, __VA_ARGS__) : (RTS_RESULT)(result))
-RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...);
+RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...) RTS_FORMAT(3, 4);
 #endif
 
 #endif

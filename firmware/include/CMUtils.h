@@ -14,8 +14,8 @@
  * Formats into `out`, always NUL-terminated and cut to `size` bytes (at least 1). Understands %s, %d (int), %u and %X
  * (unsigned, the latter always with eight digits), %%. Returns the length of the result. From any context.
  */
-RTS_SIZE CMUtlvsnprintf(char *out, RTS_SIZE size, const char *format, va_list arguments);
-RTS_SIZE CMUtlsnprintf(char *out, RTS_SIZE size, const char *format, ...);
+RTS_SIZE CMUtlvsnprintf(char *out, RTS_SIZE size, const char *format, va_list arguments) RTS_FORMAT(3, 0);
+RTS_SIZE CMUtlsnprintf(char *out, RTS_SIZE size, const char *format, ...) RTS_FORMAT(3, 4);
 
 /* Length of a text that may be cut: at most `max`. */
 RTS_UI32 CMUtlStrNLen(const char *text, RTS_UI32 max);

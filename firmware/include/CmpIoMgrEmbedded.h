@@ -46,7 +46,8 @@ RTS_RESULT IoMgrConfigEachChannel(const IoConfigTaskMap *task_maps, int count, c
  * of the connector, which is put before it. The application is refused with it, and the driver returns what this
  * returns. ERR_OK: the connector is optional; the sentence is in the log, and the driver goes on without it.
  */
-RTS_RESULT IoMgrConfigRefuse(const IoConfigConnector *connector, RTS_RESULT result, const char *format, ...);
+RTS_RESULT IoMgrConfigRefuse(const IoConfigConnector *connector, RTS_RESULT result, const char *format, ...)
+    RTS_FORMAT(3, 4);
 
 /* Events of the component; manual's numbers. */
 enum {

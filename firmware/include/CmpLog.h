@@ -34,7 +34,7 @@ typedef struct {
         if (LOG_MAX_ENTRIES > 0)      \
             LogAddEntry(__VA_ARGS__); \
     } while (0)
-void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...);
+void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...) RTS_FORMAT(4, 5);
 
 RTS_RESULT CmpLog_Hook(CMP_HOOK hook);
 #endif

@@ -48,9 +48,13 @@ typedef void (*RTS_PFN)(void);
 #define RTS_NOINLINE __attribute__((noinline))
 /* Of a small function that runs in each cycle, also where the compiler saves room. */
 #define RTS_INLINE inline __attribute__((always_inline))
+/* Of a function with a format, which is argument `number`: the compiler checks those from `first` on, and refuses a text
+ * in its place that is no literal: it may be of a client. */
+#define RTS_FORMAT(number, first) __attribute__((format(printf, number, first)))
 #else
 #define RTS_NOINLINE
 #define RTS_INLINE inline
+#define RTS_FORMAT(number, first)
 #endif
 #endif
 

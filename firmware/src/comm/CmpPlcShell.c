@@ -52,7 +52,7 @@ static void put(SHELL_OUTPUT *out, const char *text, RTS_UI32 size)
     out->more = out->more || fits < size;
 }
 
-static void put_formatted(SHELL_OUTPUT *out, const char *format, va_list arguments)
+RTS_FORMAT(2, 0) static void put_formatted(SHELL_OUTPUT *out, const char *format, va_list arguments)
 {
     enum { PIECE_SIZE = 160 };
     char piece[PIECE_SIZE];
@@ -61,7 +61,7 @@ static void put_formatted(SHELL_OUTPUT *out, const char *format, va_list argumen
 }
 
 /* A line, or the end of one. */
-static void print(SHELL_OUTPUT *out, const char *format, ...)
+RTS_FORMAT(2, 3) static void print(SHELL_OUTPUT *out, const char *format, ...)
 {
     va_list arguments;
 
@@ -72,7 +72,7 @@ static void print(SHELL_OUTPUT *out, const char *format, ...)
 }
 
 /* A part of a line. */
-static void print_part(SHELL_OUTPUT *out, const char *format, ...)
+RTS_FORMAT(2, 3) static void print_part(SHELL_OUTPUT *out, const char *format, ...)
 {
     va_list arguments;
 
@@ -167,7 +167,7 @@ static void print_line(SHELL_OUTPUT *out, const BLK_COUNTERS *counters, RTS_UI32
     print_part(out, "Line %s %u:", counters->driver, (unsigned)(line + 1));
     for (RTS_UI32 i = 0; i < counters->count; i++)
         print_part(out, "%s %s %u", i == 0 ? "" : ",", counters->names[i], (unsigned)values[i]);
-    print(out, "");
+    put(out, "\r\n", 2);
 }
 
 static void print_lines(SHELL_OUTPUT *out)
