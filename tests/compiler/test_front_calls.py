@@ -162,9 +162,9 @@ def test_result_that_is_not_used_is_fine_for_a_call_with_effects() -> None:
     [
         ("i := Add3(1, 2, 3, 4);", "20: Add3 takes 3 arguments, not 4"),
         ("i := Add3(1);", "6: the argument b of Add3 is missing"),
-        ("i := Add3(b := 1, c := 2, d := 3);", "27: Add3 has no parameter d"),
+        ("i := Add3(b := 1, c := 2, d := 3);", "27: Add3 has no parameter d; it has a, b, c"),
         ("i := Add3(b := 2, 1);", "19: b is given twice"),
-        ("i := Add3(x := 1);", "11: Add3 has no parameter x"),
+        ("i := Add3(x := 1);", "11: Add3 has no parameter x; it has a, b, c"),
         ("i := Add3(a := 1, a := 2);", "19: a is given twice"),
         ("i := Add3(a => j);", "11: a is given with :="),
         ("b := Split(x := 1, low := i, count := k);", "20: low is given with =>"),
@@ -368,10 +368,13 @@ def test_instances_in_arrays_are_called_by_index() -> None:
         ("c(TOTAL := d, Q := b);", "15: Q is given with =>"),
         ("c(TOTAL := d, N => b);", "15: INT does not fit BOOL; write INT_TO_BOOL(...), or compare it: <> 0"),
         ("c(TOTAL := d, N => 5);", "20: the output N needs a variable"),
-        ("b := c(TOTAL := d);", "6: a call of the function block COUNTER is a statement and has no value"),
+        (
+            "b := c(TOTAL := d);",
+            "6: a call of the function block COUNTER is a statement and has no value; call it first, then read c.Q",
+        ),
         ("c.Q := b;", "1: Q is an output of COUNTER and cannot be assigned to"),
         ("c.LAST := b;", "1: LAST is a local variable of COUNTER and cannot be assigned to"),
-        ("c;", "1: this is a value, not a statement; write an assignment or a call"),
+        ("c;", "1: c is an instance; a call of it is written c();"),
         ("i();", "1: i is not a function"),
     ],
 )

@@ -197,7 +197,7 @@ def test_globals_of_a_configuration_are_known_everywhere() -> None:
             "TASK t(SENSITIVITY := 2);",
             "2:8: SENSITIVITY says how often in a row a cycle may be longer than WATCHDOG, which is missing",
         ),
-        ("PROGRAM one : P(x := 5);", "2:17: one has no parameter x"),
+        ("PROGRAM one : P(x := 5);", "2:17: one has no parameter x; it has a, o"),
         ("PROGRAM one : P(a := TRUE);", "2:22: BOOL does not fit INT; write BOOL_TO_INT(...)"),
         ("PROGRAM one : P(o => 5);", "2:22: the output o needs a variable"),
     ],

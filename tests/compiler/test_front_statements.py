@@ -91,7 +91,7 @@ def test_return_ends_a_unit() -> None:
         ("CASE i OF 3: ; 1..5: ; END_CASE;", "16: 3 is a label in line 7 already"),
         ("CASE e OF Red: ; Color#Red: ; END_CASE;", "18: Red is a label in line 7 already"),
         ("CASE i OF 5..1: ; END_CASE;", "11: the range 5..1 is empty"),
-        ("CASE i OF j: ; END_CASE;", "11: a constant is needed here"),
+        ("CASE i OF j: ; END_CASE;", "11: a constant is needed here; declare j in VAR CONSTANT"),
         ("CASE u OF 300: ; END_CASE;", "11: 300 does not fit USINT (0..255)"),
         ("FOR r := 1 TO 3 DO ; END_FOR;", "5: a FOR loop counts with an integer, not with REAL"),
         ("FOR i := 1 TO 3 BY 0 DO ; END_FOR;", "20: a FOR loop with a step of zero never ends"),

@@ -156,7 +156,7 @@ def test_syntax_error_is_one_clear_sentence(text: str, message: str) -> None:
         ("END_ACTION", "1:1: END_ACTION without an ACTION"),
         ("PROGRAM p\nVAR x INT; END_VAR\nEND_PROGRAM", "2:6: expected : before INT"),
         ("PROGRAM p\nVAR x : INT; END_VAR\nWAIT 5;\nEND_PROGRAM", "3:5: expected := before 5"),
-        ("PROGRAM p\nVAR q : POINTER TO INT; END_VAR\nq->x := 5;\nEND_PROGRAM", "3:2: -> is written ^. here"),
+        ("PROGRAM p\nVAR q : POINTER TO INT; END_VAR\nq->x := 5;\nEND_PROGRAM", "3:2: -> is written ^. here: q^.x"),
         ("PROGRAM p\nx := 1;", "2:8: END_PROGRAM missing for the PROGRAM in line 1"),
         ("FUNCTION f : INT\nf := 1;\nPROGRAM p\nEND_PROGRAM", "3:1: END_FUNCTION missing for the FUNCTION in line 1"),
         (

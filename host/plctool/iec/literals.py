@@ -103,6 +103,8 @@ def typed(text: str) -> tuple[LiteralKind, Value, str]:
     name = prefix.upper()
     if name in _TIME_TYPES:
         return LiteralKind.TIME, duration(rest), _TIME_TYPES[name]
+    if name in ("S5T", "S5TIME"):
+        raise LiteralError(f"a duration is written T#{rest}, not {text}")
     if name in _DATE_TYPES:
         return LiteralKind.DATE, date(name, rest), _DATE_TYPES[name]
     if name == "BOOL" and rest.upper() in ("TRUE", "FALSE", "1", "0"):
@@ -112,6 +114,12 @@ def typed(text: str) -> tuple[LiteralKind, Value, str]:
     if name in _REAL_TYPES:
         kind, value = LiteralKind.REAL, float(value)
     return kind, -value if rest.startswith("-") else value, name
+
+
+def _unit_hint(rest: str) -> str:
+    if _NUMBER.match(rest) and rest.replace(".", "", 1).isdigit():
+        return f"; {rest} has no unit, as in {rest}s"
+    return "; its units are d, h, m, s, ms, us and ns"
 
 
 def duration(text: str) -> int:
@@ -124,7 +132,7 @@ def duration(text: str) -> int:
     while at < len(body):
         part = _TIME_PART.match(body, at)
         if part is None:
-            raise LiteralError(f"{text} is not a duration such as 1h30m or 2.5s")
+            raise LiteralError(f"{text} is not a duration such as 1h30m or 2.5s{_unit_hint(body[at:])}")
         number, unit = part.group(1), _UNITS.index(part.group(2).lower())
         if unit <= last_unit:
             raise LiteralError(f"the units of {text} are not in the order d, h, m, s, ms, us, ns")

@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from plctool.compiler.diagnostics import Diagnostics
@@ -42,6 +43,8 @@ class Allocation:
 
 # ---- addresses ----
 
+_LETTERS = {8: "B", 16: "W", 32: "D", 64: "L"}
+_NO_SUCH_BIT = re.compile(r"%[IQM]X?\d+\.([89]|[1-9]\d+)", re.IGNORECASE)
 MAX_ADDRESS = 0xFFFF  # the last byte an address such as %IB65535 reaches
 
 
@@ -61,7 +64,8 @@ def _read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
 def _not_an_address(text: str) -> str:
     address = parse_module_address(text)
     if address is None:
-        return f"{text} is not an address such as %IX0.3 or %QW2"
+        hint = "; a byte has the bits 0 to 7" if _NO_SUCH_BIT.fullmatch(text) else ""
+        return f"{text} is not an address such as %IX0.3 or %QW2{hint}"
     if address.area is Area.MEMORY:
         return f"{text}: the memory %M has no modules; number its bytes or words, as in {address.numbered}"
     return f"{text} is in a module, and only a channel of a description of inputs and outputs may lead there"
@@ -77,9 +81,12 @@ def misfit(t: Type, text: str, width: int) -> str:
     """Why a variable cannot be at an address of that width in bits (0: a single one); "" when it can."""
     base = elementary(t)
     if width == 0 and base_of(t) is not BOOL:
-        return f"{text} is a bit, {t} is not"
+        letter = "" if base is None else _LETTERS.get(base.bits, "")
+        return f"{text} is a bit, {t} is not" + (f"; write {text[:2]}{letter} and a number" if letter else "")
+    if width not in (0, 8) and base is BOOL:
+        return f"a BOOL is at a bit such as {text[:2]}X0.3, {text} has {width}"
     if width and base is not None and base.bits != width:
-        return f"{t} has {base.bits} bits, {text} {width}"
+        return f"{t} has {base.bits} bits, {text} {width}; write {text[:2]}{_LETTERS[base.bits]} and a number"
     return ""
 
 

@@ -93,7 +93,8 @@ class Checker:
             return None
         if isinstance(e, Const):
             return e
-        self.error(node.pos, "constant", "a constant is needed here")
+        hint = f"; declare {node.name} in VAR CONSTANT" if isinstance(node, ast.Name) else ""
+        self.error(node.pos, "constant", f"a constant is needed here{hint}")
         return None
 
     def integer(self, node: ast.Expr) -> int | None:

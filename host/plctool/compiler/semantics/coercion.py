@@ -34,6 +34,7 @@ from plctool.iec.types import (
     REAL,
     TIME,
     WORD,
+    ArrayType,
     Elementary,
     EnumType,
     InterfaceType,
@@ -113,6 +114,9 @@ class Coercion:
         if isinstance(e, Const) and isinstance(e.value, str) and len(e.value) == 1 and to in (BYTE, WORD):
             message = f"a character of a STRING is a number here: write 16#{ord(e.value):02X} for '{e.value}'"
             return self._error(e.pos, "type", message)
+        if isinstance(e.type, StringType) and isinstance(e, Const) and to is not None and to.kind is Kind.TIME:
+            message = f"{e.type} does not fit {target}; a duration is written without quotes: T#5s"
+            return self._error(e.pos, "type", message)
         if isinstance(e.type, StringType) and to is not None:
             return self._needs(e, e.type.keyword, to.name)
         if same_lengths(e.type, target):
@@ -135,7 +139,8 @@ class Coercion:
             return Const(0, target, e.pos)
         what = "an integer" if e.type is UNTYPED_INT else "a real number"
         if to is None:
-            return self._error(e.pos, "type", f"{what} does not fit {target}")
+            hint = "; assign to its elements in a loop" if isinstance(target, ArrayType) else ""
+            return self._error(e.pos, "type", f"{what} does not fit {target}{hint}")
         if to.kind is Kind.REAL:
             number = constants.rounded(float(value), to)
             if number in (float("inf"), float("-inf")):

@@ -284,7 +284,8 @@ class _Builder:
         offset, name = instance.task
         task = tasks.get(name.casefold())
         if task is None:
-            hint = did_you_mean(name, (t.name for t in tasks.values()))
+            names = [t.name for t in tasks.values()]
+            hint = did_you_mean(name, names) or (f"; there is {', '.join(names)}" if names else "")
             scope.error(offset, "unknown", f"there is no task {name}{hint}")
         return task
 

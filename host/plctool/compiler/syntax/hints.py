@@ -29,17 +29,30 @@ _REPEAT = "a loop that tests at its end is written REPEAT ... UNTIL condition EN
 _LABEL = "a branch has values or a range: 6..100: ...; for comparisons write IF ... ELSIF"
 _RANGE = "a range of values is written {low}..{high}"
 _LOOP = "a loop is written FOR i := 0 TO 9 DO ... END_FOR"
+_VALUE = r"[A-Za-z_][\w.^]*(?:\[[^\]]*\])?"
+_INSTANCE = "an instance of a program is declared PROGRAM {instance} WITH {task} : {type};"
+_NO_IMPORT = "all sources and libraries of a program are compiled together; nothing is imported"
 
 
 @dataclass(frozen=True)
 class _Hint:
     """`pattern` is looked for around an error, from the line of the last good word on. `at`: the group the error has to
-    stand in; `where`: in a body, in a declaration, or both ("")."""
+    stand in; `where`: in a body, in a declaration, or both (""). `ends`: nothing of this statement can be read."""
 
     pattern: str
     message: str | Callable[[re.Match[str]], str]
     at: str = ""
     where: str = ""
+    ends: bool = False
+
+
+@dataclass(frozen=True)
+class Said:
+    """What to say at an offset, and whether the statement is left out."""
+
+    offset: int
+    message: str
+    ends: bool
 
 
 def _count(match: re.Match[str]) -> str:
@@ -60,6 +73,11 @@ def _typed(message: str) -> Callable[[re.Match[str]], str]:
     return lambda m: message.format(name=m["name"], type=slips.TYPES.get(m["type"].upper(), m["type"]))
 
 
+def _stepped(match: re.Match[str]) -> str:
+    sign, name = match["sign"], match["name"]
+    return f"there is no {sign}{sign}; write {name} := {name} {sign} 1"
+
+
 def _located(match: re.Match[str]) -> str:
     return f"AT comes after the name: {match['name']} AT {match['place']} : {match['type'].strip()};"
 
@@ -67,10 +85,52 @@ def _located(match: re.Match[str]) -> str:
 _HINTS = (
     _Hint(r"(?P<here><-)", "an assignment is written :=, not <-", "here"),
     _Hint(r":=[^;]*?(?P<here>\bIF\b[^;]*\bELSE\b)", slips.CHOICE, "here", "body"),
+    _Hint(r":=[^;]*?(?P<here>\bIF\s*\()", slips.CHOICE, "here", "body", ends=True),
+    _Hint(rf"(?P<name>{_VALUE})\s*(?P<here>(?P<sign>[-+*/])=\s*(?P<value>[^;\n=]+))",
+          "there is no {sign}=; write {name} := {name} {sign} {value}", "here", "body"),
+    _Hint(rf"(?P<name>{_VALUE})(?P<here>(?P<sign>[-+])(?P=sign))\s*(?:;|$)", _stepped, "here", "body"),
+    _Hint(rf"(?:^|;)[ \t]*(?P<here>(?P<sign>[-+])(?P=sign)(?P<name>{_VALUE}))\s*(?:;|$)", _stepped, "here"),
+    _Hint(rf"(?P<name>{_NAME})(?P<here>->\s*(?P<member>{_NAME}))", "-> is written ^. here: {name}^.{member}", "here",
+          "body"),
+    _Hint(rf"^\s*(?P<here>(?:def|void|func)\s+(?P<name>{_NAME})\s*\()",
+          "a function is declared FUNCTION {name} : INT ... END_FUNCTION, outside of the PROGRAM", "here"),
+    _Hint(r"^\s*(?P<here>(?:import|from)\s+[\w.]+\s*)", _NO_IMPORT, "here"),
+    _Hint(r"\b(?P<word>IF|ELSIF)\b[^;:]*?(?P<here>:)(?!=)", "the condition of {word} ends with THEN, not with a colon",
+          "here", "body"),
+    _Hint(r"\bWHILE\b[^;:]*?(?P<here>:)(?!=)", "the condition of WHILE ends with DO, not with a colon", "here", "body"),
+    _Hint(r"\bUNTIL\b[^;]*?(?P<here>\bDO\b\s*)", "the condition of UNTIL ends with END_REPEAT, without DO", "here"),
+    _Hint(rf'(?P<here>"(?P<name>{_NAME})")\s*(?::=|\()', "a name is written without quotes: {name}", "here"),
+    _Hint(r"^\s*(?P<here>(?:END_)?REGION\b[^\n]*\s*)", "there is no REGION; write a comment", "here", "body"),
+    _Hint(rf"(?:^|;)[ \t]*(?P<here>(?P<word>SET|RESET)\s+(?P<name>{_VALUE})\s*)(?=;|$)",
+          lambda m: f"write {m['name']} := {'TRUE' if m['word'].upper() == 'SET' else 'FALSE'};", "here", "body"),
+    _Hint(r"\w\[\s*[-\w]+\s*(?P<here>\.\.)\s*[-\w]+\s*\]",
+          "an index is one number; for several elements write a loop", "here", "body"),
+    _Hint(rf"\bFUNCTION\s+(?P<here>BLOCK\s+{_NAME}\s*)", "FUNCTION BLOCK is written FUNCTION_BLOCK", "here"),
+    _Hint(rf"(?P<here>\bFUNCTION\s+(?P<name>{_NAME})\s+{_TYPE}\s*(?:{_NAME}\s*)?)",
+          _typed("the type of the result follows a colon: FUNCTION {name} : {type}"), "here"),
+    _Hint(rf"^\s*(?P<here>STRUCT\s+(?P<name>{_NAME}))",
+          "a structure is declared TYPE {name} : STRUCT ... END_STRUCT; END_TYPE", "here"),
+    _Hint(r"(?P<here>\b(?P<word>CONSTANT|RETAIN|PERSISTENT)\s+(?P<var>VAR\w*))",
+          "{word} comes after {var}: {var} {word}", "here"),
+    _Hint(rf"(?P<here>(?:DIM\s+)?(?P<name>{_NAME})\s+AS\s+(?P<type>{_NAME}))", _typed(_IN_VARIABLES), "here"),
+    _Hint(r"^\s*(?P<here>(?P<word>RETAIN|PERSISTENT)\s+\w+\s*)(?=[:,])",
+          "variables of this kind are declared in VAR {word} ... END_VAR", "here", "declaration"),
+    _Hint(rf"\bPROGRAM\s+(?P<type>{_NAME})\s+WITH\s+(?P<task>{_NAME})\s*(?P<here>;)",
+          lambda m: _INSTANCE.format(instance=f"{m['type']}1", task=m["task"], type=m["type"]), "here"),
+    _Hint(rf"\bPROGRAM\s+(?P<instance>{_NAME})\s*:\s*(?P<type>{_NAME})\s+(?P<here>WITH\s+(?P<task>{_NAME}))",
+          _INSTANCE, "here"),
+    _Hint(rf"(?:^|;)[ \t]*(?P<here>TASK\s+{_NAME}\s*\()",
+          "a task is declared in CONFIGURATION ... END_CONFIGURATION, outside of the PROGRAM", "here", "body"),
+    _Hint(r"\bAT\s+(?P<here>(?P<address>[IQM][XBWDL]?\d+(?:\.\d+)*))", "an address begins with %: %{address}", "here"),
+    _Hint(r"\w#\s*(?P<number>[\d.]+)(?P<here>\s+(?P<unit>ms|us|ns|s|m|h|d)\b\s*)",
+          "a duration has no blank: T#{number}{unit}", "here"),
+    _Hint(r"\bT(?:IME)?#\d+(?P<here>:\d+(?::\d+)*)", "a duration is written with its units: T#1h30m5s", "here"),
     _Hint(r"(?:^|;)[ \t]*(?P<here>REM[ \t][^\n]*\n?\s*)", "a comment is written // or (* *)", "here"),
     _Hint(r"(?P<name>[\w.]+)\s*(?:<>|[<>]=?|=)\s*[\w.]+\s+(?P<word>AND|OR|XOR)\s+(?P<here>(?P<sign><>|[<>]=?|=)\s*"
           r"(?P<value>[\w.]+))", "{word} joins two comparisons: ... {word} {name} {sign} {value}", "here", "body"),
     _Hint(rf"{_NAME}\(\s*\w+\s*:=[^();]+(?P<here>;\s*)\w+\s*:=[^();]*\)", "inputs are separated by commas", "here"),
+    _Hint(rf"{_NAME}\([^();:\n]+(?P<here>;\s*)[^();:\n]+\)", "arguments are separated by commas", "here", "body",
+          ends=True),
     _Hint(rf"(?P<here>\bCALL\s+(?P<name>{_NAME}))", "there is no CALL; write {name}(...)", "here", "body"),
     _Hint(r"\bFOR\b[^;]*?:=[^;]*?(?P<here>,)", _LOOP, "here"),
     _Hint(r"(?P<here>\bSTEP\s+(?P<value>[-\w.]+))", "the step of a loop is written BY {value}", "here", "body"),
@@ -91,7 +151,7 @@ _HINTS = (
           "variables are declared in VAR ... END_VAR before the statements: {name} : INT;", "here", "body"),
     _Hint(rf"^\s*(?P<here>(?P<name>{_NAME})\s*:=\s*(?P<value>[^;]*))",
           "a variable is declared with its type: {name} : INT := {value};", "here", "declaration"),
-    _Hint(r"\bARRAY\s*\[\s*(?P<here>(?P<low>\w+)\s*-\s*(?P<high>\w+)\s*\])",
+    _Hint(r"\bARRAY\s*\[\s*(?P<here>(?P<low>\w+)\s*(?:-|:|\.|\.\.\.|…|\bTO\b)\s*(?P<high>\w+)\s*\])",
           "the bounds of an array are written {low}..{high}", "here"),
     _Hint(r"\bARRAY\s*(?P<here>\(\s*(?P<low>[-\w]+)\s*\.\.\s*(?P<high>[-\w]+)\s*\))",
           "the bounds of an array stand in brackets: ARRAY[{low}..{high}]", "here"),
@@ -146,8 +206,8 @@ _HINTS = (
 )  # fmt: skip
 
 
-def hint(text: str, begin: int, pos: int, where: str) -> tuple[int, str] | None:
-    """What to say of a mistake at offset `pos` of `text`, and where; None when it is not one of these. `begin`: the
+def hint(text: str, begin: int, pos: int, where: str) -> Said | None:
+    """What to say of a mistake at offset `pos` of `text`; None when it is not one of these. `begin`: the
     offset of the last word but one that was fine; `where`: body, declaration or ""."""
     start = text.rfind("\n", 0, begin) + 1
     end = text.find("\n", pos)
@@ -160,5 +220,5 @@ def hint(text: str, begin: int, pos: int, where: str) -> tuple[int, str] | None:
             if match.start(known.at or 0) <= column <= match.end(known.at or 0):
                 said = known.message
                 message = said(match) if callable(said) else said.format(**match.groupdict())
-                return start + match.start(known.at or 0), message
+                return Said(start + match.start(known.at or 0), message, known.ends)
     return None

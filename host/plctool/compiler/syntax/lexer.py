@@ -276,15 +276,16 @@ class Lexer:
     def _bad(self, character: str, pos: int) -> bool:
         """Reports a character that starts no token; False when the rest of the line is to be skipped."""
         if character in "'\"":
-            self._report(pos, "string", "this string is not closed before the end of the line")
+            rest = self.text[pos + 1 : self._end_of_line(pos)]
+            hint = "; a $ in a string is written $$" if f"${character}" in rest else ""
+            self._report(pos, "string", f"this string is not closed before the end of the line{hint}")
             return False
         if character == "{":
             self._report(pos, "pragma", "this pragma is not closed")
             return True
         shown = character if character.isprintable() else f"character {ord(character)}"
-        hint = slips.CHARACTERS.get(character, "")
-        if character == "#" and self.text[pos + 1 : pos + 2].isalpha():
-            hint = "a name is written without it; a comment is // or (* *)"
+        known = (said for pattern, said in slips.BEGINNINGS if pattern.match(self.text, pos))
+        hint = next(known, slips.CHARACTERS.get(character, ""))
         self._report(pos, "character", f"{shown} has no place in a program{'; ' * bool(hint)}{hint}")
         return True
 

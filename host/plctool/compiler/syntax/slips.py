@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 TYPESET = {
@@ -38,14 +39,48 @@ CHOICE = "a choice between two values is written SEL(condition, value_if_false, 
 CHARACTERS = {"#": "a comment is written // or (* *)", "?": CHOICE}
 """Characters that begin nothing, and what may have been meant."""
 
+BEGINNINGS = (
+    (re.compile(r"#define\b", re.IGNORECASE), "constants are declared in VAR CONSTANT ... END_VAR"),
+    (re.compile(r"#include\b", re.IGNORECASE), "all sources of a program are compiled together; leave it out"),
+    (re.compile(r"#[A-Za-z_]"), "a name is written without it; a comment is // or (* *)"),
+    (re.compile(r"%E[XBWDL]?\d", re.IGNORECASE), "inputs (E) are at %I"),
+    (re.compile(r"%A[XBWDL]?\d", re.IGNORECASE), "outputs (A) are at %Q"),
+    (re.compile(r"(?<=\d)%"), "50 % is written 0.5"),
+    (re.compile(r"@\s*%"), "a variable at an address is written name AT %IX0.0 : BOOL;"),
+)
+"""Beginnings of what is no token, and what may have been meant."""
+
 DECLARED = "variables are declared in VAR ... END_VAR before the statements: {name} : {type};"
 """What to say of a declaration among statements."""
 
 WORDS = {
-    "ELSEIF": "ELSIF",
-    "VAR_INOUT": "VAR_IN_OUT",
+    **dict.fromkeys(("ELSEIF", "ELIF", "ELSE_IF"), "ELSIF"),
+    **dict.fromkeys(("VAR_INOUT", "VARINOUT", "VAR_INPUT_OUTPUT"), "VAR_IN_OUT"),
+    **dict.fromkeys(("VARINPUT", "VAR_IN", "VAR_INPUTS"), "VAR_INPUT"),
+    **dict.fromkeys(("VAROUTPUT", "VAR_OUT", "VAR_OUTPUTS"), "VAR_OUTPUT"),
+    **dict.fromkeys(("VARGLOBAL", "GLOBAL_VAR", "VAR_GLOBALS"), "VAR_GLOBAL"),
+    **dict.fromkeys(("VAR_CONSTANT", "VAR_CONST"), "VAR CONSTANT"),
+    "VARTEMP": "VAR_TEMP",
+    "VAR_STATIC": "VAR_STAT",
     "VAR_RETAIN": "VAR RETAIN",
-    **{f"END{word}": f"END_{word}" for word in ("IF", "CASE", "FOR", "WHILE", "REPEAT", "VAR", "STRUCT", "TYPE")},
+    "FUNCTIONBLOCK": "FUNCTION_BLOCK",
+    **dict.fromkeys(("ENDFUNCTIONBLOCK", "ENDFUNCTION_BLOCK", "END_FUNCTIONBLOCK"), "END_FUNCTION_BLOCK"),
+    **{
+        f"END{word}": f"END_{word}"
+        for word in (
+            "IF",
+            "CASE",
+            "FOR",
+            "WHILE",
+            "REPEAT",
+            "VAR",
+            "STRUCT",
+            "TYPE",
+            "PROGRAM",
+            "FUNCTION",
+            "CONFIGURATION",
+        )
+    },
 }
 """Keywords spelled wrongly, and rightly."""
 

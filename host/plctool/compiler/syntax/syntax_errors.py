@@ -10,6 +10,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
+from difflib import get_close_matches
 
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import slips
@@ -64,6 +65,10 @@ _PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",), "_C
 _RETURN = "RETURN takes no value; assign it to the name of the function, then RETURN"
 _BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "TRY"}
 _AFTER_DECLARATIONS = re.compile(r"\b(?:END_\w+|VAR(?:_\w+)?|IF|FOR|WHILE|REPEAT|CASE)\b", re.IGNORECASE)
+_WORDS_OF_ENDS = re.compile(r"\bEND\w+", re.IGNORECASE)
+_UNIT_WORDS = ("PROGRAM", "FUNCTION", "FUNCTION_BLOCK", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "INTERFACE")
+_POUS = ("PROGRAM", "FUNCTION", "FUNCTION_BLOCK")
+_NEXT_UNIT = re.compile(r"\b(?:END_)?(?:PROGRAM|FUNCTION_BLOCK|FUNCTION|CONFIGURATION)\b", re.IGNORECASE)
 _ELSE_IF = re.compile(r"\bELSE\s+IF\b", re.IGNORECASE)
 _APART = 3  # an error closer than so many tokens to the previous one is a consequence of it
 
@@ -94,7 +99,9 @@ class Recovery:
             return
         self._reduce()
         self._hint(token)
-        if self._late_variables(token) or self._stray_end(token):
+        if self.skipping:
+            return
+        if self._late_variables(token) or self._misspelt_unit(token) or self._stray_end(token):
             return
         while self._insert(token) or self._close(token):
             if self._parser.feed(token):
@@ -266,8 +273,9 @@ class Recovery:
         begin = (self._earlier or token).pos
         found = hint(self._source.text, begin, token.pos, where)
         if found is not None:
-            self._say(*found)
+            self._say(found.offset, found.message)
             self._quiet = True
+            self.skipping = found.ends
 
     def _leave_out(self, token: Token, message: str, end: str) -> None:
         """Reports `token`, and goes on after the word or sign `end`."""
@@ -275,11 +283,32 @@ class Recovery:
         self.skipping, self._skip_to = True, end
 
     def _late_variables(self, token: Token) -> bool:
-        """Variables declared between statements."""
-        if token.type != "VAR" or self._item(self._parser.states) != "stmt":
+        """Variables declared between statements, global ones within a POU, others outside of one."""
+        message, opener = "", self._open()
+        if token.type == "VAR" and self._item(self._parser.states) == "stmt":
+            message = f"{token.text} stands before the first statement"
+        elif token.type == "VAR" and self._item_at(self._parser.states[-1]) == "unit":
+            message = f"{token.text} stands in a PROGRAM, FUNCTION or FUNCTION_BLOCK; for all of them write VAR_GLOBAL"
+        elif token.type == "GLOBAL" and opener is not None and self._ends_later(opener, token):
+            message = f"{token.text} stands outside of the {opener.text.upper()}"
+        if message:
+            self._leave_out(token, message, "END_VAR")
+        return bool(message)
+
+    def _ends_later(self, opener: Token, token: Token) -> bool:
+        """Whether a POU that is open at `token` has its END_... before the next one begins."""
+        following = _NEXT_UNIT.search(self._source.text, token.pos)
+        return opener.type in _POUS and following is not None and following[0].upper() == _CLOSERS[opener.type]
+
+    def _misspelt_unit(self, token: Token) -> bool:
+        """Takes `FUNTION` for FUNCTION."""
+        if token.type != "IDENT" or self._item_at(self._parser.states[-1]) != "unit":
             return False
-        self._leave_out(token, f"{token.text} stands before the first statement", "END_VAR")
-        return True
+        word = next(iter(get_close_matches(token.text.upper(), _UNIT_WORDS, 1, 0.8)), "")
+        if word:
+            self._say(token.pos, f"{token.text} is written {word}")
+            token.type, token.text = KEYWORDS[word], word
+        return bool(word) and self._parser.feed(token)
 
     def _stray_end(self, token: Token) -> bool:
         """An END_... that closes nothing that is open: it stands for the right one, or is left out."""
@@ -313,10 +342,16 @@ class Recovery:
             message = "ELSE IF begins a second IF, with an END_IF of its own; write ELSIF"
             self._say(second[-1].start(), message)
             return
+        for end in _WORDS_OF_ENDS.finditer(self._source.text, opener.pos, token.pos):
+            if end[0].upper() not in KEYWORDS and get_close_matches(end[0].upper(), [_CLOSERS[opener.type]], 1, 0.8):
+                self._say(end.start(), f"{end[0]} is written {_CLOSERS[opener.type]}")
+                return
         self._say(token.pos, f"{_CLOSERS[opener.type]} missing for the {opener.text.upper()} in line {line}")
 
     def _skip(self, token: Token) -> None:
         if self._shift(self._parser.states, token.type) is None:
+            if token.type in _CLOSERS:
+                self._dropped.append(KEYWORDS[_CLOSERS[token.type]].removeprefix("_END_"))
             self.skipping = True
             if not self.resume(token):
                 return
@@ -391,8 +426,6 @@ class Recovery:
             return "a label is one name, such as again:, and not in front of the statements of a CASE"
         if token.type == "_COMMA" and self._assigns_in_parentheses():
             return "values by name are for declarations and calls; assign the members one by one"
-        if _is_doubled(token, self._source.text) and self._shift(stack, "_ASSIGN") is not None:
-            return f"there is no {token.text}{self._source.text[token.end]}; write x := x {token.text} 1"
         return ""
 
     def _assigns_in_parentheses(self) -> bool:
@@ -415,8 +448,7 @@ class Recovery:
                 f"expected PROGRAM, FUNCTION, FUNCTION_BLOCK, TYPE, VAR_GLOBAL or CONFIGURATION, found {_shown(token)}"
             )
         if self._shift(stack, "_ASSIGN") is not None and self._shift(stack, "_SEMI") is not None:
-            pointer = token.text == "-" and self._source.text[token.end : token.end + 1] == ">"
-            return "-> is written ^. here" if pointer else f"expected := or ;, found {_shown(token)}"
+            return f"expected := or ;, found {_shown(token)}"
         words = [word for kind, word in _WORDS.items() if self._shift(stack, kind) is not None]
         if self._shift(stack, "IDENT") is not None:
             words = ["a name", *(word for word in words if word != "(")]
@@ -426,11 +458,6 @@ class Recovery:
             return f"{_shown(token)} has no place here"
         listed = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
         return f"expected {listed}, found {_shown(token)}"
-
-
-def _is_doubled(token: Token, text: str) -> bool:
-    """Whether this is the first sign of `+=` or `++`."""
-    return token.type in ("SIGN", "OP") and text[token.end : token.end + 1] in ("=", token.text)
 
 
 def _a(word: str) -> str:

@@ -122,7 +122,8 @@ class InitialValues:
 
     def _struct_initial(self, node: ast.StructInit, t: Type, scope: Scope) -> Initial | None:
         if not isinstance(t, StructType):
-            scope.error(node.pos, "type", f"(name := value) does not initialise {t}")
+            hint = "; the values of an array are written in brackets" if isinstance(t, ArrayType) else ""
+            scope.error(node.pos, "type", f"(name := value) does not initialise {t}{hint}")
             return None
         block = self._world.blocks.get(t)
         members: dict[str, Initial] = {}

@@ -143,7 +143,7 @@ def bind(
         else:
             i = index.get(argument.name.casefold())
         if i is None:
-            hint = did_you_mean(argument.name or "", (n for n, _ in names))
+            hint = did_you_mean(argument.name or "", (n for n, _ in names)) or _listed([n for n, _ in names])
             if what in OTHER_BLOCKS and not c.world.names.is_user_name(what):
                 hint = f"; that of CODESYS' library Util is Util.{what}"
             c.error(argument.pos, "arguments", f"{what} has no parameter {argument.name}{hint}")
@@ -242,6 +242,14 @@ def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: 
     return ValuePlace(constant, t, pos) if parameter.by_reference else constant
 
 
+MAX_LISTED = 6  # parameters
+
+
+def _listed(names: list[str]) -> str:
+    """The parameters that there are, if they are few."""
+    return f"; it has {', '.join(names)}" if 0 < len(names) <= MAX_LISTED else ""
+
+
 def _actual_argument(
     c: Checker, actual: Actual, symbol: VarSymbol, direction: Direction, parameter: Parameter
 ) -> Expr | Place | None:
@@ -265,7 +273,7 @@ def _actual_argument(
 def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
     """The value of an input; a REFERENCE TO gets the address."""
     if not isinstance(t, ReferenceType):
-        if _is_slip(node, t, name):
+        if _is_slip(c, node, t, name):
             return c.error(node.pos, "arguments", f"the input {name} is given with :=, not with =")
         e = c.expr(node, t)
         e = e if takes_array(t, e.type) else c.coerce(e, t)
@@ -276,13 +284,13 @@ def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
     return error_value(c.pos(node.pos)) if place is None else refer(place, t)
 
 
-def _is_slip(node: ast.Expr, t: Type, name: str) -> bool:
-    """`f(x = 1)` for an input x that is no BOOL."""
+def _is_slip(c: Checker, node: ast.Expr, t: Type, name: str) -> bool:
+    """`f(x = 1)` for an input x that is no BOOL, or where no variable is named x."""
     if (
         not isinstance(node, ast.Binary)
         or node.op is not ast.Operator.EQ
         or not isinstance(node.left, ast.Name)
-        or base_of(t) is BOOL
+        or (base_of(t) is BOOL and c.scope.lookup(name) is not None)
     ):
         return False
     return node.left.name.casefold() == name.casefold()

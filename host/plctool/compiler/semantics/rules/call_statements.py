@@ -248,6 +248,8 @@ def call_statement(c: Checker, statement: ast.ExprStmt) -> list[Statement]:
     e = c.expr(node)
     if isinstance(e, Load) and elementary(e.type) is not None:
         c.warning(statement.pos, "statement", "this reads a variable and does nothing with it; write an assignment")
+    elif isinstance(e.type, StructType) and e.type in c.world.blocks and isinstance(node, ast.Name):
+        c.error(statement.pos, "statement", f"{node.name} is an instance; a call of it is written {node.name}();")
     elif e.type is not ERROR:
         c.error(statement.pos, "statement", "this is a value, not a statement; write an assignment or a call")
     return []

@@ -24,6 +24,7 @@ from plctool.compiler.semantics.symbols import (
     Member,
     Namespace,
     PouSymbol,
+    Role,
     VarSymbol,
 )
 from plctool.compiler.syntax import ast
@@ -275,7 +276,11 @@ def _call_of_place(c: Checker, node: ast.Call) -> Expr:
     if e.type is ERROR:
         return e
     if isinstance(e.type, StructType) and e.type in c.world.blocks:
-        return c.error(node.pos, "call", f"a call of the function block {e.type} is a statement and has no value")
+        outputs = (s.name for s in c.world.blocks[e.type].members.values() if s.role is Role.OUTPUT)
+        name, output = node.callee.name if isinstance(node.callee, ast.Name) else "", next(outputs, "")
+        read = f"; call it first, then read {name}.{output}" if name and output else ""
+        message = f"a call of the function block {e.type} is a statement and has no value{read}"
+        return c.error(node.pos, "call", message)
     if isinstance(node.callee, ast.Member) and isinstance(e, Load) and not node.args:
         owner = e.place.base.type if isinstance(e.place, MemberPlace) else None
         of = f" of {owner}" if owner is not None else ""

@@ -223,6 +223,8 @@ def _label_range(c: Checker, label: ast.CaseLabel, t: Type, seen: _Labels) -> tu
 
 def _label_value(c: Checker, node: ast.Expr, t: Type) -> int | None:
     e = c.constant(node, t)
+    if isinstance(node, ast.Binary) and node.op is ast.Operator.OR and isinstance(node.right, ast.Literal) and e:
+        c.warning(node.pos, "case", f"this is the one value {e.value}; several values are separated by commas")
     if e is None:
         return None
     if not is_untyped(e) and isinstance(t, EnumType) and e.type is not t and isinstance(e.type, EnumType):

@@ -70,7 +70,7 @@ def qualified(c: Checker, node: ast.Member) -> Expr | None:
             return error_value(c.pos(node.pos))
         return variable_value(c.world.declared.variable(symbol), c.pos(node.pos))
     if symbol is not None:
-        return c.error(node.pos, "name", f"{name} is {describe(symbol)}, not a value")
+        return c.error(node.pos, "name", f"{name} is {describe(symbol)}, not a value{instance_hint(symbol)}")
     space, _, value = name.rpartition(".")
     owner = c.scope.lookup(space)
     if isinstance(owner, TypeSymbol):
@@ -112,6 +112,12 @@ def dotted_name(c: Checker, node: ast.Expr) -> str | None:
     if not isinstance(node, ast.Name) or not parts or isinstance(c.scope.lookup(node.name), VarSymbol):
         return None
     return ".".join([node.name, *reversed(parts)])
+
+
+def instance_hint(symbol: object) -> str:
+    """What to do with a name that stands for a type with instances."""
+    is_block = isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK
+    return "; declare an instance of it" if is_block else ""
 
 
 def describe(symbol: object) -> str:

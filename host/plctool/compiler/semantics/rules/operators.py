@@ -135,8 +135,10 @@ def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expe
         t = _number_type(left.type, right.type)
         if t is not None and op is BinaryOp.MOD and t.kind is Kind.REAL:
             t = None
-    if t is None and op is BinaryOp.ADD and (isinstance(left.type, StringType) or isinstance(right.type, StringType)):
-        return c.error(offset, "type", "strings are joined by CONCAT(a, b), not by +")
+    texts = isinstance(left.type, StringType) + isinstance(right.type, StringType)
+    if t is None and ((texts == 2 and op is BinaryOp.AND) or (texts and op is BinaryOp.ADD)):
+        sign = "&" if op is BinaryOp.AND else "+"
+        return c.error(offset, "type", f"strings are joined by CONCAT(a, b), not by {sign}")
     if t is None:
         return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
     if t in _UNTYPED:
@@ -237,6 +239,15 @@ def _duration_arithmetic(c: Checker, op: BinaryOp, left: Expr, right: Expr, offs
     return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
 
 
+def _duration_hint(left: Expr, right: Expr) -> str:
+    """What to write when a duration is compared with a number."""
+    bases = elementary(left.type), elementary(right.type)
+    if not any(base is not None and base.kind is Kind.TIME for base in bases):
+        return ""
+    numbers = (e.value for e in (left, right) if isinstance(e, Const) and type(e.value) is int)
+    return next((f"; a duration is written T#{number}ms" for number in numbers), "")
+
+
 def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr:
     if is_untyped(left) is not is_untyped(right):
         _report_decided(c, op, left, right, offset)
@@ -260,6 +271,8 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
         hint = ""
         if isinstance(left, Binary) and left.op in _COMPARISONS:
             hint = f"; to compare a value twice, write a {left.op.value} b AND b {op.value} c"
+        else:
+            hint = _duration_hint(left, right)
         return c.error(offset, "type", f"{op.value} cannot compare {left.type} with {right.type}{hint}")
     if isinstance(t, StringType):
         return _build(c, op, c.coerce(left, t), c.coerce(right, t), BOOL, offset)

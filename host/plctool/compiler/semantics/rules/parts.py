@@ -179,7 +179,7 @@ def indexed(c: Checker, node: ast.Index, expected: Type | None) -> Expr:
             return c.error(node.pos, "type", message)
         count = len(t.bounds)
         if len(indices) < count:
-            return c.error(node.pos, "type", f"{t} needs {count} indices, not {len(indices)}")
+            return c.error(node.pos, "type", f"{t} needs {count} indices, not {len(indices)}; write [i, j]")
         base, indices = _element(c, base, t, indices[:count], node.pos), indices[count:]
     return base
 

@@ -16,6 +16,7 @@ from plctool.compiler.semantics.rules.calls import property_value
 from plctool.compiler.semantics.rules.members import (
     bound_member,
     describe,
+    instance_hint,
     is_namespace,
     namespace_member,
     own_member,
@@ -82,6 +83,8 @@ def _flag_symbol(cls: ClassInfo | None, action: str) -> VarSymbol | None:
 # ---- variables, constants, enumerations, THIS and SUPER ----
 
 _OWN = ("THIS", "SUPER")
+_ADDRESS = re.compile(r"([IQMEA])([XBWDL]?\d+)", re.IGNORECASE)
+_DATA_BLOCK = re.compile(r"DB\d+", re.IGNORECASE)
 _DURATION = re.compile(r"T_?(\d+(?:ms|us|ns|s|m|h|d))", re.IGNORECASE)
 
 
@@ -108,7 +111,7 @@ def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
         value = _enumerated(c, node, expected)
         if value is not None or symbol is None:
             return value or _unknown(c, node)
-    return c.error(node.pos, "name", f"{node.name} is {describe(symbol)}, not a value")
+    return c.error(node.pos, "name", f"{node.name} is {describe(symbol)}, not a value{instance_hint(symbol)}")
 
 
 def _yields(c: Checker, symbol: object, name: str, wanted: EnumType) -> bool:
@@ -185,6 +188,13 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
         return c.error(node.pos, "unknown", f"{message}, which makes it a variable")
     names = [*(s for s in c.scope.names), *c.world.names.visible_names()]
     hint = known_name_like(node.name, {_written(c, n) for n in names} - {""})
+    if not hint and (address := _ADDRESS.fullmatch(node.name)):
+        area = {"E": "I", "A": "Q"}.get(address[1].upper(), address[1])
+        message = f"unknown name {node.name}; an address begins with %: %{area}{address[2]}"
+        return c.error(node.pos, "unknown", message)
+    if not hint and _DATA_BLOCK.fullmatch(node.name):
+        message = f"unknown name {node.name}; there are no data blocks: declare a variable in VAR_GLOBAL"
+        return c.error(node.pos, "unknown", message)
     if node.name and not hint:
         return c.missing(node.pos, node.name, f"unknown name {node.name}")
     return c.error(node.pos, "unknown", f"unknown name {node.name}{hint}" if node.name else "a name is missing")

@@ -1,0 +1,172 @@
+"""Slips of those who know C, Python, Siemens, ladder diagrams or a spreadsheet: each message says what to write.
+
+All were written down before their messages were looked at.
+"""
+
+from __future__ import annotations
+
+import pytest
+from front_support import messages
+
+VARIABLES = (
+    "a, b : INT; on : BOOL; r : REAL; s : STRING; t : TON; tm : TIME; arr : ARRAY[1..9] OF INT; "
+    "m : ARRAY[1..3, 1..3] OF INT;"
+)
+TASK = "PROGRAM Main\nEND_PROGRAM\nCONFIGURATION C\nTASK T1(INTERVAL := T#10ms);\n"
+BODY = 5  # the line where a case stands
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("++a;", ["1: there is no ++; write a := a + 1"]),
+        ("a--;", ["1: there is no --; write a := a - 1"]),
+        ("a -= b;", ["1: there is no -=; write a := a - b"]),
+        ("a *= 2;", ["1: there is no *=; write a := a * 2"]),
+        ("b := p->x;", ["1: -> is written ^. here: p^.x"]),
+        ('"a" := 1;', ["1: a name is written without quotes: a"]),
+        ("#define MAX 10", ["1: # has no place in a program; constants are declared in VAR CONSTANT ... END_VAR"]),
+        (
+            "#include <math.h>",
+            ["1: # has no place in a program; all sources of a program are compiled together; leave it out"],
+        ),
+        ("IF a = 1 THEN\nb := 1;\nELIF a = 2 THEN\nb := 2;\nEND_IF;", ["3: ELIF is written ELSIF"]),
+        ("def foo(x):", ["1: a function is declared FUNCTION foo : INT ... END_FUNCTION, outside of the PROGRAM"]),
+        ("import math", ["1: all sources and libraries of a program are compiled together; nothing is imported"]),
+        ("IF a > 3:\nb := 1;\nEND_IF;", ["1: the condition of IF ends with THEN, not with a colon"]),
+        ("while on:\na := 1;\nEND_WHILE;", ["1: the condition of WHILE ends with DO, not with a colon"]),
+        ("t(IN := on, PT := S5T#2s);", ["1: a duration is written T#2s, not S5T#2s"]),
+        ("REGION Pump\na := 1;", ["1: there is no REGION; write a comment"]),
+        ("DB10.DBW2 := 3;", ["1: unknown name DB10; there are no data blocks: declare a variable in VAR_GLOBAL"]),
+        ("a := MW10;", ["1: unknown name MW10; an address begins with %: %MW10"]),
+        ("on := E0.1;", ["1: unknown name E0; an address begins with %: %I0"]),
+        ("SET on;", ["1: write on := TRUE;"]),
+        ("RESET on;", ["1: write on := FALSE;"]),
+        (
+            "b := IF(a > 3, 1, 2);",
+            ["1: a choice between two values is written SEL(condition, value_if_false, value_if_true)"],
+        ),
+        ("b := MAX(a; b);", ["1: arguments are separated by commas"]),
+        ("r := 50%;", ["1: % has no place in a program; 50 % is written 0.5"]),
+        ("s := s & 'x';", ["1: strings are joined by CONCAT(a, b), not by &"]),
+        ("b := SUM(arr[1..3]);", ["1: an index is one number; for several elements write a loop"]),
+        ("VAR_STATIC\nz : INT;\nEND_VAR\na := 1;", ["1: VAR_STATIC is written VAR_STAT"]),
+        ("FOR a := 1 TO 3 DO\nb := 1;\nEND_FRO;\na := 1;", ["3: END_FRO is written END_FOR"]),
+        (
+            "REPEAT a := a + 1; UNTIL a > 3 DO END_REPEAT;",
+            ["1: the condition of UNTIL ends with END_REPEAT, without DO"],
+        ),
+        (
+            "TASK Fast(INTERVAL := T#10ms);",
+            ["1: a task is declared in CONFIGURATION ... END_CONFIGURATION, outside of the PROGRAM"],
+        ),
+        ("tm := T#5sec;", ["1: 5sec is not a duration such as 1h30m or 2.5s; its units are d, h, m, s, ms, us and ns"]),
+        (
+            "tm := T#5 s;",
+            [
+                "1: 5 is not a duration such as 1h30m or 2.5s; 5 has no unit, as in 5s",
+                "1: a duration has no blank: T#5s",
+            ],
+        ),
+        (
+            "tm := T#01:30:00;",
+            [
+                "1: 01 is not a duration such as 1h30m or 2.5s; 01 has no unit, as in 01s",
+                "1: a duration is written with its units: T#1h30m5s",
+            ],
+        ),
+        ("tm := '5s';", ["1: STRING[2] does not fit TIME; a duration is written without quotes: T#5s"]),
+        ("on := tm > 5;", ["1: > cannot compare TIME with INT; a duration is written T#5ms"]),
+        ("on := t.ET >= 500;", ["1: >= cannot compare TIME with INT; a duration is written T#500ms"]),
+        ("arr := 0;", ["1: an integer does not fit ARRAY[1..9] OF INT; assign to its elements in a loop"]),
+        ("m[1][2] := 3;", ["1: ARRAY[1..3,1..3] OF INT needs 2 indices, not 1; write [i, j]"]),
+        ("s := '5$';", ["1: this string is not closed before the end of the line; a $ in a string is written $$"]),
+        (
+            "on := t(IN := on, PT := T#5s);",
+            ["1: a call of the function block TON is a statement and has no value; call it first, then read t.Q"],
+        ),
+        ("on := TON.Q;", ["1: TON is a function block type, not a value; declare an instance of it"]),
+        ("t(IN = on, PT := T#5s);", ["1: the input IN is given with :=, not with ="]),
+        ("t(INPUT := on);", ["1: TON has no parameter INPUT; it has IN, PT, Q, ET"]),
+        ("t;", ["1: t is an instance; a call of it is written t();"]),
+    ],
+)
+def test_a_slip_in_a_body(body: str, said: list[str]) -> None:
+    found = messages(f"PROGRAM Main\nVAR\n{VARIABLES}\nEND_VAR\n{body}\nEND_PROGRAM\n")
+    assert [f"{int(m.split(':')[0]) - BODY + 1}: {m.split(': ', 1)[1]}" for m in found] == said
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("c : ARRAY[1 TO 9] OF INT;", "the bounds of an array are written 1..9"),
+        ("c : ARRAY[1.9] OF INT;", "the bounds of an array are written 1..9"),
+        ("c : ARRAY[1:9] OF INT;", "the bounds of an array are written 1..9"),
+        (
+            "c : ARRAY[1..3] OF INT := (1, 2, 3);",
+            "(name := value) does not initialise ARRAY[1..3] OF INT; the values of an array are written in brackets",
+        ),
+        ("c : ARRAY[1..a] OF INT;", "a constant is needed here; declare a in VAR CONSTANT"),
+        ("DIM c AS FLOAT;", "a variable is declared with its name first: c : REAL;"),
+        ("c AS INT;", "a variable is declared with its name first: c : INT;"),
+        ("RETAIN c : INT;", "variables of this kind are declared in VAR RETAIN ... END_VAR"),
+        ("c AT IX0.0 : BOOL;", "an address begins with %: %IX0.0"),
+        ("c AT %IX0.8 : BOOL;", "%IX0.8 is not an address such as %IX0.3 or %QW2; a byte has the bits 0 to 7"),
+        ("c AT %IW0 : BOOL;", "a BOOL is at a bit such as %IX0.3, %IW0 has 16"),
+        ("c AT %I0.0 : INT;", "%I0.0 is a bit, INT is not; write %IW and a number"),
+        ("c AT %E0.0 : BOOL;", "% has no place in a program; inputs (E) are at %I"),
+        ("c AT %AW0 : INT;", "% has no place in a program; outputs (A) are at %Q"),
+        (
+            "c @ %IX0.0 : BOOL;",
+            "@ has no place in a program; a variable at an address is written name AT %IX0.0 : BOOL;",
+        ),
+        ("c AT %ID0 : INT;", "INT has 16 bits, %ID0 32; write %IW and a number"),
+    ],
+)
+def test_a_slip_in_a_declaration(line: str, said: str) -> None:
+    found = messages(f"PROGRAM Main\nVAR\n{VARIABLES}\n{line}\nEND_VAR\na := 1;\nEND_PROGRAM\n")
+    assert [m.split(": ", 1)[1] for m in found] == [said]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("FUNCTION_BLOCK F\nVARINPUT a : INT; END_VAR\nEND_FUNCTION_BLOCK\n", ["2:1: VARINPUT is written VAR_INPUT"]),
+        ("FUNTION F : INT\nF := 1;\nEND_FUNCTION\n", ["1:1: FUNTION is written FUNCTION"]),
+        ("FUNCTION BLOCK F\nEND_FUNCTION_BLOCK\n", ["1:10: FUNCTION BLOCK is written FUNCTION_BLOCK"]),
+        ("FUNCTION F INT\nF := 1;\nEND_FUNCTION\n", ["1:1: the type of the result follows a colon: FUNCTION F : INT"]),
+        ("STRUCT P\nx : INT;\nEND_STRUCT\n", ["1:1: a structure is declared TYPE P : STRUCT ... END_STRUCT; END_TYPE"]),
+        ("PROGRAM Main\nENDPROGRAM\n", ["2:1: ENDPROGRAM is written END_PROGRAM"]),
+        (
+            "PROGRAM Main\nVAR_GLOBAL a : INT; END_VAR\na := 1;\nEND_PROGRAM\n",
+            ["2:1: VAR_GLOBAL stands outside of the PROGRAM"],
+        ),
+        (
+            "VAR a : INT; END_VAR\nPROGRAM Main\nEND_PROGRAM\n",
+            ["1:1: VAR stands in a PROGRAM, FUNCTION or FUNCTION_BLOCK; for all of them write VAR_GLOBAL"],
+        ),
+        ("VARGLOBAL a : INT; END_VAR\nPROGRAM Main\nEND_PROGRAM\n", ["1:1: VARGLOBAL is written VAR_GLOBAL"]),
+        (
+            "PROGRAM Main\nVAR_CONSTANT a : INT := 1; END_VAR\nEND_PROGRAM\n",
+            ["2:1: VAR_CONSTANT is written VAR CONSTANT"],
+        ),
+        (
+            "PROGRAM Main\nCONSTANT VAR a : INT := 1; END_VAR\nEND_PROGRAM\n",
+            ["2:1: CONSTANT comes after VAR: VAR CONSTANT", "2:9: expected ; after the statement"],
+        ),
+        (
+            TASK + "PROGRAM One WITH T2 : Main;\nEND_CONFIGURATION\n",
+            ["5:18: there is no task T2; there is T1"],
+        ),
+        (
+            TASK + "PROGRAM Main WITH T1;\nEND_CONFIGURATION\n",
+            ["5:21: an instance of a program is declared PROGRAM Main1 WITH T1 : Main;"],
+        ),
+        (
+            TASK + "PROGRAM One : Main WITH T1;\nEND_CONFIGURATION\n",
+            ["5:20: an instance of a program is declared PROGRAM One WITH T1 : Main;"],
+        ),
+    ],
+)
+def test_a_slip_in_a_unit(text: str, said: list[str]) -> None:
+    assert messages(text) == said
