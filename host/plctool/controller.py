@@ -27,8 +27,7 @@ from plctool.debug.symbols import (
 )
 from plctool.debug.variables import Change, Reading, Symbol
 from plctool.errors import DeviceError, UsageError
-from plctool.files import read_image
-from plctool.image.file import image_crc, parse_image
+from plctool.image.file import image_crc, parse_image, read_program
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, AppState, LogEntry, Status, TaskInfo
 
@@ -144,7 +143,7 @@ class Controller(ABC):
         wait meanwhile. Raises LinkError when one of them is downloading, UsageError for what is not an image,
         DeviceError when the controller refuses it.
         """
-        data = image if isinstance(image, bytes) else read_image(Path(image))
+        data = image if isinstance(image, bytes) else read_program(Path(image))
         if not unchecked:
             parse_image(data)
         what = "a program" if isinstance(image, bytes) else Path(image).name

@@ -46,8 +46,15 @@ def path_error(error: OSError) -> UsageError:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """The file has the old or the new content, whatever happens on the way."""
+    """The file has the old or the new content, whatever happens on the way; a link to it stays one. What is no file but
+    a device or a pipe, such as /dev/stdout, is written to."""
     try:
+        path = Path(os.path.realpath(path)) if path.is_file() else path
+        if path.exists() and not path.is_file() and not path.is_dir():
+            path.write_bytes(data)
+            return
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         file = tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False)  # noqa: SIM115
         try:
             with file:

@@ -20,10 +20,9 @@ from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Change, Symbol, unreachable
 from plctool.errors import DeviceError, UsageError
-from plctool.files import read_image
 from plctool.iec.areas import Area
 from plctool.iec.types import Type
-from plctool.image.file import image_crc, parse_image
+from plctool.image.file import image_crc, parse_image, read_program
 from plctool.image.targets import host_target
 from plctool.link import l7
 from plctool.link.monitoring import Contents
@@ -84,7 +83,7 @@ class Simulator(Controller):
     def from_file(cls, path: Path | str, *, start: bool = True) -> Simulator:
         """The program in `app.cdl` with its symbols (`app.sym` beside it)."""
         file = Path(path)
-        image = read_image(file)
+        image = read_program(file)
         return cls(image, find_symbols(parse_image(image).crc, file), start=start)
 
     @classmethod

@@ -16,9 +16,8 @@ from typing import Any, Self
 
 from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.errors import DeviceError, PlcError, UsageError
-from plctool.files import read_image
 from plctool.iec.types import StructType
-from plctool.image.file import image_crc
+from plctool.image.file import image_crc, read_program
 from plctool.sim import Simulator
 
 
@@ -40,7 +39,7 @@ class PlantProgram:
     @classmethod
     def from_file(cls, path: Path | str) -> PlantProgram:
         """The program in `plant.cdl` with its symbols (`plant.sym` beside it)."""
-        image = read_image(Path(path))
+        image = read_program(Path(path))
         return cls(image, find_symbols(image_crc(image), Path(path)))
 
     def __enter__(self) -> Self:

@@ -231,6 +231,18 @@ def test_read_of_an_unknown_name_exits_2_with_a_suggestion(tool: Any, running: F
     assert "Main.count" in done.json["error"]["message"]
 
 
+@pytest.mark.parametrize("command", ["read", "watch"])
+def test_an_empty_name_is_called_empty(tool: Any, running: FakePlc, command: str) -> None:
+    done = tool(command, *PORT, "")
+    assert (done.status, done.err) == (2, "plctool: A name is empty; write for example Main.speed.\n")
+
+
+def test_a_pattern_is_not_written_to(tool: Any, running: FakePlc) -> None:
+    done = tool("write", *PORT, "Main.*=1")
+    assert done.status == 2
+    assert "Main.* stands for several variables; name one" in done.err
+
+
 def test_read_without_application_exits_1(tool: Any, plc: FakePlc) -> None:
     assert tool("read", *PORT, "Main.count", "--json").status == 1
 
@@ -395,9 +407,21 @@ def test_the_project_names_the_link_where_the_environment_does_not(
     assert opened == ["serial:/dev/project?baud=115200", "serial:/dev/mine?baud=115200"]
 
 
+def test_a_port_of_the_project_begins_at_its_folder(
+    tool: Any, opened: list[str], scratch: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (scratch / "plc.toml").write_text('link = "serial:plc.tty"\n')
+    (scratch / "plc.tty").touch()
+    (scratch / "sources").mkdir()
+    monkeypatch.chdir(scratch / "sources")
+    assert tool("status").status == 0
+    assert opened == ["serial:../plc.tty?baud=115200"]
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        ("\nlink = 5", "plc.toml:2: link is not a text"),
         ("link = 5", 'write for example link = "serial:/dev/ttyS0"'),
         ("link = ", "is not TOML"),
         ('link = "/dev/ttyS0"', "'/dev/ttyS0' is not a link; write for example serial:/dev/ttyS0"),

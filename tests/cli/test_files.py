@@ -269,6 +269,16 @@ def test_a_trace_replaces_neither_the_image_nor_its_symbols(tool: Any, counter: 
         assert done.status == 2 and "write for example -o trace.csv" in done.err
 
 
+def test_a_run_names_the_file_of_its_trace(tool: Any, counter: Path) -> None:
+    assert tool("run", str(counter), "--trace", "Main.n").out == "1 cycles, 0 ms; the values are in trace.csv\n"
+
+
+def test_a_file_for_a_trace_without_names_is_refused(tool: Any, counter: Path, scratch: Path) -> None:
+    done = tool("run", str(counter), "-o", "n.csv")
+    assert done.status == 2 and "-o is the file of --trace" in done.err
+    assert not (scratch / "n.csv").exists()
+
+
 def test_run_takes_patterns_of_what_to_print(tool: Any, scratch: Path) -> None:
     text = """TYPE P : STRUCT x : INT; y : REAL; END_STRUCT END_TYPE
 INTERFACE I END_INTERFACE
@@ -357,6 +367,28 @@ def test_a_file_that_cannot_be_written_leaves_nothing(
     assert done.status == 2
     assert "No space left" in done.err
     assert set(scratch.iterdir()) == before
+
+
+def test_what_is_written_goes_through_a_link_to_its_file(tool: Any, counter: Path, scratch: Path) -> None:
+    (scratch / "old.cdl").write_bytes(b"old")
+    (scratch / "link.cdl").symlink_to("old.cdl")
+    assert tool("build", "counter.st", "-o", "link.cdl").status == 0
+    assert (scratch / "link.cdl").is_symlink()
+    assert (scratch / "old.cdl").read_bytes() == counter.read_bytes()
+
+
+def test_what_is_no_file_is_written_to_and_not_replaced(tool: Any, counter: Path, scratch: Path) -> None:
+    os.mkfifo(scratch / "pipe")
+    reader = os.open(scratch / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    assert tool("run", str(counter), "--trace", "Main.n", "-o", "pipe").status == 0
+    assert os.read(reader, 100) == b"time_ms,Main.n\n0,1\n"
+    os.close(reader)
+    assert (scratch / "pipe").is_fifo()
+
+
+def test_a_folder_is_no_file_to_write(tool: Any, counter: Path, scratch: Path) -> None:
+    done = tool("run", str(counter), "--trace", "Main.n", "-o", ".")
+    assert (done.status, done.err) == (2, "plctool: . cannot be written: Is a directory.\n")
 
 
 def test_run_of_a_missing_image_exits_2(tool: Any) -> None:

@@ -241,3 +241,31 @@ def test_program_of_another_board_is_not_burned(build: Callable[..., Path], tool
     assert f"The inputs and outputs of {image} are those of LM3S6965 board, this is MPS2 AN385 (full)" in refused.err
     image = build(PROGRAM, "--board", "mps2-an385/full")
     assert tool("image", str(image), "--board", "mps2-an385/full", "-o", "flash.bin").status == 0
+
+
+@pytest.mark.parametrize("suffix", [".bin", ".hex"])
+@pytest.mark.parametrize(
+    "command", ["run FLASH", "symbols FLASH", "bench FLASH", "image FLASH --board plcrt -o other.bin"]
+)
+def test_a_production_image_in_place_of_a_program_is_called_so(
+    tool: Any, build: Callable[..., Path], command: str, suffix: str
+) -> None:
+    assert tool("image", str(build()), "--board", "plcrt", "-o", f"flash{suffix}").status == 0
+    done = tool(*command.replace("FLASH", f"flash{suffix}").split())
+    assert done.status == 2
+    assert f"flash{suffix} is a production image, for a programmer; name the .cdl that it was made of." in done.err
+
+
+def test_a_program_may_be_named_bin(tool: Any, build: Callable[..., Path], scratch: Path) -> None:
+    (scratch / "app.bin").write_bytes(build().read_bytes())
+    assert tool("run", "app.bin").status == 0
+
+
+@pytest.mark.parametrize("damage", [lambda line: line[:-2] + "00", lambda line: line[:-5]])
+def test_a_damaged_hex_names_the_line(tool: Any, for_m3: Path, scratch: Path, damage: Callable[[str], str]) -> None:
+    tool("image", str(for_m3), "--board", "mps2-an385/standard", "-o", "flash.hex")
+    lines = (scratch / "flash.hex").read_text().splitlines()
+    lines[4] = damage(lines[4])
+    (scratch / "flash.hex").write_text("\n".join(lines))
+    done = tool("info", "flash.hex")
+    assert done.status == 2 and "is not an Intel HEX file, or damaged in line 5" in done.err

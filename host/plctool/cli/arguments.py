@@ -142,7 +142,6 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "-o",
         "--output",
         type=usable_path,
-        default=Path("trace.csv"),
         metavar="FILE",
         help="of --trace; default: trace.csv",
     )

@@ -271,9 +271,9 @@ def variables(path: Path, patterns: Sequence[str]) -> Document:
     variables."""
     from plctool.debug.symbols import find_symbols
     from plctool.iec.areas import Area
-    from plctool.image.file import describe_image
+    from plctool.image.file import describe_image, read_program
 
-    symbols = find_symbols(int(describe_image(read_image(path))["crc"], 16), path)
+    symbols = find_symbols(int(describe_image(read_program(path))["crc"], 16), path)
     areas = {area.value: area.name.lower() for area in Area}
     return {
         "variables": [

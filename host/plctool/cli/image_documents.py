@@ -13,14 +13,14 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
     """Writes what a programmer burns to `output`; "burn_apart" is the firmware that cannot be in it. Raises UsageError
     when the parts do not go together."""
     from plctool.image.board import board_of, read_firmware
-    from plctool.image.file import image_crc
+    from plctool.image.file import image_crc, read_program
     from plctool.image.production import is_production, production_pieces, write_production
 
     if not is_production(output):
         raise UsageError(f"{output} is neither .bin nor .hex; write for example -o {output.stem}.hex.", "bad-output")
     of_firmware = None if firmware is None else read_firmware(firmware)
     wanted = board_of(board, of_firmware)
-    data = read_image(image)
+    data = read_program(image)
     meant = board_in(data)
     if meant not in ("", wanted.name) and not wanted.is_program:
         raise UsageError(

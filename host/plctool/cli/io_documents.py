@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from plctool.cli.overwriting import check_not_read
 from plctool.errors import UsageError, did_you_mean
-from plctool.files import make_folder, read_image, write_atomically
+from plctool.files import make_folder, write_atomically
 
 if TYPE_CHECKING:
     from plctool.device import Plc
@@ -31,9 +31,9 @@ _LAST_PARAMETER = 0xFFFF_FFFF
 def channels_of(path: Path) -> Document:
     """The channels of an image."""
     from plctool.debug.symbols import find_symbols
-    from plctool.image.file import describe_image
+    from plctool.image.file import describe_image, read_program
 
-    symbols = find_symbols(int(describe_image(read_image(path))["crc"], 16), path)
+    symbols = find_symbols(int(describe_image(read_program(path))["crc"], 16), path)
     return {"channels": symbols.io.get("channels", [])}
 
 

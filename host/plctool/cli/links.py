@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -76,13 +77,21 @@ def _default_link() -> Link | None:
 def _link_in(file: Path) -> Link | None:
     """What a project says. Raises UsageError for a file that cannot be understood."""
     try:
-        text = TomlText(str(file), read_utf8(file, "bad-project")).values.get("link")
+        toml = TomlText(str(file), read_utf8(file, "bad-project"))
+        text = toml.values.get("link")
     except BadToml as error:
         where = f"{file}:{error.pos.line}:{error.pos.column}"
         raise UsageError(f"{where}: {error.message}.", "bad-project") from None
     if text is not None and not isinstance(text, str):
-        raise UsageError(f'{file}: link is not a text; write for example link = "serial:/dev/ttyS0".', "bad-project")
-    return _parse(text, str(file)) if text else None
+        where = f"{file}:{toml.key_pos(('link',)).line}"
+        raise UsageError(f'{where}: link is not a text; write for example link = "serial:/dev/ttyS0".', "bad-project")
+    return _beside(file, _parse(text, str(file))) if text else None
+
+
+def _beside(file: Path, link: Link) -> Link:
+    """The link of a project whose port is a path that begins at its folder, as that of `--serial pty:plc.tty` may."""
+    place = file.parent / link.place
+    return replace(link, place=str(place)) if link.is_shared and place.exists() else link
 
 
 def _parse(text: str, where: str) -> Link:

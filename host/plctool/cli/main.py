@@ -100,7 +100,9 @@ def _symbols(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace) -> int:
     from plctool.io.faults import parse_fault
 
-    trace = documents.TraceFile(args.trace, args.output) if args.trace else None
+    if args.output and not args.trace:
+        raise UsageError("-o is the file of --trace; write for example --trace 'Main.*' -o trace.csv.", "usage")
+    trace = documents.TraceFile(args.trace, args.output or Path("trace.csv")) if args.trace else None
     faults = [parse_fault(text) for text in args.fault]
     document, texts = documents.run(
         _program_to_run(args), args.cycles, args.time, pairs(args.set), args.get, args.plant, trace, faults

@@ -78,8 +78,9 @@ def variables_text(document: dict[str, Any]) -> str:
 
 
 def run_text(document: dict[str, Any], texts: dict[str, str]) -> str:
-    """Values as ST writes them, and how long it ran."""
-    return f"{values_text(texts)}\n{document['cycles']} cycles, {document['time_ms']:.10g} ms".lstrip()
+    """Values as ST writes them, how long it ran, and the file of a trace."""
+    trace = f"; the values are in {document['trace']}" if "trace" in document else ""
+    return f"{values_text(texts)}\n{document['cycles']} cycles, {document['time_ms']:.10g} ms{trace}".lstrip()
 
 
 def missing_text(document: dict[str, Any]) -> str:

@@ -149,6 +149,10 @@ class Units:
 
     def no_variable(self, path: str, unit: str, known: Iterable[str]) -> UsageError:
         """The error about a path that leads to nothing in `unit`; `known` are those that would."""
+        if not path:
+            return UsageError("A name is empty; write for example Main.speed.", "unknown-variable")
+        if "*" in path or "?" in path:
+            return UsageError(f"{path} stands for several variables; name one, 'plctool symbols' lists them.", "usage")
         if path.rpartition(".")[2].casefold() in self.temporaries.get(unit.casefold(), ()):
             return UsageError(f"{path} lives only while {unit} runs: there is nothing to read or write.", "temporary")
         lower = {k.casefold(): k for k in known}

@@ -9,10 +9,12 @@ import time
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
+from plctool.files import read_image
 from plctool.iec.areas import Area
 
 NO_AREA = int(lib.APP_AREA_NONE)
@@ -31,6 +33,7 @@ _SEGMENTS = (
     "application_info", "area_table", "function_table", "external_function_table", "iec_function_table", "blob", "code",
 )  # fmt: skip
 _MAX_NAME = 255
+TAG = int(lib.CDL_HEADER_TAG).to_bytes(4, "little")
 _BLOB_IO = int(lib.CDL_BLOB_IO)
 
 
@@ -310,6 +313,18 @@ def parse_image(data: bytes) -> Image:
         io=_parse_io(blobs.get(_BLOB_IO, b""), len(code)),
         crc=int(header.crc),
     )
+
+
+def read_program(path: Path) -> bytes:
+    """The bytes of an image that is to run. Raises UsageError for what a programmer burns, which has one in it."""
+    data, size = read_image(path), int(lib.CDL_HEADER_SIZE)
+    is_flash = path.suffix.lower() == ".bin" and data.startswith(TAG) and len(data) >= size
+    if is_flash:
+        is_flash = ffi.from_buffer("CDL_HEADER *", data[:size]).total_size < len(data)
+    if is_flash or path.suffix.lower() == ".hex":
+        message = f"{path} is a production image, for a programmer; name the .cdl that it was made of."
+        raise UsageError(message, "production-image")
+    return data
 
 
 def image_crc(data: bytes) -> int:

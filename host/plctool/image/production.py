@@ -24,14 +24,13 @@ from plctool.errors import UsageError
 from plctool.files import write_atomically
 from plctool.iec.types import align_up
 from plctool.image.board import COMMIT, RETAIN, SLOT_A, SLOT_B, Board, Firmware, Flash, Segment
-from plctool.image.file import describe_image, image_crc, parse_image, target_name
+from plctool.image.file import TAG, describe_image, image_crc, parse_image, target_name
 from plctool.image.limits import check_fit, needs_of_image
 
 BIN, HEX = ".bin", ".hex"
 _FIRST = 1  # number of the first seal, and of the first record
 _MOST_BIN = 64 * 1024 * 1024  # bytes; a file with more of them has mostly gaps
 _ALIGN = int(lib.FILE_ALIGN)
-_TAG = int(lib.CDL_HEADER_TAG).to_bytes(4, "little")
 
 
 @dataclass(frozen=True)
@@ -186,7 +185,10 @@ def _segments(path: Path, data: bytes) -> Iterator[Segment]:
     content = IntelHex()
     try:
         content.loadhex(io.StringIO(data.decode("ascii")))
-    except (HexReaderError, UnicodeDecodeError):
+    except HexReaderError as error:
+        line = f" in line {error.line}" if hasattr(error, "line") else ""
+        raise UsageError(f"{path} is not an Intel HEX file, or damaged{line}; write it again.", "bad-image") from None
+    except UnicodeDecodeError:
         raise UsageError(f"{path} is not an Intel HEX file, or damaged; write it again.", "bad-image") from None
     for start, end in content.segments():
         yield Segment(start, bytes(content.tobinarray(start=start, end=end - 1)))
@@ -194,10 +196,10 @@ def _segments(path: Path, data: bytes) -> Iterator[Segment]:
 
 def _programs(segment: Segment) -> Iterator[dict[str, Any]]:
     data, at = segment.data, 0
-    while (at := data.find(_TAG, at)) >= 0:
+    while (at := data.find(TAG, at)) >= 0:
         image = _image_at(data, at)
         if image is None:
-            at += len(_TAG)
+            at += len(TAG)
             continue
         yield {"address": f"{segment.address + at:08X}", "seal": _seal_number(data, at, image), **describe_image(image)}
         at += len(image)
