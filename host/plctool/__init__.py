@@ -15,12 +15,27 @@ from typing import TYPE_CHECKING, Any
 from plctool.errors import DeviceError, LinkError, PlcError, UsageError
 
 if TYPE_CHECKING:
+    from plctool.controller import ProgramStopped
     from plctool.device import Plc, connect, scan
     from plctool.sim import Simulator
 
-__all__ = ["DeviceError", "LinkError", "Plc", "PlcError", "Simulator", "UsageError", "connect", "scan"]
+__all__ = [
+    "DeviceError",
+    "LinkError",
+    "Plc",
+    "PlcError",
+    "ProgramStopped",
+    "Simulator",
+    "UsageError",
+    "connect",
+    "scan",
+]
 
-_HOMES = {"Plc": "plctool.device", "connect": "plctool.device", "scan": "plctool.device", "Simulator": "plctool.sim"}
+_HOMES = {
+    **dict.fromkeys(("Plc", "connect", "scan"), "plctool.device"),
+    "ProgramStopped": "plctool.controller",
+    "Simulator": "plctool.sim",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -105,10 +105,18 @@ class Simulator(Controller):
         from plctool.compiler import compile_sources
         from plctool.compiler.semantics.python_functions import PythonFunctions
 
+        for name, function in (functions or {}).items():
+            if not callable(function):
+                raise UsageError(f"{name} in Python is {function!r}, which cannot be called.", "python")
         python = PythonFunctions(functions) if functions else None
         built = compile_sources(paths, target=host_target(), level=level, checks=checks, python=python, dialect=dialect)
         connected = SimFunctions(functions, python.units) if python else None
-        return cls(built.image, built.symbols, start=start, cycle_limit_ms=cycle_limit_ms, functions=connected)
+        try:
+            return cls(built.image, built.symbols, start=start, cycle_limit_ms=cycle_limit_ms, functions=connected)
+        except DeviceError as error:
+            if error.result == lib.ERR_APP_UNRESOLVED_REFERENCE:
+                error.add_note("What is in C on a board may be given in Python: functions={'Name': function}.")
+            raise
 
     def _power_on(self, cycle_limit_ms: int) -> None:
         """With an empty flash and no events."""
@@ -317,7 +325,9 @@ class Simulator(Controller):
 
     def run_for(self, ms: float | timedelta = 0, *, seconds: float = 0, check: bool = True) -> None:
         """Lets virtual time pass: ten times 10 ms are ten cycles of a 10 ms task. Raises UsageError for a time that is
-        negative or longer than 146 years, and ProgramStopped as `run_cycles` does."""
+        negative or longer than 146 years, or none at all, and ProgramStopped as `run_cycles` does."""
+        if not isinstance(ms, int | float | timedelta):
+            raise UsageError(f"run_for takes milliseconds or a timedelta, not {ms!r}.", "time")
         passed = ms / timedelta(milliseconds=1) if isinstance(ms, timedelta) else ms
         ns = round(passed * 1e6 + seconds * 1e9)
         if not 0 <= ns < MAX_NS:

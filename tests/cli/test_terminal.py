@@ -57,6 +57,9 @@ class Terminal:
 def test_no_color_turns_colours_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
     assert output.wants_colour(Terminal())  # type: ignore[arg-type]
+    monkeypatch.setenv("TERM", "dumb")
+    assert not output.wants_colour(Terminal())  # type: ignore[arg-type]
+    monkeypatch.delenv("TERM")
     monkeypatch.setenv("NO_COLOR", "1")
     assert not output.wants_colour(Terminal())  # type: ignore[arg-type]
 

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plctool import Simulator, UsageError
+from plctool import DeviceError, Simulator, UsageError
 from plctool.controller import ProgramStopped
 from plctool.link.services import AppState
 
@@ -57,8 +57,9 @@ def test_a_function_in_c_is_one_of_python(tmp_path: Path) -> None:
 
 
 def test_without_it_the_function_is_missing(tmp_path: Path) -> None:
-    with pytest.raises(Exception, match="board_adc"):
+    with pytest.raises(DeviceError, match="board_adc") as raised:
         simulator(tmp_path, ADC)
+    assert "functions={'Name': function}" in raised.value.__notes__[0]
 
 
 @pytest.mark.parametrize(
@@ -231,8 +232,13 @@ def test_it_may_read_and_write_variables(tmp_path: Path) -> None:
 
 
 def test_unknown_functions_are_named(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"no function .*boardadcc.*[Dd]id you mean BoardAdc"):
+    with pytest.raises(UsageError, match=r"no function BoardAdcc; [Dd]id you mean BoardAdc"):
         simulator(tmp_path, ADC, BoardAdcc=lambda channel: 0.0)
+
+
+def test_what_is_no_function_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="BoardAdc in Python is 5, which cannot be called"):
+        simulator(tmp_path, ADC, BoardAdc=5)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

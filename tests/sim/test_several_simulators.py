@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import plctool
 from plctool import Simulator, UsageError
 from plctool.controller import ProgramStopped
 from plctool.core import lib
@@ -107,3 +109,14 @@ def test_a_folder_without_room_for_a_copy_is_named(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
     with pytest.raises(UsageError, match="TMPDIR"):
         simulator(tmp_path, LOOPS)
+
+
+@pytest.mark.parametrize("time", ["1s", None])
+def test_what_is_no_time_is_refused(tmp_path: Path, time: Any) -> None:
+    with simulator(tmp_path, "PROGRAM Main END_PROGRAM") as plc, pytest.raises(UsageError, match="or a timedelta, not"):
+        plc.run_for(time)
+
+
+def test_names_of_the_package_are_those_that_docs_import() -> None:
+    assert plctool.ProgramStopped is ProgramStopped
+    assert all(getattr(plctool, name) for name in plctool.__all__)

@@ -19,8 +19,8 @@ def as_json(document: Any) -> str:
 
 
 def wants_colour(stream: TextIO) -> bool:
-    """Whether text for a stream may have colours: on a terminal, unless NO_COLOR is set (no-color.org)."""
-    return stream.isatty() and not os.environ.get("NO_COLOR")
+    """Whether text for a stream may have colours: on a terminal with colours, unless NO_COLOR is set (no-color.org)."""
+    return stream.isatty() and os.environ.get("TERM") != "dumb" and not os.environ.get("NO_COLOR")
 
 
 def coloured(text: str, stream: TextIO) -> str:

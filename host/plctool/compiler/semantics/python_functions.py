@@ -26,7 +26,9 @@ class PythonFunctions:
     """`names`: of functions, in any case. `units`: what they are declared as, in the same order, after the check."""
 
     def __init__(self, names: Iterable[str]) -> None:
-        self._numbers = {name.casefold(): number for number, name in enumerate(names)}
+        written = list(names)
+        self._numbers = {name.casefold(): number for number, name in enumerate(written)}
+        self._written = {name.casefold(): name for name in written}
         self.units: list[Pou] = []
 
     def rewritten(self, declarations: Sequence[ast.Declaration]) -> list[ast.Declaration]:
@@ -42,8 +44,8 @@ class PythonFunctions:
         units = {s.decl.full_name.casefold(): s for s in program.world.names.functions()}
         for name in self._numbers:
             if name not in units:
-                suggestion = did_you_mean(name, [s.decl.full_name for s in units.values()])
-                raise UsageError(f"There is no function {name}{suggestion or '.'}", "unknown-function")
+                shown, known = self._written[name], [s.decl.full_name for s in units.values()]
+                raise UsageError(f"There is no function {shown}{did_you_mean(shown, known) or '.'}", "unknown-function")
             info = program.world.declared.function(units[name], {})
             if info is not None:
                 self.units.append(_callable(info.pou))
