@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -310,6 +311,20 @@ def test_watch_as_json_prints_each_reading_at_once_and_ends_well_at_ctrl_c(
     done = tool(*watched, "--json")
     assert done.status == 0
     assert len(done.out.splitlines()) == 2
+
+
+@pytest.mark.parametrize("how", [(), ("--json",)])
+def test_what_watch_prints_is_there_before_the_next_reading(
+    tool: Any, watched: tuple[str, ...], scratch: Path, monkeypatch: pytest.MonkeyPatch, how: tuple[str, ...]
+) -> None:
+    there: list[int] = []
+    monkeypatch.setattr(
+        "plctool.device.time.sleep", lambda seconds: there.append(len((scratch / "out").read_text().splitlines()))
+    )
+    with (scratch / "out").open("w") as out:
+        monkeypatch.setattr(sys, "stdout", out)
+        assert tool(*watched, *how, "--count", "3").status == 0
+    assert there[-2:] == [1, 2]
 
 
 def test_ctrl_c_exits_130_without_a_word(tool: Any, watched: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
