@@ -117,6 +117,20 @@ def test_the_reports_have_the_same_lines(tool: Tool) -> None:
     assert "Sign" in page.read_text()
 
 
+@pytest.mark.parametrize("source", ["../pump.st", "../link/pump.st"])
+def test_sources_of_other_folders_are_in_the_reports(
+    tool: Tool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, source: str
+) -> None:
+    Path("pump.st").write_text(PROGRAM + TESTS)
+    Path("link").symlink_to(tmp_path)
+    Path("here").mkdir()
+    monkeypatch.chdir("here")
+    assert tool("test", source, "--coverage", "out").status == 1  # one of the tests fails
+    (found,) = ElementTree.parse("out/cobertura.xml").getroot().iter("class")
+    assert found.get("filename", "").endswith("pump.st")
+    assert len(list(Path("out").glob("*pump_st.html"))) == 1
+
+
 def test_a_program_without_statements_has_no_report(tool: Tool) -> None:
     Path("empty.st").write_text("PROGRAM Main END_PROGRAM\nTEST 'a' ASSERT_TRUE(TRUE); END_TEST\n")
     done = tool("test", "empty.st", "--coverage", "out")

@@ -3,6 +3,7 @@ XML of Cobertura)."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -84,7 +85,7 @@ class Coverage:
         Raises OSError."""
         from coverage import Coverage as Reports
 
-        files = {str(Path(file.source.path).absolute()): file for file in self.files()}
+        files = {os.path.realpath(file.source.path): file for file in self.files()}  # the names `coverage` has
         if not files:
             return
         reports = Reports(data_file=None, config_file=False, messages=False)
