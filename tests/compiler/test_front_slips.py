@@ -89,6 +89,31 @@ BODY = 5  # the line where a case stands
         ("t(IN = on, PT := T#5s);", ["1: the input IN is given with :=, not with ="]),
         ("t(INPUT := on);", ["1: TON has no parameter INPUT; it has IN, PT, Q, ET"]),
         ("t;", ["1: t is an instance; a call of it is written t();"]),
+        (
+            "IF on THEN\na := 1;\nESLE\na := 2;\nEND_IF;",
+            ["3: expected ; after the statement; did you mean ELSE for ESLE?"],
+        ),
+        (
+            "REPEAT\na := a + 1;\nUNTILL on\nEND_REPEAT;",
+            [
+                "4: END_REPEAT has no place here; did you mean UNTIL for UNTILL?",
+                "5: expected UNTIL, found END_PROGRAM; did you mean UNTIL for UNTILL?",
+            ],
+        ),
+        ("FRO a := 1 TO 3 DO\nb := a;", ["1: expected ; after the statement; did you mean FOR for FRO?"]),
+        ("on := on ADN on;", ["1: expected ; after the statement; did you mean AND for ADN?"]),
+        ("IF on THEN\na := 1;\nFI;", ["3: FI is written END_IF"]),
+        ("WHILE on DO\na := 1;\nWEND;", ["3: WEND is written END_WHILE"]),
+        (
+            "FOR a := 1 TO 3 DO\nb := 1;\nNEXT a;",
+            ["3: NEXT a is written END_FOR", "4: END_FOR missing for the FOR in line 5"],
+        ),
+        ("IF on THEN\na := 1;\nEND;", ["3: END is written END_IF"]),
+        ("LOOP\na := 1;", ["1: a task runs its program again and again; a loop within one cycle is FOR or WHILE"]),
+        ("r := POWER(r, 2.0);", ["1: unknown function POWER; write a ** b"]),
+        ("s := str(a);", ["1: unknown function str; write TO_STRING"]),
+        ("s := 5;", ["1: an integer does not fit STRING[80]; write '5'"]),
+        ("a := arr[1, 2];", ["1: there is 1 index too many"]),
     ],
 )
 def test_a_slip_in_a_body(body: str, said: list[str]) -> None:
@@ -121,6 +146,7 @@ def test_a_slip_in_a_body(body: str, said: list[str]) -> None:
             "@ has no place in a program; a variable at an address is written name AT %IX0.0 : BOOL;",
         ),
         ("c AT %ID0 : INT;", "INT has 16 bits, %ID0 32; write %IW and a number"),
+        ("c : STRING 20;", "the length of a STRING is written STRING[20]"),
     ],
 )
 def test_a_slip_in_a_declaration(line: str, said: str) -> None:
@@ -166,7 +192,29 @@ def test_a_slip_in_a_declaration(line: str, said: str) -> None:
             TASK + "PROGRAM One : Main WITH T1;\nEND_CONFIGURATION\n",
             ["5:20: an instance of a program is declared PROGRAM One WITH T1 : Main;"],
         ),
+        ("TYPE E : {A, B}; END_TYPE\n", ["1:10: an enumeration is written (A, B)"]),
+        ("typedef INT Speed;\n", ["1:1: a type is declared TYPE Speed : INT; END_TYPE"]),
+        ("class Motor:\n", ["1:1: a class is written FUNCTION_BLOCK Motor ... END_FUNCTION_BLOCK"]),
+        ("PROCEDURE Foo\nEND_PROCEDURE\n", ["1:1: a procedure is written FUNCTION Foo ... END_FUNCTION"]),
+        (
+            "FUNCTION F(x : INT) : INT\nF := x;\nEND_FUNCTION\n",
+            ["1:11: inputs are declared after the first line: VAR_INPUT x : ... END_VAR"],
+        ),
+        ("void main() {\n}\n", ["1:1: a program is written PROGRAM Main ... END_PROGRAM"]),
     ],
 )
 def test_a_slip_in_a_unit(text: str, said: list[str]) -> None:
     assert messages(text) == said
+
+
+def test_a_name_that_is_declared_is_no_misspelt_keyword() -> None:
+    text = "PROGRAM Main\nVAR form, end : INT; END_VAR\nIF form = 1 THEN\nend := form\nend := 1;\nEND_PROGRAM\n"
+    assert messages(text) == [
+        "4:12: expected ; after the statement",
+        "6:1: END_IF missing for the IF in line 3",
+    ]
+
+
+def test_labels_joined_by_or_are_one_value() -> None:
+    text = "PROGRAM Main\nVAR a : INT; END_VAR\nCASE a OF\n1 OR 2: a := 1;\nEND_CASE;\nEND_PROGRAM\n"
+    assert messages(text, "warning") == ["4:3: this is the one value 3; several values are separated by commas"]

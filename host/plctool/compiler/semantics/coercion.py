@@ -140,6 +140,7 @@ class Coercion:
         what = "an integer" if e.type is UNTYPED_INT else "a real number"
         if to is None:
             hint = "; assign to its elements in a loop" if isinstance(target, ArrayType) else ""
+            hint = f"; write '{value}'" if isinstance(target, StringType) and not target.wide else hint
             return self._error(e.pos, "type", f"{what} does not fit {target}{hint}")
         if to.kind is Kind.REAL:
             number = constants.rounded(float(value), to)

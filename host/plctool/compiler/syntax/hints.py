@@ -31,6 +31,7 @@ _RANGE = "a range of values is written {low}..{high}"
 _LOOP = "a loop is written FOR i := 0 TO 9 DO ... END_FOR"
 _VALUE = r"[A-Za-z_][\w.^]*(?:\[[^\]]*\])?"
 _INSTANCE = "an instance of a program is declared PROGRAM {instance} WITH {task} : {type};"
+_ENDS = {"FI": "END_IF", "WEND": "END_WHILE", "ESAC": "END_CASE", "NEXT": "END_FOR"}
 _NO_IMPORT = "all sources and libraries of a program are compiled together; nothing is imported"
 
 
@@ -92,6 +93,7 @@ _HINTS = (
     _Hint(rf"(?:^|;)[ \t]*(?P<here>(?P<sign>[-+])(?P=sign)(?P<name>{_VALUE}))\s*(?:;|$)", _stepped, "here"),
     _Hint(rf"(?P<name>{_NAME})(?P<here>->\s*(?P<member>{_NAME}))", "-> is written ^. here: {name}^.{member}", "here",
           "body"),
+    _Hint(r"^\s*(?P<here>(?:void|int|def)\s+main\s*\()", "a program is written PROGRAM Main ... END_PROGRAM", "here"),
     _Hint(rf"^\s*(?P<here>(?:def|void|func)\s+(?P<name>{_NAME})\s*\()",
           "a function is declared FUNCTION {name} : INT ... END_FUNCTION, outside of the PROGRAM", "here"),
     _Hint(r"^\s*(?P<here>(?:import|from)\s+[\w.]+\s*)", _NO_IMPORT, "here"),
@@ -103,6 +105,21 @@ _HINTS = (
     _Hint(r"^\s*(?P<here>(?:END_)?REGION\b[^\n]*\s*)", "there is no REGION; write a comment", "here", "body"),
     _Hint(rf"(?:^|;)[ \t]*(?P<here>(?P<word>SET|RESET)\s+(?P<name>{_VALUE})\s*)(?=;|$)",
           lambda m: f"write {m['name']} := {'TRUE' if m['word'].upper() == 'SET' else 'FALSE'};", "here", "body"),
+    _Hint(r"(?:^|;)[ \t]*(?P<here>(?P<word>FI|WEND|ESAC|NEXT(?:\s+\w+)?)\s*)(?=;|END|$)",
+          lambda m: f"{m['word']} is written {_ENDS[m['word'][:4].upper()]}", "here", "body"),
+    _Hint(rf"^\s*(?P<here>LOOP\b\s*(?:{_NAME}\s*)?)",
+          "a task runs its program again and again; a loop within one cycle is FOR or WHILE", "here", "body"),
+    _Hint(r":\s*(?P<here>STRING\s+(?P<count>\d+))", "the length of a STRING is written STRING[{count}]", "here",
+          "declaration"),
+    _Hint(r":\s*(?P<here>\{(?P<values>[^{};:]*)\}\s*);", "an enumeration is written ({values})", "here"),
+    _Hint(rf"^\s*(?P<here>typedef\s+(?P<type>[\w ]+?)\s+(?P<name>{_NAME})\s*;)",
+          "a type is declared TYPE {name} : {type}; END_TYPE", "here"),
+    _Hint(rf"^\s*(?P<here>class\s+(?P<name>{_NAME})\s*(?:\([^)]*\))?\s*[:{{])",
+          "a class is written FUNCTION_BLOCK {name} ... END_FUNCTION_BLOCK", "here"),
+    _Hint(rf"^\s*(?P<here>(?:PROCEDURE|SUB)\s+(?P<name>{_NAME}))",
+          "a procedure is written FUNCTION {name} ... END_FUNCTION", "here"),
+    _Hint(rf"\bFUNCTION\s+{_NAME}\s*(?P<here>\(\s*(?P<name>{_NAME})\s*:)",
+          "inputs are declared after the first line: VAR_INPUT {name} : ... END_VAR", "here"),
     _Hint(r"\w\[\s*[-\w]+\s*(?P<here>\.\.)\s*[-\w]+\s*\]",
           "an index is one number; for several elements write a loop", "here", "body"),
     _Hint(rf"\bFUNCTION\s+(?P<here>BLOCK\s+{_NAME}\s*)", "FUNCTION BLOCK is written FUNCTION_BLOCK", "here"),

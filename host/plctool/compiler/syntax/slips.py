@@ -108,6 +108,7 @@ FUNCTIONS = {
     **dict.fromkeys(("STRCMP", "EQUALS"), "strings are compared with ="),
     "ASSERT": "in a TEST write ASSERT_TRUE",
     "STRLEN": "write LEN", "STRCAT": "write CONCAT", "STRCPY": "strings are assigned with :=", "STRSTR": "write FIND",
+    "POWER": "write a ** b", **dict.fromkeys(("STR", "TOSTRING"), "write TO_STRING"),
     "SUBSTR": "write MID", "ATOI": "write STRING_TO_INT", "ATOF": "write STRING_TO_REAL", "POW": "write a ** b",
     "ROUND": "write REAL_TO_INT, which rounds", "MALLOC": "nothing is allocated while a program runs",
     **dict.fromkeys(("PRINTF", "PRINT"), "a program prints nothing; write it into a STRING and watch it"),

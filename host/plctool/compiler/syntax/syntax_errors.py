@@ -65,8 +65,12 @@ _PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",), "_C
 _RETURN = "RETURN takes no value; assign it to the name of the function, then RETURN"
 _BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "TRY"}
 _AFTER_DECLARATIONS = re.compile(r"\b(?:END_\w+|VAR(?:_\w+)?|IF|FOR|WHILE|REPEAT|CASE)\b", re.IGNORECASE)
-_WORDS_OF_ENDS = re.compile(r"\bEND\w+", re.IGNORECASE)
+_WORDS_OF_ENDS = re.compile(r"\b(?:END(?=\s*;)|END\w+|FI|WEND|ESAC)\b", re.IGNORECASE)
+_OTHER_ENDS = {"FI": "END_IF", "WEND": "END_WHILE", "ESAC": "END_CASE"}
 _UNIT_WORDS = ("PROGRAM", "FUNCTION", "FUNCTION_BLOCK", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "INTERFACE")
+_STATEMENT_WORDS = (
+    "IF", "THEN", "ELSIF", "ELSE", "FOR", "WHILE", "REPEAT", "UNTIL", "CASE", "RETURN", "NOT", "AND", "XOR", "MOD",
+)  # fmt: skip
 _POUS = ("PROGRAM", "FUNCTION", "FUNCTION_BLOCK")
 _NEXT_UNIT = re.compile(r"\b(?:END_)?(?:PROGRAM|FUNCTION_BLOCK|FUNCTION|CONFIGURATION)\b", re.IGNORECASE)
 _ELSE_IF = re.compile(r"\bELSE\s+IF\b", re.IGNORECASE)
@@ -88,6 +92,7 @@ class Recovery:
         self._taken = taken
         self._quiet_up_to = 0  # an error before so many tokens were taken is a consequence of the last one
         self._quiet = False
+        self._misspelt = ""  # what is added to what is said next
         self._skip_to = ""  # the word or sign that ends what is refused
         self._dropped: list[str] = []  # openings that were thrown away, whose ends are still to come
 
@@ -98,9 +103,11 @@ class Recovery:
         if self._parted_end(token):
             return
         self._reduce()
+        self._misspelt = ""
         self._hint(token)
         if self.skipping:
             return
+        self._misspelt = "" if self._quiet else self._misspelt_near(token)
         if self._late_variables(token) or self._misspelt_unit(token) or self._stray_end(token):
             return
         while self._insert(token) or self._close(token):
@@ -342,11 +349,15 @@ class Recovery:
             message = "ELSE IF begins a second IF, with an END_IF of its own; write ELSIF"
             self._say(second[-1].start(), message)
             return
+        closer = _CLOSERS[opener.type]
         for end in _WORDS_OF_ENDS.finditer(self._source.text, opener.pos, token.pos):
-            if end[0].upper() not in KEYWORDS and get_close_matches(end[0].upper(), [_CLOSERS[opener.type]], 1, 0.8):
-                self._say(end.start(), f"{end[0]} is written {_CLOSERS[opener.type]}")
-                return
-        self._say(token.pos, f"{_CLOSERS[opener.type]} missing for the {opener.text.upper()} in line {line}")
+            word = end[0].upper()
+            if word in KEYWORDS or not (word == "END" or _OTHER_ENDS.get(word) == closer or _is_like(word, closer)):
+                continue
+            self._misspelt = ""
+            self._say(end.start(), f"{end[0]} is written {closer}")
+            return
+        self._say(token.pos, f"{closer} missing for the {opener.text.upper()} in line {line}")
 
     def _skip(self, token: Token) -> None:
         if self._shift(self._parser.states, token.type) is None:
@@ -376,7 +387,19 @@ class Recovery:
 
     def _say(self, offset: int, message: str) -> None:
         if not self._quiet:
-            self._report(offset, "syntax", message)
+            self._report(offset, "syntax", message + self._misspelt)
+            self._misspelt = ""
+
+    def _misspelt_near(self, token: Token) -> str:
+        """`; did you mean ELSE for ESLE?` of one of the last names, unless it is declared here."""
+        for name in (token, *reversed(self._taken[-2:])):
+            if name.type != "IDENT" or re.search(rf"\b{name.text}\s*[,:](?!=)", self._source.text):
+                continue
+            written = name.text.upper()
+            swapped = [word for word in _STATEMENT_WORDS if sorted(word) == sorted(written)]
+            for word in swapped or get_close_matches(written, _STATEMENT_WORDS, 1, 0.75):
+                return f"; did you mean {word} for {name.text}?"
+        return ""
 
     # ---- looking at the parser ----
 
@@ -458,6 +481,10 @@ class Recovery:
             return f"{_shown(token)} has no place here"
         listed = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
         return f"expected {listed}, found {_shown(token)}"
+
+
+def _is_like(word: str, keyword: str) -> bool:
+    return bool(get_close_matches(word, [keyword], 1, 0.8))
 
 
 def _a(word: str) -> str:

@@ -175,7 +175,8 @@ def indexed(c: Checker, node: ast.Index, expected: Type | None) -> Expr:
             continue
         if not isinstance(t, ArrayType):
             more = len(indices) < len(node.indices)
-            message = f"there are {len(indices)} indices too many" if more else f"{t} is not an array"
+            surplus = "is 1 index" if len(indices) == 1 else f"are {len(indices)} indices"
+            message = f"there {surplus} too many" if more else f"{t} is not an array"
             return c.error(node.pos, "type", message)
         count = len(t.bounds)
         if len(indices) < count:
