@@ -105,6 +105,11 @@ def test_status_without_application(tool: Any, plc: FakePlc) -> None:
     assert tool("status", *PORT).out == "state: none\n"
 
 
+def test_a_crc_has_eight_digits(tool: Any, running: FakePlc, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FakePlc, "crc", 0xABC)
+    assert tool("status", *PORT, "--json").json["image_crc"] == "00000ABC"
+
+
 def test_status_of_a_running_program_has_the_crc_that_build_printed(tool: Any, running: FakePlc) -> None:
     document = tool("status", *PORT, "--json").json
     assert document == {"state": "run", "image_crc": f"{running.crc:08X}", "exception": None}

@@ -62,6 +62,16 @@ def test_build_writes_image_and_symbols(tool: Any, scratch: Path) -> None:
     assert load_symbols(scratch / "out.sym").image_crc == int(document["crc"], 16)
 
 
+def test_the_crc_of_a_build_has_eight_digits(tool: Any, scratch: Path) -> None:
+    for n in range(300):  # one in sixteen begins with a zero
+        (scratch / "counter.st").write_text(COUNTER.replace("step : INT := 1", f"step : INT := {n}"))
+        crc = tool("build", "counter.st", "-o", "out.cdl", "--json").json["crc"]
+        if int(crc, 16) < 0x1000_0000:
+            break
+    assert len(crc) == 8 and crc.startswith("0")
+    assert tool("info", "out.cdl", "--json").json["crc"] == crc
+
+
 def test_build_writes_app_cdl_when_nothing_else_is_said(tool: Any, scratch: Path) -> None:
     (scratch / "counter.st").write_text(COUNTER)
     assert tool("build", "counter.st").out.startswith("app.cdl: ")
