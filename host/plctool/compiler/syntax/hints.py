@@ -25,6 +25,7 @@ _CHOICE = "a choice is written CASE a OF 1: ...; ELSE ...; END_CASE"
 _CONSTANT = "constants are declared in VAR CONSTANT ... END_VAR"
 _POINTER = "a pointer is declared POINTER TO {name}"
 _NAME = r"[A-Za-z_]\w*"
+_FAR = 1000  # characters of a line before and after a mistake that are looked at
 _REPEAT = "a loop that tests at its end is written REPEAT ... UNTIL condition END_REPEAT"
 _LABEL = "a branch has values or a range: 6..100: ...; for comparisons write IF ... ELSIF"
 _RANGE = "a range of values is written {low}..{high}"
@@ -226,9 +227,9 @@ _HINTS = (
 def hint(text: str, begin: int, pos: int, where: str) -> Said | None:
     """What to say of a mistake at offset `pos` of `text`; None when it is not one of these. `begin`: the
     offset of the last word but one that was fine; `where`: body, declaration or ""."""
-    start = text.rfind("\n", 0, begin) + 1
-    end = text.find("\n", pos)
-    window = text[start : len(text) if end < 0 else end]
+    start = max(text.rfind("\n", 0, begin) + 1, begin - _FAR)
+    end = text.find("\n", pos, pos + _FAR)
+    window = text[start : pos + _FAR if end < 0 else end]
     column = pos - start
     for known in _HINTS:
         if known.where not in ("", where):

@@ -393,11 +393,8 @@ class Recovery:
     def _misspelt_near(self, token: Token) -> str:
         """`; did you mean ELSE for ESLE?` of one of the last names, unless it is declared here."""
         for name in (token, *reversed(self._taken[-2:])):
-            if name.type != "IDENT" or re.search(rf"\b{name.text}\s*[,:](?!=)", self._source.text):
-                continue
-            written = name.text.upper()
-            swapped = [word for word in _STATEMENT_WORDS if sorted(word) == sorted(written)]
-            for word in swapped or get_close_matches(written, _STATEMENT_WORDS, 1, 0.75):
+            word = _like(name.text.upper()) if name.type == "IDENT" else ""
+            if word and not re.search(rf"\b{name.text}\s*[,:](?!=)", self._source.text):
                 return f"; did you mean {word} for {name.text}?"
         return ""
 
@@ -481,6 +478,12 @@ class Recovery:
             return f"{_shown(token)} has no place here"
         listed = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
         return f"expected {listed}, found {_shown(token)}"
+
+
+def _like(written: str) -> str:
+    """The word of statements that a name seems to be, "" for none."""
+    swapped = [word for word in _STATEMENT_WORDS if sorted(word) == sorted(written)]
+    return next(iter(swapped or get_close_matches(written, _STATEMENT_WORDS, 1, 0.75)), "")
 
 
 def _is_like(word: str, keyword: str) -> bool:
