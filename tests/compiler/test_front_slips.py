@@ -114,6 +114,11 @@ BODY = 5  # the line where a case stands
         ("s := str(a);", ["1: unknown function str; write TO_STRING"]),
         ("s := 5;", ["1: an integer does not fit STRING[80]; write '5'"]),
         ("a := arr[1, 2];", ["1: there is 1 index too many"]),
+        ("a := arr.length;", ["1: ARRAY[1..9] OF INT has no members; its last index is UPPER_BOUND(..., 1)"]),
+        (
+            "a := len(arr);",
+            ["1: ARRAY[1..9] OF INT does not fit STRING[255]; the last index of an array is UPPER_BOUND(..., 1)"],
+        ),
     ],
 )
 def test_a_slip_in_a_body(body: str, said: list[str]) -> None:

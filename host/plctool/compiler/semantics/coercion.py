@@ -104,7 +104,9 @@ class Coercion:
         if e.type is NULL_TYPE:
             message = f"NULL is for pointers, references and interfaces; it does not fit {target}"
             return self._error(e.pos, "type", message)
-        return self._error(e.pos, "type", f"{e.type} does not fit {target}")
+        counted = isinstance(e.type, ArrayType) and isinstance(target, StringType)
+        hint = "; the last index of an array is UPPER_BOUND(..., 1)" if counted else ""
+        return self._error(e.pos, "type", f"{e.type} does not fit {target}{hint}")
 
     def _no_scalars(self, e: Expr, target: Type) -> Expr:
         """A text and a number need a conversion; anything else does not go together."""

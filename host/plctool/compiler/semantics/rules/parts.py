@@ -73,6 +73,8 @@ def member_of(c: Checker, base: Expr, node: ast.Member) -> Expr:
         hint = "; write ^. to follow the pointer" if isinstance(t, PointerType) else ""
         if isinstance(t, StringType) and name.upper() in ("LEN", "LENGTH", "SIZE"):
             hint = "; its length is LEN(...)"
+        if isinstance(t, ArrayType) and name.upper() in ("LEN", "LENGTH", "SIZE", "COUNT"):
+            hint = "; its last index is UPPER_BOUND(..., 1)"
         return c.error(node.name_pos, "type", f"{t} has no members{hint}")
     block = c.world.blocks.get(t)
     if block is not None:
