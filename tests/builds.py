@@ -19,6 +19,7 @@ def environment(build: Path, sanitized: bool) -> dict[str, str]:
         "PYTHONDONTWRITEBYTECODE": "1",
         "PLCRT": str(build / "firmware/port/linux/plcrt"),
         "PLCTOOL_GATEWAY": "off",
+        "PLCTOOL_PATIENCE": "3",  # the machine may be busy
     }
     if sanitized:
         names = ("libasan.so", "libubsan.so")

@@ -461,6 +461,24 @@ def test_a_device_that_is_gone_is_reported_within_about_five_seconds(words: int)
     assert line.now() - begin < 5.5
 
 
+@pytest.mark.parametrize(("factor", "longer"), [("4", 4), ("0.5", 0.5), ("none", 1), ("-1", 1), ("1e9", 1)])
+def test_a_device_is_waited_for_as_long_as_the_user_wants(
+    factor: str, longer: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PLCTOOL_PATIENCE", factor)
+    line = FakeLine(FakeDevice(reverse))
+    connection = connect(line)
+    line.cut = True
+    begin = line.now()
+    with pytest.raises(ChannelLost):
+        connection.exchange(b"anybody?", patience=4.0)
+    assert 4 * longer <= line.now() - begin < 4.5 * longer
+    begin = line.now()
+    with pytest.raises(ChannelLost):
+        connection.open()
+    assert 1.5 * longer <= line.now() - begin < 2 * longer
+
+
 def test_a_device_that_is_back_is_found_again_and_waited_for_as_before() -> None:
     line = FakeLine(FakeDevice(reverse))
     connection = connect(line)

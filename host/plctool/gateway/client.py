@@ -32,7 +32,7 @@ from plctool.gateway.frames import (
 )
 from plctool.gateway.place import NoGateway, Place, find_holder, find_place, locked
 from plctool.link.channel import ChannelLost
-from plctool.link.connection import PATIENCE, SCAN_SECONDS
+from plctool.link.connection import PATIENCE, SCAN_SECONDS, patience_factor
 from plctool.link.names import Node
 from plctool.link.passwords import AskPassword, no_password, password_needed
 from plctool.link.session import Application, Session
@@ -401,7 +401,7 @@ class GatewayConnection:
     def _answer(self, number: int, patience: float) -> Frame:
         """The next reply to a request. Raises what has failed."""
         while True:
-            frame = self._next_frame(patience + _ANSWER_PATIENCE)
+            frame = self._next_frame(patience_factor() * patience + _ANSWER_PATIENCE)
             if frame.number not in (number, GOODBYE) or frame.kind is Kind.WAIT:
                 continue  # WAIT, or what remains of a stream that was aborted
             if frame.kind is not Kind.FAILED:
