@@ -51,6 +51,7 @@ class Plcrt:
         self.options = options
         self.process: subprocess.Popen[str] | None = None
         self.port = f"{self.flash}.tty"
+        self._terminals: list[int] = []  # that it has had
         self.tcp = self.udp = self.can = ""
 
     def start(self) -> None:
@@ -60,7 +61,9 @@ class Plcrt:
             ends_with_us(command), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         assert self.process.stdout and self.process.stderr
-        self._place("serial")
+        # Kept open, so that no other process gets its number when this one is killed: a tool that looks whether the
+        # controller is back would take that one's.
+        self._terminals.append(os.open(self._place("serial"), os.O_RDWR | os.O_NOCTTY))
         self.tcp = self._place("tcp") if "--tcp" in self.options else ""
         self.udp = self._place("udp") if "--udp" in self.options else ""
         self.can = self._place("can") if "slcan:pty" in self.options else ""
@@ -99,3 +102,5 @@ class Plcrt:
 
     def __exit__(self, *exc: object) -> None:
         self.stop(signal.SIGKILL if exc[0] else signal.SIGTERM)
+        while self._terminals:
+            os.close(self._terminals.pop())
