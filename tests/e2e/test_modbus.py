@@ -16,12 +16,15 @@ from modbus_support import Devices, Wire, eventually
 from pymodbus.client import ModbusTcpClient
 
 import plctool
+from plctool.cli.io_documents import parameter
 from plctool.compiler import compile_sources
+from plctool.core import lib
 from plctool.device import Plc
 from plctool.errors import DeviceError, PlcError, UsageError
 from plctool.testing.plcrt import Plcrt
 
 CONNECTIONS = 32  # MODBUS_MAX_CONNECTIONS of plcrt
+FIRST_COUNTER = int(lib.MODBUS_PARAM_REQUESTS)
 
 PROGRAM = """
 PROGRAM Main
@@ -290,6 +293,18 @@ def test_absent_device_is_said_to_be_and_holds_up_no_other(plant: Plant) -> None
     assert not ok(plant, "Absent")
     before = plant.meter.count(3)
     eventually(lambda: plant.meter.count(3) >= before + 100)
+
+
+def test_counters_of_the_driver_have_names(plant: Plant) -> None:
+    eventually(lambda: parameter(plant.plc, "Absent", "timeouts", None)["value"] >= 2)
+    assert parameter(plant.plc, "Meter", "Requests", None)["value"] > 0
+    absent = ("Second", "Ghost")  # an optional line that is in use, and its device
+    present = [d for d in plant.plc.symbols().io["devices"] if d["name"] not in absent]
+    counters = [(d["name"], p["name"]) for d in present for p in d["parameters"] if p["id"] >= FIRST_COUNTER]
+    assert len(counters) == 3 * 6 + 6 + 2, "of three devices, the server and two lines"
+    assert all(parameter(plant.plc, device, name, None)["value"] >= 0 for device, name in counters)
+    with pytest.raises(UsageError, match=r"Meter has no parameter requets; did you mean requests\?"):
+        parameter(plant.plc, "Meter", "requets", None)
 
 
 def test_low_register_may_come_first(plant: Plant) -> None:

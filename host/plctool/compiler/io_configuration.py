@@ -158,7 +158,10 @@ def io_document(program: TypedProgram, description: Description) -> dict[str, An
             "driver": connector.driver,
             "enabled": connector.enabled,
             "load": connector.load,
-            "parameters": [{"name": p.name, "id": p.id, "type": _type_name(p)} for p in connector.parameters if p.name],
+            "parameters": [
+                *({"name": p.name, "id": p.id, "type": _type_name(p)} for p in connector.parameters if p.name),
+                *({"name": name, "id": number, "type": "UDINT"} for name, number in connector.counters.items()),
+            ],
         }
         for connector in description.connectors
     ]

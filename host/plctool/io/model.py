@@ -103,9 +103,10 @@ class Connector:
     """A bus, device or module. `type`: CT_*. `name`: as in `plctool io map`, at most 31 ASCII characters, unique.
     `driver`: szDriverName of the driver that takes it. `task`: in whose cycle the bus cycle is started, None for the
     fastest. `variable`: it has an IO_DEVICE of its name in the program. `faults`: those that it may have when it is
-    simulated."""
+    simulated. `counters`: parameters of 32 bits that its driver counts, by name."""
 
     faults: ClassVar[tuple[str, ...]] = tuple(FAULTS)
+    counters: ClassVar[dict[str, int]] = {}
 
     name: str
     driver: str

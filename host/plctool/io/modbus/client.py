@@ -34,6 +34,7 @@ from plctool.io.modbus.settings import (
     DRIVER,
     MAX_UNIT,
     address_parameters,
+    counters,
     default_name,
     number_parameter,
     serial_settings,
@@ -150,6 +151,7 @@ class ModbusLine(Connector):
     cyclic requests take."""
 
     faults = ("absent",)  # it is pulled
+    counters = counters("bad_frames")
 
     char_us: float | None = None
     silence_us: float = 0.0
@@ -193,6 +195,8 @@ class ModbusLine(Connector):
 @dataclass(eq=False)
 class ModbusDevice(Connector):
     """A device of a client. `pause_us`: of all devices at once, how long the line is left to them after a request."""
+
+    counters = counters("requests", "timeouts", "exceptions", "others", "unverified", "last_exception")
 
     pause_us: int | None = None
     unit: int = 0

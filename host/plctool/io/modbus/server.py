@@ -37,6 +37,7 @@ from plctool.io.modbus.settings import (
     DRIVER,
     MAX_UNIT,
     address_parameters,
+    counters,
     default_name,
     number_parameter,
     serial_settings,
@@ -68,6 +69,7 @@ class ModbusServer(Connector):
     """This PLC as a server. `as_bits`: its registers are coils and discrete inputs, too."""
 
     faults = ()  # its clients are not simulated
+    counters = counters("requests", "exceptions", "written", "bad_frames", "accepted", "displaced")
 
     order: Order = ORDERS["ABCD"]
     as_bits: bool = False

@@ -33,6 +33,11 @@ def structure_parameter(number: int, value: Any) -> Parameter:
     return Parameter(number, ArrayType(BYTE, ((0, len(data) - 1),)), data)
 
 
+def counters(*names: str) -> dict[str, int]:
+    """Numbers of parameters that the driver counts, by the names that users give them (`plctool io param get`)."""
+    return {name: int(getattr(lib, f"MODBUS_PARAM_{name.upper()}")) for name in names}
+
+
 def default_name(table: Table, key: str) -> str:
     """What a line is called that has no name."""
     found = table.text(key)
