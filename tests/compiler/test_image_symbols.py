@@ -127,7 +127,7 @@ def test_paths_are_resolved(path: str, area: int, offset: int, t: Type, bit: int
         ("Main.wrod", "Did you mean Main.word?"),
         ("Mian.n", "Did you mean Main.n?"),
         ("nothing", "There is no variable nothing."),
-        ("", "There is no variable"),
+        ("", "A name is empty"),
         ("Main", "name one of its variables, such as Main.n"),
         ("Main.fb.arr[5]", "has the elements 2 to 4, not 5"),
         ("Main.fb.arr[1,2]", "cannot be indexed"),

@@ -270,7 +270,7 @@ def test_download_that_begins_changes_or_ends_the_server_comes_to_its_end(line: 
 def test_server_with_another_address_has_the_tools_at_its_own(
     line: Rs485, build: Build, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("plctool.link.services._SLOW", 2.0)
+    monkeypatch.setattr("plctool.link.services.SLOW_PATIENCE", 2.0)
     with connect(line) as plc, pytest.raises(LinkError, match="unit 247"):
         plc.flash(build("moved", SERVER, 7))  # it is in the device, but its reply is at the other address
     with connect(line, 7) as plc:
