@@ -6,7 +6,6 @@ each does its own way is abstract.
 
 from __future__ import annotations
 
-import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -27,6 +26,7 @@ from plctool.debug.symbols import (
 )
 from plctool.debug.variables import Change, Reading, Symbol
 from plctool.errors import DeviceError, UsageError
+from plctool.files import write_atomically
 from plctool.image.file import image_crc, parse_image, read_program
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, AppState, LogEntry, Status, TaskInfo
@@ -354,4 +354,4 @@ def _keep_symbols(image: Path, crc: int) -> None:
     with suppress(OSError, UsageError):
         if load_symbols(source).image_crc == crc:
             kept.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source, kept)
+            write_atomically(kept, source.read_bytes())  # another process may read it now

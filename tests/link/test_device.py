@@ -172,6 +172,15 @@ def test_symbols_are_kept_at_flash_and_found_again(running: Controller, tmp_path
     assert plc.read("Main.count") == 0
 
 
+def test_kept_symbols_are_replaced_as_a_whole(running: Controller, tmp_path: Path) -> None:
+    """Another process that reads them while they are kept again has all of the old ones."""
+    kept = cache_path(running.symbols.image_crc)
+    (tmp_path / "being_read").hardlink_to(kept)
+    running.plc.flash(running.image)
+    assert not kept.samefile(tmp_path / "being_read")
+    assert kept.read_bytes() == (tmp_path / "being_read").read_bytes()
+
+
 def test_without_symbols_nothing_is_read(running: Controller) -> None:
     cache_path(running.symbols.image_crc).unlink()
     plc = Plc(Connection(FakeLine(running.device)))
