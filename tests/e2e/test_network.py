@@ -54,13 +54,13 @@ def test_it_listens_on_the_loopback_address_unless_told_otherwise(plcrt: Plcrt, 
 
 @pytest.mark.parametrize("kind", ["tcp", "udp"])
 def test_without_a_place_it_is_the_loopback_address(kind: str, tmp_path: Path) -> None:
-    """At the ports of the protocol, which another program may have."""
+    """At the ports of the protocol. When another program has them, plcrt says where it tried."""
     running = Plcrt(tmp_path / "plc.flash", f"--{kind}")
     try:
         running.start()
     except UsageError as error:
-        assert "in use" in str(error)
-        pytest.skip(str(error))
+        assert f"cannot serve --{kind} 127.0.0.1: Address already in use" in str(error)
+        return
     try:
         assert getattr(running, kind).startswith("127.0.0.1:")
     finally:
