@@ -1,7 +1,7 @@
 """Runs the tests of the build folders given as one pool, and prints what was skipped, the failures and one closing
 line over all.
 
-A process runs for each processor and one more, because some tests wait more than they work. Those with the highest
+A process runs for each processor and two more, because many tests wait more than they work. Those with the highest
 priority, which is about their seconds, come first, so that no processor idles while the last long one ends. The C
 tests of a folder, which are short, are one process: a `meson test`.
 
@@ -194,7 +194,7 @@ def main() -> int:
     jobs = [job for build in args.builds for job in jobs_of(args.meson, build.resolve())]
     jobs.sort(key=lambda job: -job.seconds)
     begin, used, counts, lines, status = time.monotonic(), 0.0, Counter[str](), list[str](), 0
-    for number, done in enumerate(run(jobs, (os.cpu_count() or 1) + 1), 1):
+    for number, done in enumerate(run(jobs, (os.cpu_count() or 1) + 2), 1):
         outcome = done.outcome
         result = "ok" if done.is_good else "failed"
         print(
