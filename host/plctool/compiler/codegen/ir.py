@@ -27,6 +27,11 @@ class Value(str):
         with it stay inside."""
         return False
 
+    @property
+    def on_stack(self) -> bool:
+        """Whether it is a pointer to memory of this call only."""
+        return False
+
 
 class Number(Value):
     """An integer."""
@@ -50,7 +55,20 @@ class FixedPointer(Value):
         return True
 
 
-_USES_MEMORY = ("load ", "call ", "tail call ", "cmpxchg ", "atomicrmw ")
+class StackPointer(FixedPointer):
+    """A pointer to memory of this call."""
+
+    __slots__ = ()
+
+    @property
+    def on_stack(self) -> bool:
+        """It is one."""
+        return True
+
+
+_WRITES_MEMORY = ("call ", "tail call ", "cmpxchg ", "atomicrmw ")
+_USES_MEMORY = ("load ", *_WRITES_MEMORY)
+_ARITHMETIC = " @llvm."  # an intrinsic that has a value
 
 TRUE, FALSE, NULL = Value("true"), Value("false"), Value("null")
 
@@ -155,6 +173,7 @@ class Function:
         self.loops = False  # there is a branch back
         self._begun: set[str] = set()
         self.barriers = 0  # grows with all that ends a block or may use memory, but `load` and `store`
+        self.writes = 0  # grows with all that ends a block or may write memory, but `store`
         self.scope = -1  # its DISubprogram
         self.debug = ""  # e.g. ', !dbg !7', added to every instruction
 
@@ -162,8 +181,9 @@ class Function:
 
     def value(self, text: str) -> Value:
         """Writes an instruction that gives a value."""
-        if text.startswith(_USES_MEMORY):
+        if text.startswith(_USES_MEMORY) and _ARITHMETIC not in text:
             self.barriers += 1
+            self.writes += text.startswith(_WRITES_MEMORY)
         return self.load(text)
 
     def load(self, text: str) -> Value:
@@ -178,6 +198,7 @@ class Function:
     def do(self, text: str) -> None:
         """Writes an instruction without a value."""
         self.barriers += 1
+        self.writes += 1
         self.store(text)
 
     def store(self, text: str) -> int:
@@ -228,7 +249,7 @@ class Function:
         self._count += 1
         name = f"%m{self._count}"
         self._allocas.append(f"  {name} = alloca [{size} x i8], align {align}")
-        return FixedPointer(name)
+        return StackPointer(name)
 
     def slot(self, llvm_type: str) -> Value:
         """A scalar on the stack, which LLVM turns into registers. Returns the pointer."""
@@ -243,11 +264,17 @@ class Function:
         self._count += 1
         return f"{hint}{self._count}"
 
+    @property
+    def open(self) -> bool:
+        """Whether what is written next is reached."""
+        return not self._dead
+
     def begin(self, label: str) -> None:
         """Starts the block `label`, falling through to it when the block before is still open."""
         if not self._dead:
             self._lines.append(f"  br label %{label}{self.debug}")
         self.barriers += 1
+        self.writes += 1
         self._lines.append(f"{label}:")
         self._begun.add(label)
         self.block = label

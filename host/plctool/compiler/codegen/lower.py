@@ -10,7 +10,7 @@ from plctool.compiler.codegen.lower_body import write_body, write_calls
 from plctool.compiler.codegen.lower_classes import write_dispatcher
 from plctool.compiler.codegen.lower_frame import TAGGED_AREAS, Body, Frame, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise, initialise_members
-from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
+from plctool.compiler.codegen.lower_unit import Form, Options, Unit, value_type
 from plctool.compiler.codegen.partition import Part, parts
 from plctool.compiler.codegen.sections import sections
 from plctool.compiler.codegen.signatures import CONTEXT, SELF, block_signatures, parameter_list, result_type
@@ -59,16 +59,16 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     done = chosen = 0
     while done < len(unit.pous) or chosen < len(unit.dispatchers):
         if done < len(unit.pous):
-            pou, raises = list(unit.pous)[done]
+            pou, form = list(unit.pous)[done]
             try:
-                _pou(unit, pou, effects, raises=raises)
+                _pou(unit, pou, effects, form)
             except Exception as error:
                 note_position(error, pou.pos)
                 raise
             done += 1
         else:
-            (dispatch, raises), name = list(unit.dispatchers.items())[chosen]
-            write_dispatcher(unit, name, dispatch, raises=raises)
+            (dispatch, form), name = list(unit.dispatchers.items())[chosen]
+            write_dispatcher(unit, name, dispatch, form)
             chosen += 1
     if unit.exchanges and len(program.tasks) > 1 and not unit.target.exchanges:
         raise UsageError(
@@ -94,16 +94,16 @@ def _task_entry(unit: Unit, number: int, task: Task) -> str:
     return name
 
 
-def _pou(unit: Unit, pou: Pou, effects: Effects, *, raises: bool) -> None:
-    result = result_type(pou, unit.closed.get(pou))
-    name = unit.symbol(pou, raises=raises)
-    signature = f"{result} @{name}({parameter_list(pou, unit.handed, raises=raises, closed=unit.closed.get(pou))})"
+def _pou(unit: Unit, pou: Pou, effects: Effects, form: Form) -> None:
+    closed = unit.closed.get(pou)
+    result, name = result_type(pou, closed), unit.symbol(pou, form)
+    signature = f"{result} @{name}({parameter_list(pou, unit.handed, form, closed)})"
     fn = Function(signature, unit.attributes(pou), unit.inlining(pou))
-    body = Body(unit, fn, pou, effects, raises=raises)
+    body = Body(unit, fn, pou, effects, form)
     body.open_scope(pou.name, pou.pos)
     cut = [pou] if pou in unit.sections else sections(pou)
     if len(cut) > 1:
-        write_calls(body, [unit.section(part, raises=raises) for part in cut])
+        write_calls(body, [unit.section(part, form) for part in cut])
     else:
         write_body(body)
     body.write_given_up(result)

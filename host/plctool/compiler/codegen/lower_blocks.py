@@ -8,6 +8,7 @@ from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower_arith import convert, is_real
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Frame, Ref, rule
 from plctool.compiler.codegen.lower_string import copy_literal, copy_string
+from plctool.compiler.codegen.lower_unit import Form
 from plctool.compiler.codegen.signatures import CONTEXT, SELF, parameter_value, passed_type, result_type
 from plctool.compiler.typed import (
     Binary,
@@ -46,11 +47,11 @@ def fb_call(frame: Frame, s: FbCall) -> None:
         target = frame.import_function(frame.unit.import_slot(s.block.external))
         frame.fn.do(f"call void {target}(ptr {base}) {frame.unit.external_call}")
     else:
-        raises = frame.returns_exceptions(s.block, s.dispatch)
-        handed_on = [f"ptr {frame.raised}"] if raises else []
-        symbol = frame.unit.target_of(s.block, s.dispatch, raises=raises)
+        form = frame.form_of(s.block, s.dispatch)
+        handed_on = [f"ptr {frame.raised}"] if form is Form.RAISING else []
+        symbol = frame.unit.target_of(s.block, s.dispatch, form)
         _call(frame, s.block, symbol, [*handed_on, f"ptr {base}", *arguments], (named, instance))
-        if raises:
+        if form is Form.RAISING:
             frame.after_call(s.pos)
     for variable, place in s.outputs:
         _copy_out(frame, _member(frame, s.block, instance, variable), frame.ref(place))

@@ -15,13 +15,14 @@ from plctool.compiler.codegen.lower_blocks import take_inputs
 from plctool.compiler.codegen.lower_frame import NO_CAPACITY, Body, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise
 from plctool.compiler.codegen.lower_string import copy_string
-from plctool.compiler.codegen.lower_unit import value_type
+from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import (
     CONTEXT,
     RESULT,
     RESULT_CAPACITY,
     SELF,
     parameter_capacity,
+    parameter_length,
     parameter_value,
     result_in_memory,
     result_type,
@@ -94,7 +95,8 @@ def _take_parameters(frame: Body, pou: Pou) -> None:
         var, given, room = parameter.variable, parameter_value(number), parameter_capacity(number)
         if parameter.by_reference:
             capacity = room if isinstance(var.type, StringType) else NO_CAPACITY
-            frame.locals[var] = Ref(given, 0, var.type, capacity=capacity)
+            length = parameter_length(number) if capacity and frame.form is Form.MEASURED else None
+            frame.locals[var] = Ref(given, 0, var.type, capacity=capacity, length=length)
             continue
         ref = _stack_memory(frame, var)
         frame.locals[var] = ref

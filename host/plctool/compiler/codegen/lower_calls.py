@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from plctool.compiler.codegen.ir import Value, number
-from plctool.compiler.codegen.lengths import is_appending, is_measuring, length_variable
+from plctool.compiler.codegen.lengths import (
+    is_appending,
+    is_copying,
+    is_measuring,
+    is_spanning,
+    length_variable,
+    takes_lengths,
+)
 from plctool.compiler.codegen.lower_arith import convert, is_bool, lowest_bit
 from plctool.compiler.codegen.lower_frame import Body, Frame, Ref
 from plctool.compiler.codegen.lower_places import materialised
-from plctool.compiler.codegen.lower_string import append_string
-from plctool.compiler.codegen.lower_unit import value_type
+from plctool.compiler.codegen.lower_string import append_string, move_characters
+from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import CONTEXT, extension, parameter_types
 from plctool.compiler.typed import (
     Call,
+    Const,
     Direction,
     Dispatch,
     Expr,
@@ -25,18 +33,19 @@ from plctool.iec.types import StringType, is_scalar
 
 _LONGEST = 32_767  # characters that LEN gives
 
+Operand = Value | Ref  # a scalar, or what is passed by its address
+
 
 def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
     """Calls a function. `result`: where a string, array or struct goes; scalars are returned."""
     pou = e.function
-    if is_measuring(pou):
-        length = _known_length(frame, e.args[0])
-        if length is not None:
-            return length
+    known_value = _without_scanning(frame, e)
+    if known_value is not None:
+        return known_value
     write_back: list[tuple[Ref, Ref]] = []
     arguments = [] if pou.external else [CONTEXT]
-    raises = frame.returns_exceptions(pou, e.dispatch)
-    if raises:
+    form = frame.form_of(pou, e.dispatch)
+    if form is Form.RAISING:
         arguments.append(f"ptr {frame.raised}")
     if e.instance is not None:
         arguments.append(f"ptr {frame.address(frame.ref(e.instance))}")
@@ -47,20 +56,24 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
     if result is not None:
         arguments.append(f"ptr {frame.address(result)}")
         arguments += [f"i32 {_result_capacity(frame, pou, result)}"] if pou.cuts_result else []
-    for parameter, argument in zip(pou.parameters, e.args, strict=True):
-        operands = _operands(frame, pou, parameter, argument, write_back)
-        types = parameter_types(pou, parameter)
-        arguments += [f"{text} {operand}" for text, operand in zip(types, operands, strict=True)]
+    given = [
+        _operand(frame, pou, parameter, argument, write_back)
+        for parameter, argument in zip(pou.parameters, e.args, strict=True)
+    ]
+    if takes_lengths(pou) and all(frame.length(ref) for ref in given if isinstance(ref, Ref)):
+        form = Form.MEASURED
+    for parameter, operand in zip(pou.parameters, given, strict=True):
+        types = parameter_types(pou, parameter, form)
+        values = _values(frame, operand, form)
+        arguments += [f"{text} {value}" for text, value in zip(types, values, strict=True)]
     known = frame.lengths() if _leaves_strings(frame, e) else {}
-    length = _appended(frame, e, result, arguments)
-    value = _call_instruction(frame, pou, e.dispatch, arguments, raises=raises) if length is None else length
-    if result is not None and length_variable(pou) is not None:
-        assert value is not None
-        frame.note_length(result, value, known)
-    elif result is None or (result.direct and result.pointer.fixed):
-        written = None if result is None else (result.pointer, result.offset)
-        frame.keep_lengths({place: length for place, length in known.items() if place != written})
-    if raises:
+    length = _appended(frame, e, result, given)
+    value = _call_instruction(frame, pou, e.dispatch, arguments, form) if length is None else length
+    if result is not None:
+        frame.note_length(result, value if length_variable(pou) is not None else None, known)
+    else:
+        frame.keep_lengths(known)
+    if form is Form.RAISING:
         frame.after_call(e.pos)
     for temporary, place in write_back:
         if is_scalar(place.type):
@@ -71,28 +84,50 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
     return value
 
 
-def _known_length(frame: Frame, argument: Expr | Place | None) -> Value | None:
-    """What LEN gives, if that is known."""
+def _without_scanning(frame: Frame, e: Call) -> Value | None:
+    """What LEN, SPAN__ and COPY__ give of a string whose length is known."""
+    number_of_string = 2 if is_copying(e.function) else 0
+    if not (number_of_string or is_measuring(e.function) or is_spanning(e.function)):
+        return None
+    argument = e.args[number_of_string]
     place = argument.place if isinstance(argument, Load) else argument
-    if not isinstance(place, VarPlace):
+    if not isinstance(place, VarPlace | Const):
         return None
-    ref = frame.ref(place)
-    length, capacity = frame.length(ref), ref.capacity.constant
-    if length is None or capacity is None or capacity > _LONGEST:
+    string = frame.aggregate(place) if isinstance(place, Const) else frame.ref(place)
+    length = frame.length(string)
+    if length is None:
         return None
-    return number(length.constant) if length.constant is not None else frame.fn.value(f"trunc i32 {length} to i16")
+    if is_measuring(e.function):
+        return _measured(frame, length)
+    start, most = (frame.value(argument) for argument in e.args[-2:] if isinstance(argument, Expr))
+    left = frame.fn.value(f"sub i32 {length}, {start}")
+    count = frame.fn.value(f"call i32 @llvm.umin.i32(i32 {left}, i32 {most})")
+    if is_spanning(e.function):
+        return frame.fn.value(f"add i32 {start}, {count}")
+    target, position = e.args[:2]
+    assert isinstance(target, Place) and isinstance(position, Expr)
+    return move_characters(frame, frame.ref(target), frame.value(position), string, start, count)
 
 
-def _appended(frame: Frame, e: Call, result: Ref | None, arguments: list[str]) -> Value | None:
+def _measured(frame: Frame, length: Value) -> Value:
+    """What LEN gives."""
+    if length.constant is not None:
+        return number(min(length.constant, _LONGEST))
+    least = frame.fn.value(f"call i32 @llvm.umin.i32(i32 {length}, i32 {_LONGEST})")
+    return frame.fn.value(f"trunc i32 {least} to i16")
+
+
+def _appended(frame: Frame, e: Call, result: Ref | None, given: list[Operand]) -> Value | None:
     """Adds the second argument to a string that is the first one and the result, if its length is known. Returns the
     new length."""
-    if not is_appending(e.function) or result is None or f"ptr {frame.address(result)}" != arguments[3]:
+    if not is_appending(e.function) or result is None:
         return None
+    whole, added = given[:2]
+    assert isinstance(whole, Ref) and isinstance(added, Ref)
     length, capacity = frame.length(result), _result_capacity(frame, e.function, result)
-    if length is None or capacity != result.capacity:
+    if frame.address(whole) != frame.address(result) or length is None or capacity != result.capacity:
         return None
-    pointer, room = (Value(text.split()[1]) for text in arguments[5:7])
-    return append_string(frame, result, length, capacity, Ref(pointer, 0, result.type, capacity=room))
+    return append_string(frame, result, length, capacity, added)
 
 
 def _leaves_strings(frame: Frame, e: Call) -> bool:
@@ -112,7 +147,7 @@ def _result_capacity(frame: Frame, pou: Pou, result: Ref) -> Value:
 
 
 def _call_instruction(
-    frame: Frame, pou: Pou, dispatch: Dispatch | None, arguments: list[str], *, raises: bool
+    frame: Frame, pou: Pou, dispatch: Dispatch | None, arguments: list[str], form: Form
 ) -> Value | None:
     unit, fn = frame.unit, frame.fn
     result = pou.result.type if pou.result is not None and is_scalar(pou.result.type) else None
@@ -125,7 +160,7 @@ def _call_instruction(
             return fn.value(text)
         fn.do(text)
         return None
-    symbol = unit.target_of(pou, dispatch, raises=raises)
+    symbol = unit.target_of(pou, dispatch, form)
     if length_variable(pou) is not None:
         return fn.call_value("i32", symbol, arguments)
     if result is not None:
@@ -134,22 +169,22 @@ def _call_instruction(
     return None
 
 
-def _operands(
+def _operand(
     frame: Frame, pou: Pou, parameter: Parameter, argument: Expr | Place | None, write_back: list[tuple[Ref, Ref]]
-) -> list[Value]:
-    """The operands that carry one argument."""
+) -> Operand:
+    """What carries one argument."""
     t = parameter.variable.type
     if argument is None:  # an output that is not used
         ref = frame.temporary(t)
     elif not isinstance(argument, Place):
         if is_scalar(t) and not parameter.by_reference:
             value = frame.value(argument)
-            return [lowest_bit(frame, value)] if pou.external and is_bool(t) else [value]
+            return lowest_bit(frame, value) if pou.external and is_bool(t) else value
         ref = _aligned(frame, materialised(frame, argument))
     else:
         ref = frame.ref(argument)
         if parameter.direction is Direction.INPUT and is_scalar(t) and not parameter.by_reference:
-            return [frame.load(ref)]
+            return frame.load(ref)
         if ref.bit >= 0 or (is_scalar(t) and value_type(t) != value_type(ref.type)):
             temporary = frame.temporary(t)  # bits have no address; outputs may become a number of another width
             if parameter.direction is not Direction.OUTPUT:
@@ -161,7 +196,19 @@ def _operands(
             if parameter.direction is not Direction.INPUT:
                 write_back.append((temporary, ref))
             ref = temporary
-    return [frame.address(ref), ref.capacity] if isinstance(t, StringType) else [frame.address(ref)]
+    return ref
+
+
+def _values(frame: Frame, operand: Operand, form: Form) -> list[Value]:
+    """The values that an operand is passed as: of a string its capacity and, if the function takes them, its length."""
+    if not isinstance(operand, Ref):
+        return [operand]
+    found = [frame.address(operand)]
+    if isinstance(operand.type, StringType):
+        found.append(operand.capacity)
+        length = frame.length(operand)
+        found += [length] if form is Form.MEASURED and length is not None else []
+    return found
 
 
 def _aligned(frame: Frame, ref: Ref) -> Ref:

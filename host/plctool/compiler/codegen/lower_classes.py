@@ -6,24 +6,24 @@ from __future__ import annotations
 
 from plctool.compiler.codegen.ir import FALSE, Function
 from plctool.compiler.codegen.lower_frame import ACCESS_VIOLATION, Frame
-from plctool.compiler.codegen.lower_unit import Unit, value_type
+from plctool.compiler.codegen.lower_unit import Form, Unit, value_type
 from plctool.compiler.codegen.signatures import SELF, formals, parameter_list
 from plctool.compiler.typed import Dispatch
 from plctool.iec.types import CLASS_NUMBER, is_scalar
 
 
-def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch, *, raises: bool) -> None:
+def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch, form: Form) -> None:
     """The function `name`, which has the parameters of its targets. An instance of another class was reached through a
     wrong pointer."""
     pou = dispatch.function
     result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
-    fn = Function(f"{result} @{name}({parameter_list(pou, unit.handed, raises=raises)})", unit.plain)
-    frame = Frame(unit, fn, None, raises=raises)
+    fn = Function(f"{result} @{name}({parameter_list(pou, unit.handed, form)})", unit.plain)
+    frame = Frame(unit, fn, None, form)
     frame.open_scope(pou.name, pou.pos)
-    arguments = [formal.argument for formal in formals(pou, unit.handed, raises=raises)]
+    arguments = [formal.argument for formal in formals(pou, unit.handed, form)]
     by_symbol: dict[str, list[int]] = {}
     for number, target in dispatch.targets.items():
-        by_symbol.setdefault(unit.symbol(target, raises=raises), []).append(number)
+        by_symbol.setdefault(unit.symbol(target, form), []).append(number)
     loaded = fn.value(f"load i32, ptr {SELF}, align 4{unit.tag(CLASS_NUMBER)}")
     labels = {symbol: fn.label("class") for symbol in by_symbol}
     unknown = fn.label("unknown")

@@ -98,7 +98,7 @@ def loaded(frame: Frame, e: Load) -> Value:
     if isinstance(e.place, VarPlace):
         shadow = frame.shadows.get(e.place.var)
         if shadow is not None:
-            return frame.fn.value(f"load {value_type(e.type)}, ptr {shadow}")
+            return frame.fn.load(f"load {value_type(e.type)}, ptr {shadow}")
     return frame.load(frame.ref(e.place))
 
 

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import NULL, FixedPointer, Function, Value, number
-from plctool.compiler.codegen.lengths import Lengths
-from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, Check, Unit, value_type
+from plctool.compiler.codegen.lengths import KnownLengths, Lengths
+from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, Check, Form, Unit, value_type
 from plctool.compiler.codegen.memory import Memory
 from plctool.compiler.internal import note_position
 from plctool.compiler.typed import Dispatch, Expr, Label, Place, Pos, Pou, Statement, Variable
@@ -37,9 +37,10 @@ class Ref:
     """An address in the generated code: `pointer` plus `offset` bytes, holding a `type`.
 
     `tag`: alias tag or "". `direct`: reached by name only, not through a pointer. `capacity`: of a STRING
-    [characters], an i32. `bit`: the bit of an integer that a BOOL lives in, -1 for none; `type` is then that
-    integer's. `loose`: a character that may never have been written (after the NUL). `sure`: the address is a multiple
-    of so many bytes whatever the type wants, of which a packed structure has less.
+    [characters], an i32; `length`: how many it has, if that holds wherever this is used. `bit`: the bit of an integer
+    that a BOOL lives in, -1 for none; `type` is then that integer's. `loose`: a character that may never have been
+    written (after the NUL). `sure`: the address is a multiple of so many bytes whatever the type wants, of which a
+    packed structure has less.
     """
 
     pointer: Value
@@ -48,6 +49,7 @@ class Ref:
     tag: str = ""
     direct: bool = False
     capacity: Value = NO_CAPACITY
+    length: Value | None = None
     bit: int = -1
     loose: bool = False
     sure: int = MAX_ALIGN
@@ -136,13 +138,15 @@ _STOP, _CALLER = _Stop(), _Caller()
 class Frame:
     """State of the function being written and access to memory and context."""
 
-    def __init__(self, unit: Unit, fn: Function, pou: Pou | None, *, raises: bool = False) -> None:
-        """`pou`: None for functions that have no source. `raises`: the form that returns its exceptions."""
+    def __init__(self, unit: Unit, fn: Function, pou: Pou | None, form: Form = Form.PLAIN) -> None:
+        """`pou`: None for functions that have no source."""
         self.unit = unit
         self.fn = fn
         self.pou = pou
-        self.handler: Handler = _CALLER if raises else _STOP
-        self.raised: Value | None = RAISED if raises else None  # where the number of an exception is, 0 without one
+        self.form = form
+        self.handler: Handler = _CALLER if form is Form.RAISING else _STOP
+        # Where the number of an exception is, 0 without one.
+        self.raised: Value | None = RAISED if form is Form.RAISING else None
         self.locals: dict[Variable, Ref] = {}
         self.shadows: dict[Variable, Value] = {}  # FOR variables that live in a register inside their loop
         self.ranges: dict[Variable, tuple[int, int]] = {}
@@ -227,10 +231,11 @@ class Frame:
         """Whether an exception raised here does not stop the task at once."""
         return self.handler is not _STOP
 
-    def returns_exceptions(self, pou: Pou, dispatch: Dispatch | None) -> bool:
-        """Whether a POU is called here in the form that returns its exceptions: it may have some, and they are caught.
-        Those of the standard library have none, and none stops a C function."""
-        return self.is_caught and pou.external is None and (pou.checks or dispatch is not None)
+    def form_of(self, pou: Pou, dispatch: Dispatch | None) -> Form:
+        """The form that a POU is called in: the one that returns its exceptions if it may have some, and they are
+        caught. Those of the standard library have none, and none stops a C function."""
+        raises = self.is_caught and pou.external is None and (pou.checks or dispatch is not None)
+        return Form.RAISING if raises else Form.PLAIN
 
     def expect_exceptions(self) -> None:
         """Makes room for the number of an exception, before a __TRY."""
@@ -260,9 +265,10 @@ class Frame:
         if key not in labels:
             labels[key] = fn.label("raise")
         fn.debug = keep
-        ok = fn.label("ok")
+        ok, lengths = fn.label("ok"), self.lengths()
         fn.branch_if(condition, ok, labels[key])
         fn.begin(ok)
+        self.keep_lengths(lengths)
 
     def write_raises(self, handler: Handler | None = None) -> None:
         """Writes the cold blocks that lead to a handler; without one, at the end of the function, to that of its
@@ -350,23 +356,26 @@ class Frame:
 
     def length(self, ref: Ref) -> Value | None:
         """How many characters a string has, as an i32, if that is known."""
-        return self._lengths.known(self.fn.barriers).get((ref.pointer, ref.offset))
+        return ref.length or self.lengths().get((ref.pointer, ref.offset))
 
-    def note_length(self, ref: Ref, length: Value, known: dict[tuple[Value, int], Value] | None = None) -> None:
-        """The string at `ref` has been written and has this length. `known`: what is still known of others."""
-        lengths = dict(known or {})
-        lengths.pop((ref.pointer, ref.offset), None)
-        if ref.tag and ref.direct and ref.pointer.fixed:  # a variable that no other one overlaps
+    def note_length(self, ref: Ref, length: Value | None, known: KnownLengths | None = None) -> None:
+        """What is at `ref` has been written, and is a string of this length if there is one. `known`: before, which
+        still holds of all strings that are not part of it."""
+        lengths = {}
+        if known and ref.direct and ref.pointer.fixed:
+            here = range(ref.offset, ref.offset + ref.type.size)
+            lengths = {place: n for place, n in known.items() if place[0] != ref.pointer or place[1] not in here}
+        if length is not None and ref.direct and (ref.tag or ref.pointer.on_stack):  # which no other variable overlaps
             lengths[ref.pointer, ref.offset] = length
-        self._lengths.set(lengths, self.fn.barriers)
+        self._lengths.set(lengths, self.fn.writes)
 
-    def lengths(self) -> dict[tuple[Value, int], Value]:
+    def lengths(self) -> KnownLengths:
         """All lengths that are known."""
-        return self._lengths.known(self.fn.barriers)
+        return self._lengths.known(self.fn.writes)
 
-    def keep_lengths(self, known: dict[tuple[Value, int], Value]) -> None:
+    def keep_lengths(self, known: KnownLengths) -> None:
         """They are still known."""
-        self._lengths.set(known, self.fn.barriers)
+        self._lengths.set(known, self.fn.writes)
 
     def _memory(self) -> Memory:
         """What is known here."""
@@ -433,8 +442,8 @@ class Frame:
 class Body(Frame):
     """The body of one POU."""
 
-    def __init__(self, unit: Unit, fn: Function, pou: Pou, effects: Effects, *, raises: bool = False) -> None:
-        super().__init__(unit, fn, pou, raises=raises)
+    def __init__(self, unit: Unit, fn: Function, pou: Pou, effects: Effects, form: Form) -> None:
+        super().__init__(unit, fn, pou, form)
         self.effects = effects
         self.on_return = "return"
         self.loops: list[tuple[str, str, int]] = []  # labels for CONTINUE and EXIT, and how many `finals` are around

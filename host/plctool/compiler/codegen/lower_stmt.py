@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from plctool.compiler.codegen.ir import FALSE
+from plctool.compiler.codegen.lengths import KnownLengths, known_by_all
 from plctool.compiler.codegen.lower_blocks import assign_aggregate
 from plctool.compiler.codegen.lower_calls import call_function
 from plctool.compiler.codegen.lower_expr import truth
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Body, rule
 from plctool.compiler.codegen.lower_init import initialise
-from plctool.compiler.codegen.lower_unit import value_type
+from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import result_in_memory
 from plctool.compiler.typed import (
     Assign,
@@ -54,7 +55,7 @@ def _may_write_directly(frame: Body, target: Place, call: Call) -> bool:
     pou = call.function
     if pou.external or not _fits(call, target) or not frame.effects.is_local(pou):
         return False
-    if frame.returns_exceptions(pou, call.dispatch):
+    if frame.form_of(pou, call.dispatch) is Form.RAISING:
         return False  # an exception leaves the target as it was
     root = root_of(target)
     arguments = (
@@ -92,17 +93,24 @@ def call_statement(frame: Body, s: CallStatement) -> None:
 def if_statement(frame: Body, s: If) -> None:
     """A chain of branches."""
     fn = frame.fn
-    end = fn.label("endif")
+    end, ways = fn.label("endif"), list[KnownLengths]()
     for condition, body in s.branches:
         frame.at(condition.pos)
         then, otherwise = fn.label("then"), fn.label("else")
-        fn.branch_if(truth(frame, condition), then, otherwise)
+        test = truth(frame, condition)
+        lengths = frame.lengths()
+        fn.branch_if(test, then, otherwise)
         fn.begin(then)
+        frame.keep_lengths(lengths)
         frame.statements(body)
+        ways += [frame.lengths()] * fn.open
         fn.branch(end)
         fn.begin(otherwise)
+        frame.keep_lengths(lengths)
     frame.statements(s.otherwise)
+    ways += [frame.lengths()] * fn.open
     fn.begin(end)
+    frame.keep_lengths(known_by_all(ways))
 
 
 @rule(STATEMENTS, Exit)

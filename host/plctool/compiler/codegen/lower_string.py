@@ -22,25 +22,44 @@ _INLINE_COMPARE = 16
 
 def copy_string(frame: Frame, target: Ref, source: Ref) -> None:
     """target := source, cut to the target's capacity."""
+    known, lengths = frame.length(source), frame.lengths()
     if target.capacity.constant is not None and source.capacity.constant is not None:
         length = min(target.capacity.constant, source.capacity.constant)
         target_machine = frame.unit.target
         inline = _INLINE_COPY if target_machine.vectors else _SHORT_COPY if target_machine.unaligned else _TINY_COPY
-        if length * _unit(target) <= inline:
+        if length * _unit(target) <= (inline if known is None else min(inline, _SHORT_COPY)):
             frame.copy(target, source, length * _unit(target))
             _terminate(frame, target, length)
+            frame.note_length(target, None if known is None else _least(frame, known, length), lengths)
             return
-    name, room = frame.unit.helper(_helper("copy", target)), f"i32 {source.capacity}"
-    to = ["ptr null", f"ptr {frame.address(target)}", f"i32 {target.capacity}", "i32 0"]
-    copied = frame.fn.call_value("i32", name, [*to, f"ptr {frame.address(source)}", room, "i32 0", room])
-    frame.note_length(target, copied)
+    frame.note_length(target, append_string(frame, target, number(0), target.capacity, source), lengths)
 
 
 def append_string(frame: Frame, target: Ref, length: Value, capacity: Value, source: Ref) -> Value:
     """Adds `source` to a string of the length `length`, up to `capacity`. Returns the new length."""
-    name, room = frame.unit.helper(_helper("copy", target)), f"i32 {source.capacity}"
-    to = ["ptr null", f"ptr {frame.address(target)}", f"i32 {capacity}", f"i32 {length}"]
-    return frame.fn.call_value("i32", name, [*to, f"ptr {frame.address(source)}", room, "i32 0", room])
+    known = frame.length(source)
+    target = replace(target, capacity=capacity)
+    if known is not None:
+        return move_characters(frame, target, length, source, number(0), known)
+    return _copy(frame, "copy", target, length, source, number(0), source.capacity)
+
+
+def move_characters(frame: Frame, target: Ref, position: Value, source: Ref, start: Value, count: Value) -> Value:
+    """Puts `count` characters of `source` from `start` on, which are there, into a string at `position`, and ends it
+    there. Returns its new length."""
+    return _copy(frame, "move", target, position, source, start, count)
+
+
+def _copy(frame: Frame, helper: str, target: Ref, position: Value, source: Ref, start: Value, count: Value) -> Value:
+    arguments = [f"ptr {frame.address(target)}", f"i32 {target.capacity}", f"i32 {position}"]
+    arguments += [f"ptr {frame.address(source)}", f"i32 {source.capacity}", f"i32 {start}", f"i32 {count}"]
+    return frame.fn.call_value("i32", frame.unit.helper(_helper(helper, target)), ["ptr null", *arguments])
+
+
+def _least(frame: Frame, one: Value, limit: int) -> Value:
+    if one.constant is not None:
+        return number(min(one.constant, limit))
+    return frame.fn.value(f"call i32 @llvm.umin.i32(i32 {one}, i32 {limit})")
 
 
 def copy_literal(frame: Frame, target: Ref, text: str) -> None:
@@ -49,19 +68,24 @@ def copy_literal(frame: Frame, target: Ref, text: str) -> None:
     if target.capacity.constant is None:
         copy_string(frame, target, literal_text(frame, text, wide=wide))
         return
-    text = text[: target.capacity.constant]
+    text, lengths = text[: target.capacity.constant], frame.lengths()
     if text:
         source = replace(literal_text(frame, text, wide=wide), direct=target.direct)
         frame.copy(target, source, len(text) * _unit(target))
     _terminate(frame, target, len(text))
-    frame.note_length(target, number(len(text)))
+    frame.note_length(target, _length_of(text), lengths)
 
 
 def literal_text(frame: Frame, text: str, *, wide: bool) -> Ref:
     """A constant string in the image."""
     t = StringType(len(text), wide)
     pointer = frame.unit.module.constant(encode_text(text + "\0", t), t.align)
-    return Ref(pointer, 0, t, direct=True, capacity=number(len(text)))
+    return Ref(pointer, 0, t, direct=True, capacity=number(len(text)), length=_length_of(text))
+
+
+def _length_of(text: str) -> Value:
+    """Up to the NUL that a constant may have ('ab$00c')."""
+    return number(len(text.partition("\0")[0]))
 
 
 def _terminate(frame: Frame, target: Ref, length: int) -> None:
@@ -73,7 +97,9 @@ def _terminate(frame: Frame, target: Ref, length: int) -> None:
 def compare_strings(frame: Frame, op: BinaryOp, left: Ref, right: Ref) -> Value:
     """The i1 of a comparison, byte by byte, unsigned."""
     arguments = [text for ref in (left, right) for text in (f"ptr {frame.address(ref)}", f"i32 {ref.capacity}")]
+    lengths = frame.lengths()
     order = frame.fn.call_value("i32", frame.unit.helper(_helper("compare", left)), arguments)
+    frame.keep_lengths(lengths)
     return compare(frame, op, order, number(0), DINT)
 
 

@@ -69,6 +69,14 @@ class Options:
         return self.size or self.target.saves_room(self.opt_level)
 
 
+class Form(Enum):
+    """How a compiled function is called."""
+
+    PLAIN = 0
+    RAISING = 1  # it returns its exceptions
+    MEASURED = 2  # a function of the library that is given the lengths of its strings
+
+
 def interface_signature(text: str) -> int:
     """The signature id of an external function: CRC-32 of its interface text, e.g. 'sin(LREAL):LREAL'."""
     return zlib.crc32(text.encode("ascii"))
@@ -107,10 +115,10 @@ class Unit:
         self.sections: set[Pou] = set()  # parts of POUs
         self.handed: dict[Pou, list[Variable]] = {}  # inputs that function blocks get as parameters
         self.closed: dict[Pou, Closed] = {}  # the blocks that are closed
-        self.pous: dict[tuple[Pou, bool], str] = {}  # symbol of every POU; True: returns its exceptions
+        self.pous: dict[tuple[Pou, Form], str] = {}  # the symbol of every form of a POU
         self.structs: dict[str, StructType] = {}  # types whose default initialiser is needed, by symbol
         self.helpers: set[str] = set()
-        self.dispatchers: dict[tuple[Dispatch, bool], str] = {}  # symbols of what chooses among targets
+        self.dispatchers: dict[tuple[Dispatch, Form], str] = {}  # symbols of what chooses among targets
         self.files: dict[str, int] = {}
         self.bounds: list[BoundsCheck] = []  # that are in the code
         self._import_slots: dict[str, int] = {}
@@ -157,32 +165,32 @@ class Unit:
 
     # ---- what is referred to ----
 
-    def symbol(self, pou: Pou, *, raises: bool = False) -> str:
-        """The symbol of a POU, in the form that returns its exceptions if it `raises`; puts it in the queue."""
+    def symbol(self, pou: Pou, form: Form = Form.PLAIN) -> str:
+        """The symbol of a POU in this form; puts it in the queue."""
         if pou.no_init and pou.name in LIBRARY_FUNCTIONS:
             return self.helper(LIBRARY_FUNCTIONS[pou.name])
-        name = self.pous.get((pou, raises))
+        name = self.pous.get((pou, form))
         if name is None:
             name = self.unique(f"st.{pou.name}")
-            self.pous[pou, raises] = name
+            self.pous[pou, form] = name
         return name
 
-    def section(self, part: Pou, *, raises: bool) -> str:
+    def section(self, part: Pou, form: Form) -> str:
         """The symbol of a part of a POU."""
         self.sections.add(part)
-        return self.symbol(part, raises=raises)
+        return self.symbol(part, form)
 
-    def target_of(self, pou: Pou, dispatch: Dispatch | None, *, raises: bool = False) -> str:
+    def target_of(self, pou: Pou, dispatch: Dispatch | None, form: Form) -> str:
         """The symbol that a call of `pou` goes to: of a function that looks at the class when that decides."""
         if dispatch is None:
-            return self.symbol(pou, raises=raises)
+            return self.symbol(pou, form)
         targets = set(dispatch.targets.values())
         if len(targets) == 1:
-            return self.symbol(targets.pop(), raises=raises)
-        name = self.dispatchers.get((dispatch, raises))
+            return self.symbol(targets.pop(), form)
+        name = self.dispatchers.get((dispatch, form))
         if name is None:
             name = self.unique(f"class.{pou.name}")
-            self.dispatchers[dispatch, raises] = name
+            self.dispatchers[dispatch, form] = name
         return name
 
     def unique(self, wanted: str) -> str:

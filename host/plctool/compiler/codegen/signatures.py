@@ -17,7 +17,7 @@ from plctool.compiler.codegen.ir import FixedPointer, Value
 from plctool.compiler.codegen.lengths import length_variable
 from plctool.compiler.codegen.lower_arith import is_bool, is_real, is_signed
 from plctool.compiler.codegen.lower_frame import RAISED
-from plctool.compiler.codegen.lower_unit import value_type
+from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.typed import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
 from plctool.compiler.typed_nodes import walk
 from plctool.iec.types import StringType, Type, is_scalar
@@ -42,11 +42,16 @@ def parameter_capacity(number: int) -> Value:
     return Value(f"%p{number}.capacity")
 
 
-def parameter_types(pou: Pou, parameter: Parameter) -> list[str]:
+def parameter_length(number: int) -> Value:
+    """Its length, in the form of a function that is given lengths."""
+    return Value(f"%p{number}.length")
+
+
+def parameter_types(pou: Pou, parameter: Parameter, form: Form) -> list[str]:
     """The LLVM parameters that carry one IEC parameter."""
     t = parameter.variable.type
     if isinstance(t, StringType):
-        return ["ptr", "i32"]
+        return ["ptr", "i32", "i32"] if form is Form.MEASURED else ["ptr", "i32"]
     if parameter.by_reference or not is_scalar(t):
         return ["ptr"]
     return [f"{value_type(t)} {extension(t)}".rstrip() if pou.external else passed_type(t)]
@@ -89,12 +94,12 @@ class Formal:
         return f"{self.type} {self.value}"
 
 
-def formals(pou: Pou, handed: HandedInputs, *, raises: bool = False, closed: Closed | None = None) -> list[Formal]:
-    """The parameters of the function of a unit. `raises`: of the form that returns its exceptions."""
+def formals(pou: Pou, handed: HandedInputs, form: Form, closed: Closed | None = None) -> list[Formal]:
+    """The parameters of the function of a unit."""
     found = []
     if closed is None or closed.has_context:
         found.append(Formal("ptr", Value("%ctx"), "noalias nonnull readonly"))
-    if raises:
+    if form is Form.RAISING:
         found.append(Formal("ptr", RAISED, "noalias nonnull"))
     if pou.kind in (PouKind.FUNCTION_BLOCK, PouKind.METHOD):
         found.append(Formal("ptr", SELF, "nonnull"))
@@ -103,16 +108,16 @@ def formals(pou: Pou, handed: HandedInputs, *, raises: bool = False, closed: Clo
         found += [Formal("i32", RESULT_CAPACITY)] if pou.cuts_result else []
     if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
         for number, parameter in enumerate(pou.parameters):
-            values = (parameter_value(number), parameter_capacity(number))
-            types = parameter_types(pou, parameter)
+            values = (parameter_value(number), parameter_capacity(number), parameter_length(number))
+            types = parameter_types(pou, parameter, form)
             found += [Formal(text, value) for text, value in zip(types, values, strict=False)]
     found += [Formal(passed_type(v.type), parameter_value(n)) for n, v in enumerate(handed.get(pou, ()))]
     return found
 
 
-def parameter_list(pou: Pou, handed: HandedInputs, *, raises: bool = False, closed: Closed | None = None) -> str:
+def parameter_list(pou: Pou, handed: HandedInputs, form: Form, closed: Closed | None = None) -> str:
     """The parameters of the define line."""
-    return ", ".join(formal.definition for formal in formals(pou, handed, raises=raises, closed=closed))
+    return ", ".join(formal.definition for formal in formals(pou, handed, form, closed))
 
 
 def block_signatures(program: TypedProgram, target: Target) -> tuple[HandedInputs, ClosedBlocks]:

@@ -327,6 +327,60 @@ def _copy_vectors(fn: Function, strings: _Strings, room: Value, count: Value, so
     return after
 
 
+def _move(fn: Function, strings: _Strings) -> None:
+    """COPY__ of characters that are known to be there: `want` from `start` on, none of them a NUL."""
+    target_left = fn.value("sub i32 %dcap, %pos")
+    count = _least(fn, "%want", target_left)
+    target = strings.at(fn, "%d", strings.index(fn, "%pos"))
+    source = strings.at(fn, "%s", strings.index(fn, "%start"))
+    start = _move_chunks(fn, strings, target_left, count, source, target) if strings.chunk else None
+    if start is None:
+        fn.branch("loop")
+    fn.begin_detached("loop")
+    i = fn.phi("i32", (_ZERO, "entry"), *([] if start is None else [(start, "short")]))
+    fn.branch_if(fn.value(f"icmp ult i32 {i}, {count}"), "next", "done")
+    fn.begin_detached("next")
+    index = strings.index(fn, i)
+    strings.store(fn, strings.load(fn, strings.at(fn, source, index)), strings.at(fn, target, index))
+    _next_character(fn, i)
+    fn.begin_detached("done")
+    strings.store(fn, _ZERO, strings.at(fn, target, strings.index(fn, count)))
+    fn.terminate(f"ret i32 {fn.value(f'add i32 %pos, {count}')}")
+
+
+def _move_chunks(
+    fn: Function, strings: _Strings, target_left: Value, count: Value, source: Value, target: Value
+) -> Value:
+    """From the entry on, over the chunks that both strings have room for. A vector with the end is stored with zeros
+    from there on, as in `_copy_vectors`.
+
+    Returns from the function after that; leads to the block `loop` from `short`, with the result as the index to go on
+    at.
+    """
+    left = _least(fn, target_left, fn.value("sub i32 %scap, %start"))
+    inner = fn.value(f"call i32 @llvm.usub.sat.i32(i32 {left}, i32 {strings.chunk - 2})")
+    bound = _least(fn, inner, count)
+    fn.branch_if(fn.value(f"icmp eq i32 {bound}, 0"), "loop", "chunk")
+    fn.begin_detached("chunk")
+    at = fn.phi("i32", (_ZERO, "entry"))
+    after = fn.value(f"add i32 {at}, {strings.chunk}")
+    index = strings.index(fn, at)
+    chunk = strings.load_chunk(fn, strings.at(fn, source, index))
+    if strings.target.vectors:
+        fn.branch_if(fn.value(f"icmp ult i32 {count}, {after}"), "last", "clear")
+        fn.begin_detached("last")
+        length = fn.value(f"sub i32 {count}, {at}")
+        strings.store_chunk(fn, strings.cut(fn, chunk, length), strings.at(fn, target, index))
+        fn.terminate(f"ret i32 {fn.value(f'add i32 %pos, {count}')}")
+        fn.begin_detached("clear")
+    strings.store_chunk(fn, chunk, strings.at(fn, target, index))
+    fn.add_incoming(at, after, fn.block)
+    fn.branch_if(fn.value(f"icmp ult i32 {after}, {bound}"), "chunk", "short")
+    fn.begin_detached("short")
+    fn.branch("loop")
+    return after
+
+
 # ---- comparing ----
 
 
@@ -387,10 +441,11 @@ def _compare(fn: Function, strings: _Strings) -> None:
     fn.terminate(f"ret i32 {fn.value(f'sub i32 {left}, {right}')}")
 
 
-_BODIES = {"str.span": _span, "str.seek": _seek, "str.copy": _copy, "str.compare": _compare}
+_BODIES = {"str.span": _span, "str.seek": _seek, "str.copy": _copy, "str.move": _move, "str.compare": _compare}
 _PARAMETERS = {
     "str.span": "ptr %ctx, ptr %s, i32 %cap, i32 %start, i32 %want",
     "str.seek": "ptr %ctx, ptr %s, i32 %cap, i32 %start, {character} %c",
     "str.copy": "ptr %ctx, ptr %d, i32 %dcap, i32 %pos, ptr %s, i32 %scap, i32 %start, i32 %want",
+    "str.move": "ptr %ctx, ptr %d, i32 %dcap, i32 %pos, ptr %s, i32 %scap, i32 %start, i32 %want",
     "str.compare": "ptr %a, i32 %acap, ptr %b, i32 %bcap",
 }
