@@ -193,8 +193,8 @@ def run_twin(optimisation: str) -> tuple[int, float, float]:
 def bench_tanks() -> None:
     print("\nexamples/tanks, ns per cycle of each task, beside the same program in C")
     twins = {level: run_twin(level) for level in ("-O2", "-O3")}
-    for checks in ("all", "none"):
-        result = compile_sources(TANKS, checks=checks, io=IoFiles(wanted=False))
+    for checks, level in (("all", 2), ("none", 2), ("all", 3)):
+        result = compile_sources(TANKS, checks=checks, level=level, io=IoFiles(wanted=False))
         with Simulator(result.image, result.symbols) as plc:
             plc.run_cycles(CYCLES)
             same = {level: checksum(plc) == twin[0] for level, twin in twins.items()}
@@ -204,7 +204,7 @@ def bench_tanks() -> None:
                 + ("" if same[level] else " (OTHER RESULT)")
                 for level, twin in twins.items()
             )
-            line(f"{name}, checks {checks}", f"{code:.1f} ns", beside)
+            line(f"{name}, checks {checks}, -O{level}", f"{code:.1f} ns", beside)
 
 
 BUS = """[[modbus.rs485]]

@@ -44,7 +44,7 @@ GUEST_CYCLES = 200  # fewer, because soft float takes 50 000 instructions in eac
 CALLS = 30_000  # of a program or twin, for its time on this machine
 HOST = "x86_64-linux"
 GUESTS = ("cortex-m3", "cortex-m4f")
-CHECKS = ("all", "none")
+HOST_VARIANTS = (("all", "-O2"), ("none", "-O2"), ("all", "-O3"))  # checks and level
 TWIN_LEVELS = ("-O2", "-O3")
 VARIANTS = (("all", "-O2"), ("none", "-O2"), ("all", "-O3"), ("all", "-Os"))  # on Cortex-M
 C_FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-strict-aliasing")
@@ -142,27 +142,27 @@ def bench_host(programs: list[Program], folder: Path) -> None:
     print(f"\nBenchmark programs on this machine: ns per cycle, best of {ROUNDS} rounds in turn on one processor,")
     print("the ratio to their C twins, and how far the median of the worst variant is above its best")
     print(
-        f"  {'':<12}{'checks':<8}{'plctool':>10}{'gcc -O2':>10}{'gcc -O3':>10}{'to -O2':>8}{'to -O3':>8}{'spread':>8}"
+        f"  {'':<12}{'checks':<8}{'level':<8}{'plctool':>10}{'gcc -O2':>10}{'gcc -O3':>10}"
+        f"{'to -O2':>8}{'to -O3':>8}{'spread':>8}"
     )
-    ratios: dict[str, list[list[float]]] = {checks: [] for checks in CHECKS}
+    ratios: dict[tuple[str, str], list[list[float]]] = {variant: [] for variant in HOST_VARIANTS}
     for program in programs:
-        builds = [partial(time_program, program.build(HOST, checks)) for checks in CHECKS]
+        builds = [partial(time_program, program.build(HOST, *variant)) for variant in HOST_VARIANTS]
         twins = [partial(time_twin, compiled_twin(program.twin, level, folder)) for level in TWIN_LEVELS]
         with one_processor():
             series = interleaved([*builds, *twins])
-        own, others = series[: len(CHECKS)], series[len(CHECKS) :]
-        for checks, mine in zip(CHECKS, own, strict=True):
-            ratios[checks].append([mine.best / other.best for other in others])
+        own, others = series[: len(builds)], series[len(builds) :]
+        for (checks, level), mine in zip(HOST_VARIANTS, own, strict=True):
+            ratios[checks, level].append([mine.best / other.best for other in others])
             same = "" if all(mine.value == other.value for other in others) else "  OTHER CHECKSUM"
             times = "".join(f"{other.best:>10.0f}" for other in others)
-            shares = "".join(f"{ratio:>8.2f}" for ratio in ratios[checks][-1])
+            shares = "".join(f"{ratio:>8.2f}" for ratio in ratios[checks, level][-1])
             spread = max(each.spread for each in (mine, *others))
-            print(
-                f"  {program.st.stem:<12}{checks:<8}{mine.best:>10.0f}{times}{shares}{spread:>8.0%}{same}", flush=True
-            )
-    for checks in CHECKS:
-        means = "".join(f"{statistics.geometric_mean(column):>8.2f}" for column in zip(*ratios[checks], strict=True))
-        print(f"  {'geometric mean':<20}{checks:<8}{'':>22}{means}")
+            variant = f"{program.st.stem:<12}{checks:<8}{level:<8}"
+            print(f"  {variant}{mine.best:>10.0f}{times}{shares}{spread:>8.0%}{same}", flush=True)
+    for (checks, level), of_one in ratios.items():
+        means = "".join(f"{statistics.geometric_mean(column):>8.2f}" for column in zip(*of_one, strict=True))
+        print(f"  {'mean':<12}{checks:<8}{level:<8}{'':>30}{means}  geometric")
 
 
 # ---- Cortex-M ------------------------------------------------------------------------------------------------------

@@ -344,8 +344,10 @@ def _add_sources(parser: argparse.ArgumentParser) -> None:
 
 def _add_build_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "-O", dest="level", type=_level, metavar="0..3|s", help="optimisation, s for small code; default: 2"
-    )
+        "-O", dest="level", type=_level, metavar="0..3|s",
+        help="optimisation, 3 for the fastest code, s for the smallest, both with fewer variables of blocks to watch; "
+        "default: 2",
+    )  # fmt: skip
     parser.add_argument(
         "--checks",
         metavar="all|none|LIST",

@@ -174,7 +174,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
     for line in linked.lines:
         index = files.setdefault(line.file, len(files)) if line.file else -1
         lines.append((line.address, index, line.line))
-    return SymbolTable(
+    table = SymbolTable(
         0,
         target.name,
         project,
@@ -188,7 +188,21 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         {n: constant_symbol(n, c.type, encode(base_of(c.type), c.value)) for n, c in program.constants.items()},
         linked.debug,
         bounds=lowered.bounds,
+        unkept=_unkept(lowered),
     )
+    # Without the variables that are not in memory the types are others than those of the program.
+    return SymbolTable.from_json(table.to_json()) if table.unkept else table
+
+
+def _unkept(lowered: Lowered) -> dict[str, list[str]]:
+    """The variables of function blocks that are not in memory, by the name of the block."""
+    found = {}
+    for pou, variables in lowered.transient.items():
+        assert pou.instance is not None
+        offsets = {variable.offset for variable in variables}
+        if offsets:
+            found[pou.instance.name] = [f.name for f in pou.instance.fields if f.offset in offsets]
+    return found
 
 
 def _temporaries(pou: Pou) -> list[str]:

@@ -72,7 +72,7 @@ class SymbolTable:
     the next one. `aliases`: other names of variables. `classes`: the numbers by which instances show their class.
     `constants`: those that are not in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
     lose. `io`: devices and channels of inputs and outputs (`compiler/io_configuration.py`), empty for none. `bounds`:
-    what the code checks."""
+    what the code checks. `unkept`: variables of function blocks, by the name of the block, that live in registers."""
 
     image_crc: int
     target: str
@@ -89,6 +89,7 @@ class SymbolTable:
     kept: list[KeptName] = field(default_factory=list)
     io: dict[str, Any] = field(default_factory=dict)
     bounds: list[BoundsCheck] = field(default_factory=list)
+    unkept: dict[str, list[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -96,7 +97,8 @@ class SymbolTable:
         known = {other: self._by_key.get(name.casefold()) for other, name in self.aliases.items()}
         self._by_key |= {other.casefold(): symbol for other, symbol in known.items() if symbol is not None}
         temporaries = {u.name.casefold(): {name.casefold() for name in u.temporaries} for u in self.pous}
-        self._units = Units(self.classes, temporaries)
+        unkept = {block.casefold(): {name.casefold() for name in names} for block, names in self.unkept.items()}
+        self._units = Units(self.classes, temporaries, unkept)
 
     # ---- variables ----
 
@@ -226,6 +228,9 @@ class SymbolTable:
     def to_json(self) -> str:
         types: dict[str, Any] = {}
         variables = {name: _variable(symbol, types) for name, symbol in self.variables.items()}
+        for block, names in self.unkept.items():
+            if block in types:
+                types[block]["fields"] = [entry for entry in types[block]["fields"] if entry[0] not in names]
         document = {
             "format": FORMAT,
             "image_crc": self.image_crc,
@@ -243,6 +248,7 @@ class SymbolTable:
             "kept": [[k.name, k.type, k.persistent, k.size] for k in self.kept],
             "io": self.io,
             "bounds": [check.to_list() for check in self.bounds],
+            "unkept": self.unkept,
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))
@@ -274,6 +280,7 @@ class SymbolTable:
                 [KeptName(*entry) for entry in document.get("kept", [])],
                 document.get("io", {}),
                 [BoundsCheck.from_list(entry) for entry in document.get("bounds", [])],
+                document.get("unkept", {}),
             )
         except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None

@@ -142,10 +142,12 @@ class Symbol:
 @dataclass(frozen=True)
 class Units:
     """What is known of the units of a program. `classes`: the number of each class that an interface variable may refer
-    to. `temporaries`: of each unit, the variables that live only while it runs; names in lower case."""
+    to. `temporaries`: of each unit, the variables that live only while it runs; `unkept`: of each function block, those
+    that could be in its instance, but are in registers; names in lower case."""
 
     classes: dict[str, int] = field(default_factory=dict)
     temporaries: dict[str, set[str]] = field(default_factory=dict)
+    unkept: dict[str, set[str]] = field(default_factory=dict)
 
     def no_variable(self, path: str, unit: str, known: Iterable[str]) -> UsageError:
         """The error about a path that leads to nothing in `unit`; `known` are those that would."""
@@ -153,8 +155,15 @@ class Units:
             return UsageError("A name is empty; write for example Main.speed.", "unknown-variable")
         if "*" in path or "?" in path:
             return UsageError(f"{path} stands for several variables; name one, 'plctool symbols' lists them.", "usage")
-        if path.rpartition(".")[2].casefold() in self.temporaries.get(unit.casefold(), ()):
+        last = path.rpartition(".")[2].casefold()
+        if last in self.temporaries.get(unit.casefold(), ()):
             return UsageError(f"{path} lives only while {unit} runs: there is nothing to read or write.", "temporary")
+        if last in self.unkept.get(unit.casefold(), ()):
+            return UsageError(
+                f"{path} is in a register, only while {unit} runs, because the program was built with -O3 or -Os; "
+                "build it with -O2 to watch all variables.",
+                "temporary",
+            )
         lower = {k.casefold(): k for k in known}
         close = difflib.get_close_matches(path.casefold(), lower, n=1, cutoff=0.6)
         hint = f" Did you mean {lower[close[0]]}?" if close else ""

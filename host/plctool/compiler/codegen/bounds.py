@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import suppress
 
 from plctool.compiler.typed import (
@@ -19,8 +19,10 @@ from plctool.compiler.typed import (
     Pou,
     SelfPlace,
     Storage,
+    Variable,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import walk
 from plctool.debug.bounds import BoundsCheck, Term
 from plctool.iec.types import ArrayType, Elementary, Kind, StructType, Type, base_of
 
@@ -31,11 +33,15 @@ class _Unknown(Exception):
     """A value that cannot be read when the program has stopped."""
 
 
-def bounds_check(pou: Pou | None, array: Place | None, value: Expr, low: int, high: int, pos: Pos) -> BoundsCheck:
-    """The check of an index of `array`, or of what is assigned (None)."""
+def bounds_check(
+    pou: Pou | None, array: Place | None, value: Expr, low: int, high: int, pos: Pos, lost: Container[Variable]
+) -> BoundsCheck:
+    """The check of an index of `array`, or of what is assigned (None). `lost`: variables that are not in memory."""
     what = _name(array) if array is not None else ""
     t, constant, terms = base_of(value.type), 0, None
     with suppress(_Unknown):
+        if any(isinstance(node, VarPlace) and node.var in lost for node in walk(value)):
+            raise _Unknown
         parts = list(_terms(value, 1))
         terms = tuple(part for part in parts if isinstance(part, Term))
         constant = sum(part for part in parts if isinstance(part, int))

@@ -181,9 +181,9 @@ class Function:
 
     def value(self, text: str) -> Value:
         """Writes an instruction that gives a value."""
-        if text.startswith(_USES_MEMORY) and _ARITHMETIC not in text:
+        if text.startswith(_USES_MEMORY):
             self.barriers += 1
-            self.writes += text.startswith(_WRITES_MEMORY)
+            self.writes += text.startswith(_WRITES_MEMORY) and _ARITHMETIC not in text
         return self.load(text)
 
     def load(self, text: str) -> Value:

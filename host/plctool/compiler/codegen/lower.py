@@ -15,6 +15,7 @@ from plctool.compiler.codegen.partition import Part, parts
 from plctool.compiler.codegen.sections import sections
 from plctool.compiler.codegen.signatures import CONTEXT, SELF, block_signatures, parameter_list, result_type
 from plctool.compiler.codegen.string_functions import string_function
+from plctool.compiler.codegen.transient import TransientVariables
 from plctool.compiler.internal import note_position
 from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
@@ -32,7 +33,8 @@ GLOBAL_EXIT = "global_exit"
 class Lowered:
     """LLVM IR, in parts, and what an image of it needs. `tasks`: entry symbols
     in the order of the program's tasks; `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `pous`: by
-    symbol, all that are part of it; `imports`: in the order of their slots; `bounds`: what is checked."""
+    symbol, all that are part of it; `imports`: in the order of their slots; `bounds`: what is checked;
+    `transient`: variables of blocks that are not kept in memory."""
 
     parts: list[Part]
     tasks: list[str]
@@ -40,12 +42,14 @@ class Lowered:
     pous: dict[str, Pou]
     imports: list[External]
     bounds: list[BoundsCheck]
+    transient: TransientVariables
 
 
 def lower(program: TypedProgram, options: Options) -> Lowered:
     """Lowers what the tasks of a checked program reach."""
     unit = Unit(options, program.area_sizes, program.defaults)
-    unit.handed, unit.closed = block_signatures(program, options.target)
+    signatures = block_signatures(program, options)
+    unit.handed, unit.transient, unit.closed = signatures.handed, signatures.transient, signatures.closed
     tasks = [_task_entry(unit, number, task) for number, task in enumerate(program.tasks)]
     _code_init(unit, program.globals)
     functions = {int(lib.CDL_FUNCTION_CODE_INIT): CODE_INIT}
@@ -80,7 +84,8 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     for name in sorted(unit.helpers):
         unit.module.add_helper(string_function(name, unit.target, unit.strings))
     pous = {name: pou for (pou, _), name in unit.pous.items()}
-    return Lowered(parts(unit.module), tasks, functions, pous, unit.imports, [*dict.fromkeys(unit.bounds)])
+    bounds = [*dict.fromkeys(unit.bounds)]
+    return Lowered(parts(unit.module), tasks, functions, pous, unit.imports, bounds, unit.transient)
 
 
 def _task_entry(unit: Unit, number: int, task: Task) -> str:

@@ -80,12 +80,12 @@ def _call(frame: Frame, block: Pou, symbol: str, arguments: list[str], instances
 def _inputs(frame: Frame, s: FbCall, instance: Ref) -> list[str]:
     """Stores the inputs in the instance. Returns the values of those that the block stores itself; they must be
     stored here as well before an expression that could see it."""
-    handed = frame.unit.handed.get(s.block, [])
+    handed, transient = frame.unit.handed.get(s.block, []), frame.unit.transient.get(s.block, [])
     values: dict[Variable, Value] = {}
     arguments = [argument for _, argument in s.inputs + s.in_outs]
     last = max((n for n, argument in enumerate(arguments) if not _is_plain(frame, argument, s.block)), default=0)
     for number, (variable, value) in enumerate(s.inputs):
-        if variable in handed and number >= last:
+        if variable in transient or (variable in handed and number >= last):
             values[variable] = frame.value(value)
         else:
             _assign_member(frame, _member(frame, s.block, instance, variable), value)

@@ -37,6 +37,8 @@ def write_body(frame: Body) -> None:
     assert pou is not None
     if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
         _take_parameters(frame, pou)
+    for var in frame.unit.transient.get(pou, ()):
+        frame.locals[var] = _stack_memory(frame, var)
     take_inputs(frame, pou)
     if pou.result is not None and result_in_memory(pou):
         capacity = RESULT_CAPACITY if pou.cuts_result else string_capacity(pou.result.type)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from plctool.compiler.codegen.bounds import bounds_check
 from plctool.compiler.codegen.ir import FALSE, TRUE, Value
 from plctool.compiler.codegen.lower_arith import (
     COMPARISONS,
@@ -182,7 +181,7 @@ def _check_limits(
     low, high = max(limits[0], known[0]), min(limits[1], known[1])
     if (low, high) == known:
         return
-    frame.unit.bounds.append(bounds_check(frame.pou, None, e.operand, *limits, e.pos))
+    frame.note_bounds(None, e.operand, *limits, e.pos)
     text = value_type(t)
     if low > high:
         frame.require(FALSE, ARRAY_BOUNDS, e.pos)

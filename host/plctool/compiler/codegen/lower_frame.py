@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from plctool.compiler.analysis import Effects
+from plctool.compiler.codegen.bounds import bounds_check
 from plctool.compiler.codegen.ir import NULL, FixedPointer, Function, Value, number
 from plctool.compiler.codegen.lengths import KnownLengths, Lengths
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, Check, Form, Unit, value_type
@@ -247,6 +248,11 @@ class Frame:
     def set_raised(self, code: Value) -> None:
         """Notes the number of an exception; 0: there is none."""
         self.fn.do(f"store i32 {code}, ptr {self.raised}")
+
+    def note_bounds(self, array: Place | None, value: Expr, low: int, high: int, pos: Pos) -> None:
+        """Notes a check for the symbol file: of an index of `array`, or of what is assigned."""
+        lost = self.unit.transient.get(self.pou, ()) if self.pou is not None else ()
+        self.unit.bounds.append(bounds_check(self.pou, array, value, low, high, pos, lost))
 
     def require(self, condition: Value, code: int, pos: Pos) -> None:
         """Raises RTSEXCPT_* `code` unless the i1 `condition` holds."""

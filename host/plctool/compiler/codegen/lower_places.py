@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from plctool.compiler.codegen.bounds import bounds_check
 from plctool.compiler.codegen.ir import FALSE, Value
 from plctool.compiler.codegen.lower_arith import bits_of, is_signed, known_integer, resize
 from plctool.compiler.codegen.lower_frame import (
@@ -47,7 +46,7 @@ def variable(frame: Frame, place: VarPlace) -> Ref:
         if var.area in TAGGED_AREAS:
             tag = frame.unit.tag("globals" if is_scalar(t) else (var.area, var.offset))
         return Ref(frame.area_base(var.area), var.offset, t, tag, True, string_capacity(t))
-    if var.storage is Storage.SELF:
+    if var.storage is Storage.SELF and var not in frame.locals:
         assert frame.pou is not None and frame.pou.instance is not None
         tag = frame.unit.member_tag(frame.pou.instance, var.offset)
         return Ref(SELF, var.offset, t, tag, True, string_capacity(t))
@@ -184,7 +183,7 @@ def _subscript(frame: Frame, expr: Expr, low: int, high: int, place: IndexPlace)
     if low < 0 and not is_signed(expr.type):  # what is below `low` when read as signed is far above `high`
         tested, last = wide, high
     ok = frame.fn.value(f"icmp ule i{work} {tested}, {last}") if last >= 0 else FALSE
-    frame.unit.bounds.append(bounds_check(frame.pou, place.base, expr, low, high, place.pos))
+    frame.note_bounds(place.base, expr, low, high, place.pos)
     frame.require(ok, ARRAY_BOUNDS, place.pos)
     return _widen(frame, relative, work), True
 
@@ -201,7 +200,7 @@ def _character(frame: Frame, base: Ref, place: IndexPlace) -> Ref:
         index = resize(frame, index, expr.type, work)
         capacity = resize(frame, base.capacity, UDINT, work)
         if last is not None:
-            frame.unit.bounds.append(bounds_check(frame.pou, place.base, expr, 0, last, place.pos))
+            frame.note_bounds(place.base, expr, 0, last, place.pos)
         frame.require(frame.fn.value(f"icmp ule i{work} {index}, {capacity}"), ARRAY_BOUNDS, place.pos)
         index, inside = _widen(frame, index, work), True
     else:

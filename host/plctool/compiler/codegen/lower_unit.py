@@ -23,6 +23,7 @@ from plctool.image.targets import Target
 _ALWAYS = 'nounwind "no-builtins"'
 _PROBES = ' "probe-stack"="inline-asm"'
 _LARGE_FRAME, _LARGE_FRAME_OF_CONTROLLER = 4096, 256  # bytes of local variables
+FASTEST = 3  # the level that is for speed only
 _INLINED = 225  # LLVM's measure of what it inlines when it does not have to save room
 
 
@@ -61,6 +62,11 @@ class Options:
     checks: frozenset[Check] = ALL_CHECKS
     debug: bool = False
     size: bool = False
+
+    @property
+    def watchable(self) -> bool:
+        """Whether blocks keep in memory what no call needs from the previous one, so that it can be watched."""
+        return self.debug or not (self.size or self.opt_level >= FASTEST)
 
     @property
     def compact(self) -> bool:
@@ -114,6 +120,7 @@ class Unit:
         self.exchanges = False  # tasks exclude each other by Intrinsic.EXCHANGE
         self.sections: set[Pou] = set()  # parts of POUs
         self.handed: dict[Pou, list[Variable]] = {}  # inputs that function blocks get as parameters
+        self.transient: dict[Pou, list[Variable]] = {}  # variables of function blocks that are not kept in memory
         self.closed: dict[Pou, Closed] = {}  # the blocks that are closed
         self.pous: dict[tuple[Pou, Form], str] = {}  # the symbol of every form of a POU
         self.structs: dict[str, StructType] = {}  # types whose default initialiser is needed, by symbol

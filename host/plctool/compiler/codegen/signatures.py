@@ -3,8 +3,9 @@ declares.
 
 A function block finds its inputs in its instance. Those that every call of the block gives, it is passed as parameters,
 as far as there are registers for them, and stores them itself: that is smaller and faster than to store them before
-each call and to load them in the block. The first outputs of a closed block (`closed.py`) come back as its results,
-beside their values in the instance: most are used right after the call.
+each call and to load them in the block. Inputs that are not kept in memory are passed in any case. The first outputs of
+a closed block (`closed.py`) come back as its results, beside their values in the instance: most are used right after
+the call.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from plctool.compiler.codegen.ir import FixedPointer, Value
 from plctool.compiler.codegen.lengths import length_variable
 from plctool.compiler.codegen.lower_arith import is_bool, is_real, is_signed
 from plctool.compiler.codegen.lower_frame import RAISED
-from plctool.compiler.codegen.lower_unit import Form, value_type
+from plctool.compiler.codegen.lower_unit import Form, Options, value_type
+from plctool.compiler.codegen.transient import TransientVariables, transient_variables
 from plctool.compiler.typed import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
 from plctool.compiler.typed_nodes import walk
 from plctool.iec.types import StringType, Type, is_scalar
@@ -120,18 +122,34 @@ def parameter_list(pou: Pou, handed: HandedInputs, form: Form, closed: Closed | 
     return ", ".join(formal.definition for formal in formals(pou, handed, form, closed))
 
 
-def block_signatures(program: TypedProgram, target: Target) -> tuple[HandedInputs, ClosedBlocks]:
-    """The inputs of each function block that it is passed as parameters, and what else closed blocks have."""
-    given, calls = _inputs_of_all_calls(program)
+@dataclass(frozen=True)
+class Signatures:
+    """What is special about function blocks. `handed`: the inputs that they are passed as parameters; `transient`:
+    their variables that are not kept in memory; `closed`: those that are closed."""
+
+    handed: HandedInputs
+    transient: TransientVariables
+    closed: ClosedBlocks
+
+
+def block_signatures(program: TypedProgram, options: Options) -> Signatures:
+    """Of all function blocks that the program reaches."""
+    target = options.target
+    given, calls, reached = _inputs_of_all_calls(program)
+    transient = {} if options.watchable else transient_variables(program, reached, given)
     tried = {block: closed_block(block, target, calls[block]) for block, inputs in given.items() if inputs}
     closed = {block: found for block, found in tried.items() if found is not None}
-    handed = {block: _in_registers(inputs, target, closed.get(block)) for block, inputs in given.items()}
-    return {block: inputs for block, inputs in handed.items() if inputs}, closed
+    handed = {}
+    for block, inputs in given.items():
+        unkept = [variable for variable in transient.get(block, ()) if variable in inputs]
+        kept = [variable for variable in inputs if variable not in unkept]
+        handed[block] = unkept + _in_registers(kept, target, closed.get(block), len(unkept))
+    return Signatures({block: inputs for block, inputs in handed.items() if inputs}, transient, closed)
 
 
-def _inputs_of_all_calls(program: TypedProgram) -> tuple[HandedInputs, Counter[Pou]]:
-    """For each function block the inputs that every call gives, none for those that only the class decides about; and
-    how many calls there are."""
+def _inputs_of_all_calls(program: TypedProgram) -> tuple[HandedInputs, Counter[Pou], list[Pou]]:
+    """For each function block the inputs that every call gives, none for those that only the class decides about; how
+    many calls there are; and all units."""
     extra = (pou for pou in (program.startup, program.shutdown) if pou is not None)
     reached = dict.fromkeys([*program.pous, *program.programs.values(), *extra])  # and perhaps some that never run
     given: HandedInputs = {}
@@ -147,7 +165,7 @@ def _inputs_of_all_calls(program: TypedProgram) -> tuple[HandedInputs, Counter[P
                 if isinstance(call, FbCall):
                     calls[call.block] += 1
                     _restrict(given, call, others)
-    return given, calls
+    return given, calls, list(reached)
 
 
 def result_type(pou: Pou, closed: Closed | None) -> str:
@@ -171,16 +189,17 @@ def _restrict(given: HandedInputs, call: FbCall, others: list[Pou]) -> None:
         given[call.block] = [variable for variable in given.get(call.block, here) if variable in here]
 
 
-def _in_registers(inputs: list[Variable], target: Target, closed: Closed | None) -> list[Variable]:
-    """The first inputs, as many as fit; the context, if it is passed, and the instance take registers for integers."""
+def _in_registers(inputs: list[Variable], target: Target, closed: Closed | None, taken: int) -> list[Variable]:
+    """The first inputs, as many as fit; the context, if it is passed, and the instance take registers for integers.
+    `taken`: registers, of either kind."""
     found = []
     integers, reals = target.registers
-    left = {False: integers - (2 if closed is None or closed.has_context else 1), True: reals}
+    left = {False: integers - taken - (2 if closed is None or closed.has_context else 1), True: reals - taken}
     for variable in sorted(inputs, key=lambda v: v.offset):
         t, in_memory = variable.type, variable.storage is Storage.SELF
         if in_memory and is_scalar(t) and t.size <= target.pointer_size:
             kind = reals > 0 and is_real(t)
-            if left[kind]:
+            if left[kind] > 0:
                 left[kind] -= 1
                 found.append(variable)
     return found
