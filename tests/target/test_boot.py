@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from programs import program
 from qemu import FACTORY_OFFSET
 
 from plctool.device import Plc
+from plctool.errors import LinkError
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
 
@@ -120,11 +122,19 @@ def test_what_hangs_ends_in_a_reset_by_the_watchdog_that_plctool_tells_of(make_b
         plc.flash(build(program("VAR n : DINT; END_VAR", "n := n + 1;", "T#20ms")).path)
         eventually(lambda: plc.read("Main.n") * 20 > PROVEN_MS)
     board.patch(function, code)
-    log = eventually(lambda: [text for text in types_log(board.port) if "hardware watchdog" in text])
+    eventually(lambda: any("hardware watchdog" in text for text in log_of(board)))
+    log = [text for text in types_log(board.port) if "hardware watchdog" in text]
     assert log[0].startswith("Reset: hardware watchdog at 0x")
     with Plc(Connection(board.line())) as plc:
         eventually(lambda: plc.read("Main.n") > 10)
         assert plc.status().state is AppState.RUN
+
+
+def log_of(board) -> list[str]:
+    """Asked for as often as possible, at all times between two ticks; nothing while the device does not answer."""
+    with suppress(LinkError), Plc(Connection(board.line())) as plc:
+        return [entry.text for entry in plc.log()]
+    return []
 
 
 def types_log(port: str) -> list[str]:

@@ -24,12 +24,13 @@ static void log_reset_cause(void)
                names[record->cause], (unsigned)record->pc, (unsigned)record->status);
 }
 
-/* Whatever hangs, the main loop, the clock or the tasks, ends in a reset. Once a millisecond is enough. */
+/* Whatever hangs, the main loop, the clock or the tasks, ends in a reset. Once a millisecond is enough. A tick that is
+ * pending is counted already: while the clock stands still, its time is now one more, now one less. */
 static void kick_watchdog(void)
 {
     static RTS_UI32 kicked_ms;
     RTS_UI32 now_ms = SysTimeGetMs();
-    if (now_ms == kicked_ms || !SysTimersWork())
+    if ((RTS_I32)(now_ms - kicked_ms) <= 0 || !SysTimersWork())
         return;
     kicked_ms = now_ms;
     BoardWatchdogKick();

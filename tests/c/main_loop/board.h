@@ -1,0 +1,1 @@
+/* board.h - of the board that test_main_loop.c is. */
