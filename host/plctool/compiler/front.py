@@ -19,6 +19,7 @@ from plctool.compiler.missing_names import declared_names
 from plctool.compiler.nesting import NestingError, room_for_nesting
 from plctool.compiler.semantics.allocation import report_overlaps
 from plctool.compiler.semantics.call_graph import report_shared_writes
+from plctool.compiler.semantics.uncalled_blocks import report_uncalled_blocks
 from plctool.compiler.semantics.configuration import configure
 from plctool.compiler.semantics.io_channels import IoChannels, device_variables
 from plctool.compiler.semantics.permitted import check_declarations
@@ -167,6 +168,7 @@ def _check_parsed(
     if tests is None and not world.diagnostics.errors:
         report_shared_writes(application.tasks, world.diagnostics)
         world.io.report_written_inputs(world.pous, world.diagnostics)
+        report_uncalled_blocks(world.pous, world.diagnostics)
     allocation = world.allocation
     _check_sizes(world, sources)
     if not world.diagnostics.errors:  # else channels may have no addresses yet

@@ -45,6 +45,7 @@ WARNINGS = {
     "statement": "a statement reads a variable and does nothing with it",
     "task": "a program is called that a task runs as well",
     "truncated": "a string is longer than the STRING it goes to",
+    "uncalled": "a function block is given an input, but never called",
     "unlocated": "a variable AT %I*, %Q* or %M* has no address in VAR_CONFIG",
     "unreachable": "a statement is never reached",
     "unused": "a variable, label or program is never used, not even by a test, or the result of a call",
