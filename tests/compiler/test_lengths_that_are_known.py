@@ -226,3 +226,50 @@ def test_a_string_may_be_written_under_another_name(level: int, tmp_path: Path) 
         assert (plc.read("Main.p.a"), plc.read("Main.n")) == ("longer than before!", 18)
         assert [plc.read(f"Main.{name}") for name in ("put_", "appended", "cut_")] == ["xabc", "zzzz", "abq"]
         assert (plc.read("Main.ended"), plc.read("Main.m")) == ("abe", 2)
+
+
+VALUES_AS_TEXT = {
+    "REAL": [
+        "0.0",
+        "-0.0",
+        "1.5",
+        "-1.5E30",
+        "1.0E-38",
+        "SQRT(REAL#-1.0)",
+        "EXP(REAL#1.0E9)",
+        "-EXP(REAL#1.0E9)",
+        "123456.7",
+    ],
+    "LREAL": ["0.0", "1.0E300", "-2.5E-300", "0.1", "SQRT(LREAL#-1.0)", "EXP(LREAL#1.0E9)"],
+    "BOOL": ["TRUE", "FALSE"],
+    "SINT": ["-128", "0"],
+    "DINT": ["-2147483648", "9", "10"],
+    "UDINT": ["4294967295"],
+    "LINT": ["-9223372036854775808", "1000000000"],
+    "ULINT": ["18446744073709551615", "999999999", "1000000000000000000"],
+    "WORD": ["16#FFFF"],
+    "TIME": ["T#0s", "T#-1ms", "T#24d20h31m23s647ms", "T#1h"],
+    "LTIME": ["LTIME#0s", "LTIME#-1ns", "LTIME#1d1us", "LTIME#2h"],
+    "DATE": ["D#1970-01-01", "D#2106-02-07"],
+    "LDATE": ["LDATE#2200-12-31"],
+    "TOD": ["TOD#0:0:0", "TOD#23:59:59.999"],
+    "LTOD": ["LTOD#0:0:0.000000001", "LTOD#1:0:0"],
+    "DT": ["DT#2026-11-26-12:00:00"],
+    "LDT": ["LDT#2026-11-26-12:00:00.5"],
+}
+
+
+def test_the_length_of_every_value_as_text_is_right(tmp_path: Path) -> None:
+    cases = [(t, value) for t, values in VALUES_AS_TEXT.items() for value in values]
+    body = "".join(
+        f"v{n} := {value}; s := {t}_TO_STRING(v{n}); lengths[{n}] := LEN(s); written[{n}] := s;\n"
+        for n, (t, value) in enumerate(cases)
+    )
+    variables = "".join(f"v{n} : {t}; " for n, (t, _) in enumerate(cases))
+    arrays = f"lengths : ARRAY[0..{len(cases) - 1}] OF INT; written : ARRAY[0..{len(cases) - 1}] OF STRING;"
+    (tmp_path / "main.st").write_text(f"PROGRAM Main VAR s : STRING; {variables}{arrays} END_VAR\n{body}END_PROGRAM")
+    with Simulator.from_sources(tmp_path / "main.st") as plc:
+        plc.run_cycles(1)
+        written = plc.read("Main.written")
+        assert all(written)
+        assert plc.read("Main.lengths") == [len(text) for text in written]

@@ -19,11 +19,11 @@ from plctool.compiler.missing_names import declared_names
 from plctool.compiler.nesting import NestingError, room_for_nesting
 from plctool.compiler.semantics.allocation import report_overlaps
 from plctool.compiler.semantics.call_graph import report_shared_writes
-from plctool.compiler.semantics.uncalled_blocks import report_uncalled_blocks
 from plctool.compiler.semantics.configuration import configure
 from plctool.compiler.semantics.io_channels import IoChannels, device_variables
 from plctool.compiler.semantics.permitted import check_declarations
 from plctool.compiler.semantics.program import Program
+from plctool.compiler.semantics.uncalled_blocks import report_uncalled_blocks
 from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.ast import Declaration
