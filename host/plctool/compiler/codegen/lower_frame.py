@@ -315,7 +315,7 @@ class Frame:
         pointer = self.fn.value(
             f"getelementptr {flags}[{t.size} x i8], ptr {self.address(ref)}, {self.pointer_int} {index}"
         )
-        return replace(ref, pointer=pointer, offset=0, type=t, capacity=string_capacity(t), sure=ref.align)
+        return replace(ref, pointer=pointer, offset=0, type=t, capacity=string_capacity(t), length=None, sure=ref.align)
 
     def load(self, ref: Ref) -> Value:
         """The scalar at `ref`."""
