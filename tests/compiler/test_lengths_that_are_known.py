@@ -202,7 +202,7 @@ def test_functions_of_known_strings_are_given_the_lengths() -> None:
 
 
 ALIASES = """
-TYPE Pair : STRUCT a : STRING[20]; b : INT; END_STRUCT END_TYPE
+TYPE Pair : STRUCT b : INT; a : STRING[20]; END_STRUCT END_TYPE
 VAR_GLOBAL g : STRING; END_VAR
 FUNCTION Make : Pair VAR_INPUT n : INT; END_VAR Make.a := 'longer than before'; Make.b := n; END_FUNCTION
 FUNCTION Put : BOOL VAR_IN_OUT s : STRING; END_VAR s := CONCAT('x', g); END_FUNCTION
