@@ -88,7 +88,7 @@ def write_calls(frame: Body, parts: list[str]) -> None:
 def _stack_memory(frame: Body, var: Variable) -> Ref:
     t = var.type
     if is_scalar(t):
-        return Ref(frame.fn.slot(value_type(t)), 0, t, direct=True)
+        return frame.scalar(t)
     return Ref(frame.fn.alloca(t.size, t.align), 0, t, direct=True, capacity=string_capacity(t))
 
 

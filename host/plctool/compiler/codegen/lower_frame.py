@@ -428,10 +428,15 @@ class Frame:
 
     # ---- temporaries ----
 
+    def scalar(self, t: Type) -> Ref:
+        """A scalar on the stack; contents undefined. A pointer has its 8 bytes there as everywhere in memory."""
+        text = value_type(t)
+        return Ref(self.fn.alloca(t.size, t.align) if text == "ptr" else self.fn.slot(text), 0, t, direct=True)
+
     def temporary(self, t: Type) -> Ref:
         """Memory for a value of `t` until the next statement; contents undefined."""
         if is_scalar(t):
-            return Ref(self.fn.slot(value_type(t)), 0, t, direct=True)
+            return self.scalar(t)
         key = (t.size, t.align)
         free = self._free.setdefault(key, [])
         pointer = free.pop() if free else self.fn.alloca(*key)
