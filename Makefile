@@ -1,5 +1,5 @@
-# make demo   the whole story on this machine        make test   the tests
-# make lint   style, types, words                   make bench  figures, side by side (ARGS="--programs DIR": more pairs)
+# make demo   the whole story on this machine        make test   the tests (ARGS="--jobs 1": one at a time)
+# make lint   style, types, words                    make bench  figures, side by side (ARGS="--programs DIR": more pairs)
 # make format gives C and Python their one style
 # make wheel  dist/*.whl for this kind of Linux and every Python from 3.11 on, tried in those that are here
 # make size   flash and RAM of the bare-metal runtime, per component
@@ -33,7 +33,7 @@ test all bench size: $(VENV)/dev
 	@$(MAKE) --no-print-directory run-$@
 
 run-test: run-all
-	$(BIN)/python tests/run_all.py --meson $(MESON) $(BUILDS)
+	$(BIN)/python tests/run_all.py --meson $(MESON) $(ARGS) $(BUILDS)
 
 run-all: $(BUILDS:%=%/build.ninja)
 	set -e; for build in $(BUILDS); do $(MESON) compile -C $$build; done

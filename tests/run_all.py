@@ -1,9 +1,9 @@
 """Runs the tests of the build folders given as one pool, and prints what was skipped, the failures and one closing
 line over all.
 
-A process runs for each processor and two more, because many tests wait more than they work. Those with the highest
-priority, which is about their seconds, come first, so that no processor idles while the last long one ends. The C
-tests of a folder, which are short, are one process: a `meson test`.
+A process runs for each processor and two more (or --jobs), because many tests wait more than they work. Those with
+the highest priority, which is about their seconds, come first, so that no processor idles while the last long one
+ends. The C tests of a folder, which are short, are one process: a `meson test`.
 
 C tests count as one test each; pytest suites are counted by their own tests, from the JUnit files they leave. What a
 process printed is in meson-logs/, and here if it failed.
@@ -188,13 +188,14 @@ def run(jobs: Iterable[Job], at_once: int) -> Iterator[Done]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--meson", required=True)
+    parser.add_argument("--jobs", type=int, default=(os.cpu_count() or 1) + 2, help="processes that run at once")
     parser.add_argument("builds", nargs="+", type=Path)
     args = parser.parse_args()
     signal.signal(signal.SIGINT, signal.default_int_handler)  # tests send it; `make test &` would have it ignored
     jobs = [job for build in args.builds for job in jobs_of(args.meson, build.resolve())]
     jobs.sort(key=lambda job: -job.seconds)
     begin, used, counts, lines, status = time.monotonic(), 0.0, Counter[str](), list[str](), 0
-    for number, done in enumerate(run(jobs, (os.cpu_count() or 1) + 2), 1):
+    for number, done in enumerate(run(jobs, args.jobs), 1):
         outcome = done.outcome
         result = "ok" if done.is_good else "failed"
         print(

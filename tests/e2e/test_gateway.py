@@ -37,10 +37,20 @@ def runtime(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
     monkeypatch.setenv("PLCTOOL_GATEWAY_IDLE", "600")
     yield
-    for gateway in gateways():  # one whose line has closed is ending by itself, and tidies up
+    for pid in _gateways_of(folder):
         with suppress(ProcessLookupError):
-            os.kill(gateway["pid"], signal.SIGKILL)
+            os.kill(pid, signal.SIGKILL)
     shutil.rmtree(folder, ignore_errors=True)
+
+
+def _gateways_of(folder: str) -> Iterator[int]:
+    """Processes of gateways with this runtime folder, also those that are being started and serve nothing yet."""
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):  # it has ended, or is another user's
+            words = (process / "cmdline").read_bytes().split(b"\0")
+            variables = (process / "environ").read_bytes().split(b"\0")
+            if b"plctool.gateway" in words and f"XDG_RUNTIME_DIR={folder}".encode() in variables:
+                yield int(process.name)
 
 
 class Running:
@@ -131,6 +141,13 @@ def test_fifty_writes_beside_a_watch(tool, plcrt, program, start):
         assert watch.process.poll() is None
     status, _, err = watch.end(signal.SIGINT)
     assert (status, err) == (130, "")
+
+
+def test_the_number_of_a_terminal_is_not_given_out_again_at_once(plcrt):
+    with SerialLine(plcrt.port) as line:
+        first = line.path
+    with SerialLine(plcrt.port) as line:
+        assert line.path != first
 
 
 def test_eight_tools_at_once(tool, plcrt, program):
