@@ -20,8 +20,9 @@ import pytest
 
 import plctool
 from plctool.errors import LinkError
+from plctool.gateway import client
 from plctool.gateway.control import gateways, stop_gateways
-from plctool.gateway.place import find_holder, find_place
+from plctool.gateway.place import Place, find_holder, find_place, runtime_folder
 from plctool.testing.line import Damage, SerialLine
 
 PATIENCE = 60.0
@@ -141,6 +142,14 @@ def test_fifty_writes_beside_a_watch(tool, plcrt, program, start):
         assert watch.process.poll() is None
     status, _, err = watch.end(signal.SIGINT)
     assert (status, err) == (130, "")
+
+
+def test_a_port_whose_link_has_just_come_back_is_shared_under_its_own_name(tool, plcrt, program, monkeypatch):
+    too_early = iter([Place(runtime_folder(), plcrt.port)])  # as if there had been no link a moment ago
+    monkeypatch.setattr(client, "find_place", lambda port: next(too_early, None) or find_place(port))
+    with plctool.connect(f"serial:{plcrt.port}") as plc:
+        assert plc.status().state == "run"
+        assert [gateway["line"] for gateway in gateways()] == [os.path.realpath(plcrt.port)]
 
 
 def test_the_number_of_a_terminal_is_not_given_out_again_at_once(plcrt):

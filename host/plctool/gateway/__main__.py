@@ -35,6 +35,8 @@ def main(arguments: list[str]) -> int:
             os.ftruncate(lock, 0)
             os.write(lock, f"{os.getpid()} {line}".encode(errors="surrogateescape"))
             _serve(place, link)
+    except _Moved:
+        _say({"moved": True})
     except TimeoutError:
         _say({"busy": f"The gateway of {line} that is running takes no tools; end it with 'plctool gateway stop'."})
     except PlcError as error:
@@ -42,12 +44,22 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
+class _Moved(Exception):
+    """The name of the line is a link to another one."""
+
+
 def _serve(place: Place, link: Link) -> None:
-    """Raises LinkError when the line cannot be opened."""
+    """Raises LinkError when the line cannot be opened, _Moved when it is another one."""
     from plctool.gateway.server import Gateway
     from plctool.link.connection import Connection
 
-    connection = Connection(open_transport(link))
+    try:
+        connection = Connection(open_transport(link))
+    finally:
+        # When the tool looked, nothing had the name, as while an adapter is being plugged in. Served under the name of
+        # the link, the line would be in use for those who come to its gateway by another name.
+        if os.path.realpath(place.line) != place.line:
+            raise _Moved
     listener = _listen(place.socket)
     gateway = Gateway(connection, listener, link=link, idle=_idle_seconds())
     end = f"The gateway of {place.line} was ended (SIGTERM)."

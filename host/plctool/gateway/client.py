@@ -58,17 +58,18 @@ def connect_gateway(link: Link, words: str, ask_password: AskPassword = no_passw
 
     Raises NoGateway when there can be none, LinkError when the line cannot be opened or not be shared.
     """
-    return GatewayConnection(find_place(link.place), link, words, ask_password)
+    return GatewayConnection(link, words, ask_password)
 
 
-def _attach(place: Place, link: Link, words: str) -> Pipe:
-    """Raises NoGateway, LinkError."""
+def _attach(link: Link, words: str) -> tuple[Place, Pipe]:
+    """The place of the line now, and what leads there. Raises NoGateway, LinkError."""
     end = time.monotonic() + _ATTACH_PATIENCE
     while True:
+        place = find_place(link.place)
         try:
             pipe = connect(place) or _start_once(place, link)
             greet(pipe, place, {**link.options, "tool": words})
-            return pipe
+            return place, pipe
         except Ended:
             if time.monotonic() >= end:
                 raise _stuck(place) from None
@@ -94,7 +95,8 @@ def connect(place: Place) -> Pipe | None:
 
 
 def _start_once(place: Place, link: Link) -> Pipe:
-    """Starts the gateway unless another tool has just done that. Raises Ended when it has ended already."""
+    """Starts the gateway unless another tool has just done that. Raises Ended when it has ended already, or when the
+    line has another place now."""
     try:
         with locked(place.start_lock, _ATTACH_PATIENCE):
             pipe = connect(place)
@@ -112,7 +114,7 @@ def _start_once(place: Place, link: Link) -> Pipe:
 
 def _start(place: Place, link: Link) -> None:
     """Returns when the gateway listens. Raises NoGateway when it does not start, LinkError when it cannot open the
-    line."""
+    line, Ended when the line is not the one of the place."""
     if not sys.executable or getattr(sys, "frozen", False):
         raise NoGateway("this program cannot start Python")
     here = replace(link, place=place.line)  # it works in another folder
@@ -140,6 +142,8 @@ def _start(place: Place, link: Link) -> None:
         raise NoGateway(f"it did not start; {place.log} may say why") from None
     if "busy" in said:
         raise LinkError(said["busy"], "gateway-stuck")
+    if "moved" in said:
+        raise Ended
     if "error" in said:
         raise LinkError(said["error"]["message"], said["error"]["code"])
 
@@ -208,13 +212,12 @@ def failure(said: dict[str, Any]) -> LinkError | DeviceError:
 class GatewayConnection:
     """A MessageLink through the gateway of a line. Finds the gateway again, or starts another one, when it was lost."""
 
-    def __init__(self, place: Place, link: Link, words: str, ask_password: AskPassword = no_password) -> None:
+    def __init__(self, link: Link, words: str, ask_password: AskPassword = no_password) -> None:
         self.session = 0  # id of the device's session, while the channel is open
         self.buffer_size = 0
         self.best_size = 0
         self.is_slow = False
         self.is_bus = False  # a bus needs no gateway
-        self._place = place
         self._link = link
         self._words = words
         self._ask_password = ask_password
@@ -222,7 +225,8 @@ class GatewayConnection:
         self._numbers = itertools.count(1)
         self._generation: int | None = None  # of the channel; None while none is open
         self._purpose: str | None = None  # why this tool keeps the device to itself
-        self._pipe: Pipe | None = _attach(place, link, words)
+        self._pipe: Pipe | None
+        self._place, self._pipe = _attach(link, words)
 
     @property
     def name(self) -> str:
@@ -362,7 +366,7 @@ class GatewayConnection:
 
     def _attach_again(self) -> None:
         try:
-            self._pipe = _attach(self._place, self._link, self._words)
+            self._place, self._pipe = _attach(self._link, self._words)
         except NoGateway as error:
             raise LinkError(f"The gateway of {self.name} cannot be started again ({error}); try again.") from error
         if self._purpose:
