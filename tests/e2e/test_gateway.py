@@ -152,13 +152,6 @@ def test_a_port_whose_link_has_just_come_back_is_shared_under_its_own_name(tool,
         assert [gateway["line"] for gateway in gateways()] == [os.path.realpath(plcrt.port)]
 
 
-def test_the_number_of_a_terminal_is_not_given_out_again_at_once(plcrt):
-    with SerialLine(plcrt.port) as line:
-        first = line.path
-    with SerialLine(plcrt.port) as line:
-        assert line.path != first
-
-
 def test_eight_tools_at_once(tool, plcrt, program):
     def work(number: int) -> int:
         return tool.ok("read", "--port", plcrt.port, "Main.kept")["values"]["Main.kept"]

@@ -17,7 +17,6 @@ import tty
 from dataclasses import dataclass, field
 
 from plctool.link.transport import BITS_PER_BYTE
-from plctool.testing.terminals import retire
 
 CHUNK = 4096
 
@@ -108,9 +107,8 @@ class SerialLine:
     def __exit__(self, *exc: object) -> None:
         self._stop.set()
         self._thread.join()
-        os.close(self._device)
-        os.close(self._master)
-        retire(self._slave)
+        for fd in (self._device, self._master, self._slave):
+            os.close(fd)
 
     def _run(self) -> None:
         directions = {self._master: self.to_device, self._device: self.to_client}

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from plctool.errors import UsageError
 from plctool.testing.children import ends_with_us
-from plctool.testing.terminals import retire
 
 END_TIMEOUT = 30.0  # plcrt kills after 9 s what does not end when it is asked to [s]
 
@@ -104,4 +103,4 @@ class Plcrt:
     def __exit__(self, *exc: object) -> None:
         self.stop(signal.SIGKILL if exc[0] else signal.SIGTERM)
         while self._terminals:
-            retire(self._terminals.pop())
+            os.close(self._terminals.pop())
