@@ -124,10 +124,39 @@ def binary_value(frame: Frame, e: Binary) -> Value:
     """A comparison is an i1 first; anything else is calculated."""
     if e.op in COMPARISONS or e.op in _SHORT_CIRCUIT:
         return frame.fn.value(f"zext i1 {truth(frame, e)} to i8")
+    if e.op is BinaryOp.AND and is_bool(e.type):
+        return _both(frame, e)
     left, right = frame.value(e.left), frame.value(e.right)
     if e.op in (BinaryOp.DIV, BinaryOp.MOD) and value_type(e.type) not in ("float", "double"):
         return divide(frame, e.op, left, right, e.type, e.pos, known_integer(e.right))
     return binary(frame, e.op, left, right, e.type)
+
+
+def _both(frame: Frame, e: Binary) -> Value:
+    """AND of BOOLs. Of one operand only the lowest bit has to be right, as the other one has no more. NOT may then be
+    that of all bits, which many processors do together with the AND."""
+    if _negates(e.left) and not _negates(e.right):
+        left = _lowest_bit(frame, e.left)
+        right = frame.value(e.right)
+    else:
+        left = frame.value(e.left)
+        right = _lowest_bit(frame, e.right)
+    return frame.fn.value(f"and i8 {left}, {right}")
+
+
+def _lowest_bit(frame: Frame, e: Expr) -> Value:
+    """An i8 of which only the lowest bit is the value of a BOOL."""
+    if isinstance(e, Binary) and e.op in LOGIC:
+        left, right = _lowest_bit(frame, e.left), _lowest_bit(frame, e.right)
+        return frame.fn.value(f"{LOGIC[e.op]} i8 {left}, {right}")
+    if isinstance(e, Unary) and not (isinstance(e.operand, Binary) and e.operand.op not in LOGIC):
+        return frame.fn.value(f"xor i8 {_lowest_bit(frame, e.operand)}, -1")
+    return frame.value(e)
+
+
+def _negates(e: Expr) -> bool:
+    """Whether there is a NOT in an expression of BOOLs."""
+    return isinstance(e, Unary) or (isinstance(e, Binary) and e.op in LOGIC and (_negates(e.left) or _negates(e.right)))
 
 
 def _short_circuit(frame: Frame, e: Binary) -> Value:

@@ -1,0 +1,76 @@
+"""What statements leave in a BOOL is the byte 0 or 1, however the expression is made, because others read the byte."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from plctool import Simulator
+from plctool.compiler.build import build_program
+from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.front import check_sources
+from plctool.compiler.source import Source
+from plctool.image.targets import find_target
+
+INPUTS = "abcd"
+
+
+@dataclass(frozen=True)
+class Term:
+    """An expression, and what it is for values of INPUTS."""
+
+    text: str
+    value: Callable[[dict[str, bool]], bool]
+
+
+def leaf(name: str) -> Term:
+    return Term(name, lambda values: values[name])
+
+
+def below(name: str) -> Term:
+    return Term(f"(n < BOOL_TO_INT({name}))", lambda values: values[name])
+
+
+def negated(term: Term) -> Term:
+    return Term(f"NOT {term.text}", lambda values: not term.value(values))
+
+
+def both(parts: tuple[str, Term, Term]) -> Term:
+    word, left, right = parts
+    rules: dict[str, Callable[[bool, bool], bool]] = {
+        "AND": lambda x, y: x and y,
+        "OR": lambda x, y: x or y,
+        "XOR": lambda x, y: x != y,
+        "AND_THEN": lambda x, y: x and y,
+        "OR_ELSE": lambda x, y: x or y,
+        "=": lambda x, y: x == y,
+    }
+    return Term(f"({left.text} {word} {right.text})", lambda v: rules[word](left.value(v), right.value(v)))
+
+
+LEAVES = st.sampled_from(INPUTS).map(leaf) | st.sampled_from(INPUTS).map(below)
+WORDS = st.sampled_from(["AND", "AND", "OR", "XOR", "AND_THEN", "OR_ELSE", "="])
+TERMS = st.recursive(LEAVES, lambda terms: terms.map(negated) | st.tuples(WORDS, terms, terms).map(both), max_leaves=8)
+
+
+@settings(max_examples=25)
+@given(st.lists(TERMS, min_size=12, max_size=12))
+@pytest.mark.parametrize("level", [0, 2])
+def test_every_result_is_the_byte_zero_or_one(level: int, terms: list[Term]) -> None:
+    declared = f"{', '.join(INPUTS)} : BOOL; n : INT; r : ARRAY[1..{len(terms)}] OF BOOL; p : POINTER TO BYTE;"
+    body = "".join(f"r[{i}] := {term.text}; p := ADR(r[{i}]); raw[{i}] := p^;\n" for i, term in enumerate(terms, 1))
+    text = f"PROGRAM Main VAR {declared} raw : ARRAY[1..{len(terms)}] OF BYTE; END_VAR\n{body}END_PROGRAM"
+    found = check_sources([Source("main.st", text)])
+    assert found.program, found.diagnostics
+    built = build_program(found.program, Options(find_target("x86_64-linux"), level))
+    with Simulator(built.image, built.symbols) as plc:
+        for bits in product((False, True), repeat=len(INPUTS)):
+            values = dict(zip(INPUTS, bits, strict=True))
+            plc.write({f"Main.{name}": value for name, value in values.items()})
+            plc.run_cycles(1)
+            assert plc.read("Main.raw") == [int(term.value(values)) for term in terms]
