@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from plctool import Simulator
 from plctool.compiler import compile_sources
+from plctool.compiler.build import build_program
+from plctool.compiler.codegen.emit import optimised
 from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
@@ -68,6 +70,34 @@ def test_memory_and_values_are_as_with_every_load_and_store(accesses: list[tuple
         elif line not in given_instead:
             assert shorter[place] == full[place], "a load found what a left out store should have changed"
     assert shorter == full
+
+
+SIMPLE = {  # a type and a value that is not its zero
+    "BOOL": "TRUE", "SINT": "-7", "WORD": "500", "DINT": "-70000", "REAL": "2.5", "LREAL": "-0.25", "STRING(2)": "'x'",
+}  # fmt: skip
+
+
+@settings(max_examples=25)
+@given(st.lists(st.sampled_from([*SIMPLE, "BOOL", "BOOL"]), min_size=8, max_size=8), st.permutations(range(8)))
+@pytest.mark.parametrize("packed", ["", "{attribute 'pack_mode' := '1'}\n"])
+def test_constants_in_a_block_leave_what_is_beside_them_alone(packed: str, types: list[str], order: list[int]) -> None:
+    declared = "".join(f"v{i} : {t} := {SIMPLE[t]};" for i, t in enumerate(types))
+    zeros = {"BOOL": "FALSE", "STRING(2)": "''"}
+    body = "".join(f"v{i} := {zeros.get(types[i], '0')};" for i in order[:5])
+    source = f"{packed}FUNCTION_BLOCK Work VAR {declared} END_VAR {body} END_FUNCTION_BLOCK\n"
+    built = build_program(program(source + main("f : Work;", "f();")), Options(find_target("x86_64-linux")))
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        found = [plc.read(f"Main.f.v{i}") for i in range(8)]
+    values = {"BOOL": True, "SINT": -7, "WORD": 500, "DINT": -70000, "REAL": 2.5, "LREAL": -0.25, "STRING(2)": "x"}
+    assert found == [type(values[t])() if i in order[:5] else values[t] for i, t in enumerate(types)]
+
+
+def test_a_timer_is_reset_by_one_store() -> None:
+    target = find_target("x86_64-linux")
+    (part,) = lower(program(main("t : TON; on : BOOL;", "t(IN := on, PT := T#1s);")), Options(target)).parts
+    module, machine = optimised(part, target, 2)
+    assert len(re.findall(r"mov[bwlq]\t\$0, \d+\(%r\w+\)", machine.emit_assembly(module))) == 1
 
 
 PLACES = [

@@ -360,6 +360,11 @@ class StructType(Type):
         self._align = align
         self._size = align_up(max(end, 1), align)
 
+    def padding_after(self, offset: int, size: int) -> int:
+        """How many bytes after the field there belong to none."""
+        end = offset + size
+        return 0 if self.union else min((f.offset for f in self.fields if f.offset >= end), default=self.size) - end
+
     def member(self, name: str) -> Field | None:
         key = name.casefold()
         return next((f for f in self.fields if key in (f.name.casefold(), f.alias.casefold())), None)

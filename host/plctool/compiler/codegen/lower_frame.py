@@ -29,6 +29,7 @@ Node = TypeVar("Node")
 Written = TypeVar("Written")
 
 
+_WORD = 4  # bytes
 NO_CAPACITY = Value("")  # of what is not a string
 RAISED = FixedPointer("%raised")  # where a function leaves the number of an exception that it returns
 
@@ -338,6 +339,11 @@ class Frame:
         if text == "ptr" and self.unit.target.pointer_size == 4:  # pointers take 8 bytes in memory on every target
             self._put(ref.member(4, DINT, ref.tag), "i32", number(0))
         self._put(ref, text, value)
+
+    def ends_constants(self, ref: Ref) -> bool:
+        """Whether the bytes from the beginning of its word to this one are known to be constants, and are several."""
+        known = [self._memory().value(ref.pointer, at, "i8") for at in range(ref.offset & -_WORD, ref.offset + 1)]
+        return len(known) > 1 and all(value is not None and value.constant is not None for value in known)
 
     def note(self, ref: Ref, value: Value) -> None:
         """`value` is known to be at `ref`."""

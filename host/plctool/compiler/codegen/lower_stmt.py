@@ -7,10 +7,10 @@ from plctool.compiler.codegen.lengths import KnownLengths, known_by_all
 from plctool.compiler.codegen.lower_blocks import assign_aggregate
 from plctool.compiler.codegen.lower_calls import call_function
 from plctool.compiler.codegen.lower_expr import truth
-from plctool.compiler.codegen.lower_frame import STATEMENTS, Body, rule
+from plctool.compiler.codegen.lower_frame import STATEMENTS, Body, Ref, rule
 from plctool.compiler.codegen.lower_init import initialise
 from plctool.compiler.codegen.lower_unit import Form, value_type
-from plctool.compiler.codegen.signatures import result_in_memory
+from plctool.compiler.codegen.signatures import SELF, result_in_memory
 from plctool.compiler.typed import (
     Assign,
     Call,
@@ -32,7 +32,7 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.typed_nodes import root_of, walk
-from plctool.iec.types import StringType, is_scalar
+from plctool.iec.types import BYTE, StringType, is_scalar
 
 _WIDEST_SWITCH = 64  # labels of one range that become cases of a switch
 
@@ -43,11 +43,23 @@ def assign(frame: Body, s: Assign) -> None:
     target = s.target
     if is_scalar(target.type):
         value = frame.value(s.value)
-        frame.store(frame.ref(target), value)
+        ref = frame.ref(target)
+        frame.store(ref, value)
+        if value.constant is not None and isinstance(target, VarPlace) and ref.pointer == SELF:
+            _fill_word(frame, ref)
     elif isinstance(s.value, Call) and _may_write_directly(frame, target, s.value):
         call_function(frame, s.value, frame.ref(target))
     else:
         assign_aggregate(frame, frame.ref(target), s.value)
+
+
+def _fill_word(frame: Body, ref: Ref) -> None:
+    """Zeroes the padding after a variable of the instance that holds a constant now, if all before it in the word are
+    constants as well: LLVM makes one store of them, and of the constants in the words beside."""
+    if ref.type.size == 1 and frame.ends_constants(ref):
+        assert frame.pou is not None and frame.pou.instance is not None
+        for n in range(frame.pou.instance.padding_after(ref.offset, 1)):
+            frame.fn.store(f"store i8 0, ptr {frame.address(ref.member(1 + n, BYTE))}{ref.tag}")
 
 
 def _may_write_directly(frame: Body, target: Place, call: Call) -> bool:
