@@ -95,6 +95,74 @@ def test_what_others_name_is_kept(text: str, names: str) -> None:
     assert unkept(text) == names
 
 
+PAIRS = """TYPE
+Inner : STRUCT c : INT; list : ARRAY[0..3] OF INT; END_STRUCT
+Pair : STRUCT a, b : INT; in : Inner; END_STRUCT
+END_TYPE
+"""
+
+
+@pytest.mark.parametrize(
+    ("body", "names"),
+    [
+        ("o := p.a + p.in.c;", "p"),
+        ("o := p.in.list[2];", ""),
+        ("o := p.in.list[p.a];", ""),
+        ("last := p; o := p.a;", ""),
+        ("p.b := 3; o := p.a;", ""),
+        ("p.b.2 := TRUE; o := p.a;", ""),
+        ("o := Twice(p.b);", ""),
+        ("w := ADR(p); o := p.a;", "w"),
+    ],
+)
+def test_a_structure_is_not_kept_where_only_its_scalars_are_read(body: str, names: str) -> None:
+    text = PAIRS + "FUNCTION Twice : INT VAR_IN_OUT v : INT; END_VAR v := v * 2; Twice := v; END_FUNCTION\n"
+    text += "FUNCTION_BLOCK Work VAR_INPUT p : Pair; END_VAR VAR_OUTPUT o : INT; END_VAR "
+    text += f"VAR last : Pair; w : POINTER TO Pair; END_VAR {body} END_FUNCTION_BLOCK "
+    assert unkept(text + "PROGRAM Main VAR f : Work; s : Pair; END_VAR f(p := s); END_PROGRAM") == names
+
+
+@pytest.mark.parametrize(
+    ("call", "sums"),
+    [
+        ("f(p := one, q := two, n := 1);", [4321, 4321]),
+        ("f(p := f.q, q := two, n := 1);", [4300, 4343]),
+        ("f(q := two, p := f.q, n := 1);", [4300, 4343]),
+        ("f(p := one, q := two, n := Swap(one));", [4321, 4312]),
+        ("f(p := Swapped(one), q := one, n := 1);", [2112, 2112]),
+        ("f(p := several[i], q := one, n := Swap(several[i]));", [2165, 2156]),
+        ("g(p := one, n := Swap(one));", [21, 12]),
+    ],
+)
+@pytest.mark.parametrize("size", [False, True])
+def test_a_structure_has_the_value_of_the_moment_it_was_given(call: str, sums: list[int], size: bool) -> None:
+    text = PAIRS + (
+        "FUNCTION Swap : INT VAR_IN_OUT s : Pair; END_VAR VAR h : INT; END_VAR "
+        "h := s.a; s.a := s.b; s.b := h; Swap := 1; END_FUNCTION\n"
+        "FUNCTION Swapped : Pair VAR_INPUT s : Pair; END_VAR Swapped.a := s.b; Swapped.b := s.a; END_FUNCTION\n"
+        "FUNCTION_BLOCK Work VAR_INPUT p, q : Pair; n : INT; END_VAR VAR_OUTPUT sum : INT; END_VAR "
+        "VAR last : Pair; END_VAR last := q; sum := p.a + 10 * p.b + 100 * q.a + 1000 * q.b * n; END_FUNCTION_BLOCK\n"
+        "FUNCTION_BLOCK Small VAR_INPUT p : Pair; n : INT; END_VAR VAR_OUTPUT sum : INT; END_VAR "
+        "sum := p.a + 10 * p.b; END_FUNCTION_BLOCK\n"
+        "PROGRAM Main VAR f : Work; g : Small; one : Pair := (a := 1, b := 2); two : Pair := (a := 3, b := 4); "
+        "i : INT := 2; several : ARRAY[1..2] OF Pair := [(a := 7), (a := 5, b := 6)]; "
+        f"sums : ARRAY[0..1] OF INT; END_VAR {call} sums[0] := sums[1]; sums[1] := f.sum + g.sum; END_PROGRAM"
+    )
+    assert set(unkept(text).split()) == {"n", "p"}
+    built = build(text, size=size)
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(2)
+        assert plc.read("Main.sums") == sums
+
+
+def test_reading_a_member_of_one_says_where_it_is() -> None:
+    text = PAIRS + "FUNCTION_BLOCK Work VAR_INPUT p : Pair; END_VAR VAR_OUTPUT o : INT; END_VAR o := p.in.c; "
+    text += "END_FUNCTION_BLOCK PROGRAM Main VAR f : Work; s : Pair; END_VAR f(p := s); END_PROGRAM"
+    built = build(text, size=True)
+    with Simulator(built.image, built.symbols) as plc, pytest.raises(UsageError, match="is in a register"):
+        plc.read("Main.f.p.in.c")
+
+
 def test_what_can_be_watched_at_o2_is_kept() -> None:
     typed = checked(program("a := i; o := a;"))
     assert not lower(typed, Options(find_target(HOST), 2)).transient

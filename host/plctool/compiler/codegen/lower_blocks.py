@@ -84,15 +84,28 @@ def _inputs(frame: Frame, s: FbCall, instance: Ref) -> list[str]:
     values: dict[Variable, Value] = {}
     arguments = [argument for _, argument in s.inputs + s.in_outs]
     last = max((n for n, argument in enumerate(arguments) if not _is_plain(frame, argument, s.block)), default=0)
+    stored = max((n for n, (variable, _) in enumerate(s.inputs) if variable not in handed), default=0)
     for number, (variable, value) in enumerate(s.inputs):
         if variable in transient or (variable in handed and number >= last):
-            values[variable] = frame.value(value)
+            values[variable] = _passed(frame, value, lasting=number < max(last, stored))
         else:
             _assign_member(frame, _member(frame, s.block, instance, variable), value)
     for variable in handed:
         if variable not in values:
             values[variable] = frame.load(_member(frame, s.block, instance, variable))
     return [f"{passed_type(variable.type)} {values[variable]}" for variable in handed]
+
+
+def _passed(frame: Frame, value: Expr, lasting: bool) -> Value:
+    """What is passed: a scalar, or the address of a structure. `lasting`: what else the call needs may change that."""
+    if is_scalar(value.type):
+        return frame.value(value)
+    source = frame.aggregate(value)
+    if lasting:
+        copy = frame.temporary(value.type)
+        frame.copy(copy, source, value.type.size)
+        source = copy
+    return frame.address(source)
 
 
 def _is_plain(frame: Frame, argument: Expr | Place, block: Pou) -> bool:
@@ -119,7 +132,11 @@ def _is_plain_node(frame: Frame, node: object, block: Pou) -> bool:
 def take_inputs(frame: Frame, block: Pou) -> None:
     """Stores the inputs that the block was passed."""
     for number, variable in enumerate(frame.unit.handed.get(block, [])):
-        frame.store(frame.ref(VarPlace(variable, variable.type, block.pos)), parameter_value(number))
+        target, t = frame.ref(VarPlace(variable, variable.type, block.pos)), variable.type
+        if is_scalar(t):
+            frame.store(target, parameter_value(number))
+        else:
+            frame.copy(target, Ref(parameter_value(number), 0, t), t.size)
 
 
 def _member(frame: Frame, block: Pou, instance: Ref, variable: Variable) -> Ref:

@@ -60,8 +60,10 @@ def parameter_types(pou: Pou, parameter: Parameter, form: Form) -> list[str]:
 
 
 def passed_type(t: Type) -> str:
-    """The LLVM type of a scalar parameter inside the image. A short integer fills its register: constants and what is
-    loaded do so anyway. Of a BOOL only the lowest bit counts."""
+    """The LLVM type of a parameter inside the image; of a structure its address is passed. A short integer fills its
+    register: constants and what is loaded do so anyway. Of a BOOL only the lowest bit counts."""
+    if not is_scalar(t):
+        return "ptr"
     return value_type(t) if is_bool(t) else f"{value_type(t)} {extension(t)}".rstrip()
 
 

@@ -1,5 +1,6 @@
 """Variables of function blocks that no call needs from the previous one: inputs that every call gives, and what
-the body assigns in every call before it reads it. Where they need not be watched they live in registers.
+the body assigns in every call before it reads it. Where they need not be watched they live in registers; of a structure
+that is an input these are the members that the body reads.
 
 Outputs are kept, and so is what anything but the statements of the body names, or what they do not just read or assign.
 """
@@ -79,25 +80,34 @@ def _named_from_outside(unit: Pou) -> Iterator[_Member]:
 
 
 def _only_read_and_assigned(block: Pou, inputs: _Variables) -> set[Variable]:
-    """Scalars of the instance that are inputs of the given ones or variables of the block, and no more is done with."""
+    """Scalars of the instance that are inputs of the given ones or variables of the block, and structures that are such
+    inputs, with which no more is done."""
     plain = {id(place) for node in walk(block.body) for place in _plain_places(node)}
     places = [node for node in walk(block.body) if isinstance(node, VarPlace)]
     parameters = {parameter.variable for parameter in block.parameters}
-    candidates = {place.var for place in places} - parameters | inputs
+    scalars = {place.var for place in places if is_scalar(place.type)} - parameters
+    candidates = scalars | {v for v in inputs if is_scalar(v.type) or isinstance(v.type, StructType)}
     other = {place.var for place in places if id(place) not in plain}
-    return {v for v in candidates - other if v.storage is Storage.SELF and v.bit is None and is_scalar(v.type)}
+    return {v for v in candidates - other if v.storage is Storage.SELF and v.bit is None}
 
 
 def _plain_places(node: object) -> Iterator[Place]:
-    """What a node reads or assigns as a whole."""
-    if isinstance(node, Load):
-        yield node.place
+    """Scalars that a node reads or assigns as a whole, and structures of which it reads one."""
+    if isinstance(node, Load) and is_scalar(node.type):
+        yield _structure(node.place)
     elif isinstance(node, Assign):
         yield node.target
     elif isinstance(node, For):
         yield node.var
     elif isinstance(node, FbCall):
         yield from (place for _, place in node.outputs)
+
+
+def _structure(place: Place) -> Place:
+    """What a member is part of; the place itself if it is none."""
+    while isinstance(place, MemberPlace):
+        place = place.base
+    return place
 
 
 def _read_first(body: list[Statement], inputs: _Variables) -> set[Variable]:
