@@ -136,6 +136,16 @@ def test_blocks_that_are_called_once_may_be_inlined() -> None:
     assert "noinline" not in signature(lowered(large_callers(3)), "st.Block0")
 
 
+@pytest.mark.parametrize(("given", "inlined"), [("source", True), ("5", True), ("10 / source", False)])
+def test_what_a_configuration_connects_is_part_of_the_task_unless_it_may_fail(given: str, inlined: bool) -> None:
+    text = lowered(
+        "VAR_GLOBAL source : INT := 1; END_VAR PROGRAM Work VAR_INPUT x : INT; END_VAR END_PROGRAM CONFIGURATION c "
+        f"TASK t(INTERVAL := T#1ms); PROGRAM p WITH t : Work(x := {given}); END_CONFIGURATION"
+    )
+    assert ("noinline" not in signature(text, "st.p.inputs")) is inlined
+    assert "noinline" in signature(text, "st.p")
+
+
 def test_no_function_grows_without_limit_by_inlining() -> None:
     assert "noinline" in signature(lowered(large_callers(100)), "st.Block0")
 

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from plctool.compiler.typed import (
     AddressOf,
+    Assign,
     Call,
+    Const,
     DerefPlace,
     FbCall,
     For,
+    Load,
+    MemberPlace,
     Pou,
     SelfPlace,
     Storage,
@@ -15,6 +19,11 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.typed_nodes import root_of, walk, written_places
+
+
+def only_copies(pou: Pou) -> bool:
+    """Whether a unit does no more than assign variables and constants, which cannot fail."""
+    return all(isinstance(node, Assign | Const | Load | MemberPlace | VarPlace) for node in walk(pou.body))
 
 
 class Effects:

@@ -9,6 +9,7 @@ import zlib
 from dataclasses import dataclass
 from enum import Enum
 
+from plctool.compiler.analysis import only_copies
 from plctool.compiler.codegen.closed import Closed
 from plctool.compiler.codegen.ir import Module, escape
 from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
@@ -25,6 +26,7 @@ _PROBES = ' "probe-stack"="inline-asm"'
 _LARGE_FRAME, _LARGE_FRAME_OF_CONTROLLER = 4096, 256  # bytes of local variables
 FASTEST = 3  # the level that is for speed only
 _INLINED = 225  # LLVM's measure of what it inlines when it does not have to save room
+_INLINED_FOR_SPEED = 450  # where room is of no concern
 
 
 class Check(Enum):
@@ -148,6 +150,8 @@ class Unit:
         self._program = self.plain
         if options.compact and not options.size:
             self._program = module.attributes(f'optsize {always} "function-inline-threshold"="{_INLINED}"')
+        elif options.opt_level >= FASTEST and not options.target.compact:
+            self._program = module.attributes(f'{always} "function-inline-threshold"="{_INLINED_FOR_SPEED}"')
         # LLVM's fast instruction selection (level 0) takes a call that only reads memory for dead.
         reads = " memory(read)" if options.opt_level > 0 else ""
         self.raising = module.attributes(f"cold noreturn nounwind nomerge{reads}")
@@ -160,8 +164,10 @@ class Unit:
         return self._program if pou.checks else self.plain
 
     def inlining(self, pou: Pou) -> str:
-        """The attributes for LLVM about inlining a POU: the standard library is made for it, if there is room."""
-        if pou.kind is PouKind.PROGRAM or self.options.debug or pou in self.sections:
+        """The attributes for LLVM about inlining a POU: the standard library is made for it, if there is room. A task
+        has no lines, so it takes in only what cannot fail."""
+        is_program = pou.kind is PouKind.PROGRAM and not (pou.connection and only_copies(pou))
+        if is_program or self.options.debug or pou in self.sections:
             return "noinline"
         if self.options.size and pou in self.closed and self.closed[pou].calls > 1:
             return "noinline"  # with its inputs and outputs in registers a call is smaller than any body

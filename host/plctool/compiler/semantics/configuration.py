@@ -321,11 +321,11 @@ class _Builder:
             return
         (before, behind), pou = handed, program.pou
         at = task.programs.index(pou)
-        task.programs[at : at + 1] = [
-            *([Pou(f"{pou.name}.inputs", PouKind.PROGRAM, pou.pos, body=before)] if before else []),
-            pou,
-            *([Pou(f"{pou.name}.outputs", PouKind.PROGRAM, pou.pos, body=behind)] if behind else []),
-        ]
+        inputs, outputs = (
+            [Pou(f"{pou.name}.{name}", PouKind.PROGRAM, pou.pos, body=body, connection=True)] if body else []
+            for name, body in (("inputs", before), ("outputs", behind))
+        )
+        task.programs[at : at + 1] = [*inputs, pou, *outputs]
         self._world.pous += [p for p in task.programs[at : at + 3] if p.name.startswith(f"{pou.name}.")]
 
 
