@@ -72,6 +72,14 @@ def in_declaration(line: str) -> list[str]:
         ]),
         ("a := Nothing(1);", ["1: Nothing gives no result; call it as a statement, or declare FUNCTION Nothing : INT"]),
         ("s := 'it''s';", ["1: a quote within a string is written $'"]),
+        ("s := CONCAT(s, 'say \\'hello\\'');", [
+            "1: a quote within a string is written $'",
+            "1: \\ has no place in a program; a quote within a string is written $'",
+        ]),
+        ("p := new TON();", ["1: an instance is taken from its pool by __NEW(TON)"]),
+        ("p := __NEW TON;\ndelete p;", [
+            "1: an instance is taken from its pool by __NEW(TON)", "2: what __NEW gave is given back by __DELETE(p)"
+        ]),
         ("FOR (a = 0; a < 10; a++) b := 1;", ["1: a loop is written FOR i := 0 TO 9 DO ... END_FOR"]),
         ("FOR a IN arr DO b := 1; END_FOR;", ["1: a loop is written FOR i := 0 TO 9 DO ... END_FOR"]),
         ("CASE a OF\n1: b := 1; BREAK;\nEND_CASE;", [

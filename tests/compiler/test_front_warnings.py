@@ -181,6 +181,21 @@ def test_function_that_never_assigns_its_result_is_a_warning() -> None:
     assert warned(text, "result") == ["1:10: F never assigns its result; write F := ..."]
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("'line\\n'", "\\n is 2 characters; write $N"),
+        ('"line\\r\\n"', "\\r\\n is 4 characters; write $R$N"),
+        ("'C:\\new'", None),
+        ("'line$N'", None),
+    ],
+)
+def test_string_that_ends_as_in_c_is_a_warning(text: str, said: str | None) -> None:
+    kind = "WSTRING" if text[0] == '"' else "STRING"
+    found = [d.message for d in check(main(f"s : {kind};", f"s := {text};")).diagnostics if d.code == "escape"]
+    assert found == ([said] if said else [])
+
+
 @pytest.mark.parametrize("body", ["F := 1;", "IF a > 1 THEN F := a; END_IF;", "G(F);"])
 def test_function_that_assigns_its_result_somewhere_is_no_warning(body: str) -> None:
     other = "FUNCTION G VAR_IN_OUT x : INT; END_VAR x := 1; END_FUNCTION\n"

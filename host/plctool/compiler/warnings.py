@@ -24,6 +24,7 @@ WARNINGS = {
     "conversion": "a constant text or REAL is no value of the type it is converted to, so systems disagree",
     "endless": "a loop never ends as it is written",
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration or is compared with one",
+    "escape": "a string ends with \\n, \\r or \\t, which are two characters each",
     "for-bound": "a FOR changes its end or step in its body, but both are computed once, at its start",
     "integer-division": "an integer division drops its fraction before the result becomes a REAL",
     "io": "something in a description of inputs and outputs is probably not meant",

@@ -46,6 +46,7 @@ BEGINNINGS = (
     (re.compile(r"%E[XBWDL]?\d", re.IGNORECASE), "inputs (E) are at %I"),
     (re.compile(r"%A[XBWDL]?\d", re.IGNORECASE), "outputs (A) are at %Q"),
     (re.compile(r"(?<=\d)%"), "50 % is written 0.5"),
+    (re.compile(r"\\'"), "a quote within a string is written $'"),
     (re.compile(r"@\s*%"), "a variable at an address is written name AT %IX0.0 : BOOL;"),
 )
 """Beginnings of what is no token, and what may have been meant."""

@@ -5,6 +5,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
+
 from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import (
@@ -41,6 +43,8 @@ from plctool.iec.types import (
 
 # ---- literals ----
 
+_ESCAPE = re.compile(r"(?:\\[nrt])+\Z")  # where it is no path, as a rule
+
 
 @checks(ast.Literal)
 def literal_value(c: Checker, node: ast.Literal, expected: Type | None) -> Expr:
@@ -72,6 +76,9 @@ def _text(c: Checker, node: ast.Literal, pos: Pos) -> Expr:
     assert isinstance(node.value, str)
     text = Const(node.value, StringType(len(node.value), node.kind is ast.LiteralKind.WSTRING), pos)
     if node.type_name not in ("CHAR", "WCHAR"):
+        if escape := _ESCAPE.search(node.value):
+            meant = escape[0].replace("\\", "$").upper()
+            c.warning(node.pos, "escape", f"{escape[0]} is {len(escape[0])} characters; write {meant}")
         return text
     single = character(text, ELEMENTARY[node.type_name])
     return single or c.error(node.pos, "literal", f"a {node.type_name} is one character, not {len(node.value)}")
