@@ -10,6 +10,7 @@ from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, Frame, zero
 from plctool.compiler.codegen.lower_unit import Check, value_type
 from plctool.compiler.typed import BinaryOp, Const, Intrinsic, Pos, Rounding, UnaryOp
 from plctool.iec.types import BOOL, Elementary, Kind, Type, base_of
+from plctool.image.targets import Machine
 
 LOGIC = {BinaryOp.AND: "and", BinaryOp.OR: "or", BinaryOp.XOR: "xor"}
 _INTEGER = {BinaryOp.ADD: "add", BinaryOp.SUB: "sub", BinaryOp.MUL: "mul", **LOGIC}
@@ -175,11 +176,49 @@ def is_not_zero(frame: Frame, value: Value, t: Type) -> Value:
 def _to_integer(frame: Frame, value: Value, source: Type, target: Type, rounding: Rounding) -> Value:
     text, integer = value_type(source), value_type(target)
     if rounding is Rounding.EVEN:
+        whole = _nearest_integer(frame, value, text, target)
+        if whole is not None:
+            return whole
         value = _round_to_even(frame, value, text)
     word = "fptosi" if is_signed(target) else "fptoui"
     suffix = "f32" if text == "float" else "f64"
     whole = frame.fn.value(f"call {integer} @llvm.{word}.sat.{integer}.{suffix}({text} {value})")
     return _away_from_zero(frame, value, text, whole) if rounding is Rounding.AWAY else whole
+
+
+def _nearest_integer(frame: Frame, value: Value, text: str, target: Type) -> Value | None:
+    """The integer by the processor's own instruction, which is in its default mode: to nearest, halves to even. None
+    where there is no such instruction."""
+    fn, bits = frame.fn, bits_of(target)
+    width = 32 if bits < 32 or (bits == 32 and is_signed(target)) else 64
+    if bits == 64 and not is_signed(target):
+        return None
+    whole = _by_instruction(frame, value, text, width)
+    if whole is None or bits == width:
+        return whole
+    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if is_signed(target) else (0, (1 << bits) - 1)
+    for word, limit in (("smax", low), ("smin", high)):
+        whole = fn.value(f"call i{width} @llvm.{word}.i{width}(i{width} {whole}, i{width} {limit})")
+    return fn.value(f"trunc i{width} {whole} to i{bits}")
+
+
+def _by_instruction(frame: Frame, value: Value, text: str, width: int) -> Value | None:
+    """The nearest signed integer of 32 or 64 bits; the limits for what is beyond them, and 0 for what is no number."""
+    fn, target, real = frame.fn, frame.unit.target, "f32" if text == "float" else "f64"
+    if target.machine is Machine.AARCH64:
+        return fn.value(f"call i{width} @llvm.aarch64.neon.fcvtns.i{width}.{real}({text} {value})")
+    if target.machine is Machine.THUMB and target.registers[1] and text == "float" and width == 32:
+        return fn.value(f"bitcast float {fn.value(f'call float @llvm.arm.vcvtr.f32(float {value})')} to i32")
+    if target.machine is not Machine.X86_64:
+        return None
+    vector, name = ("<4 x float>", "sse.cvtss2si") if text == "float" else ("<2 x double>", "sse2.cvtsd2si")
+    operand = fn.value(f"insertelement {vector} poison, {text} {value}, i32 0")
+    wide = "64" if width == 64 else ""
+    whole = fn.value(f"call i{width} @llvm.x86.{name}{wide}({vector} {operand})")  # the least one if it does not fit
+    beyond = fn.value(f"fcmp oge {text} {value}, {float_literal(2.0 ** (width - 1), 64)}")
+    whole = fn.value(f"select i1 {beyond}, i{width} {(1 << width - 1) - 1}, i{width} {whole}")
+    no_number = fn.value(f"fcmp uno {text} {value}, {value}")
+    return fn.value(f"select i1 {no_number}, i{width} 0, i{width} {whole}")
 
 
 def _away_from_zero(frame: Frame, value: Value, text: str, whole: Value) -> Value:
@@ -198,7 +237,7 @@ def _away_from_zero(frame: Frame, value: Value, text: str, whole: Value) -> Valu
 
 def _round_to_even(frame: Frame, value: Value, text: str) -> Value:
     """Adding and taking away 2^23 (2^52) with the sign of the value leaves no room for a fraction; larger values
-    have none. LLVM's own rounding would be a library call on most targets."""
+    have none. For processors without an instruction for it."""
     fn = frame.fn
     suffix, magic = ("f32", 2.0**23) if text == "float" else ("f64", 2.0**52)
     literal = float_literal(magic, 64)
