@@ -152,6 +152,18 @@ def test_a_port_whose_link_has_just_come_back_is_shared_under_its_own_name(tool,
         assert [gateway["line"] for gateway in gateways()] == [os.path.realpath(plcrt.port)]
 
 
+def test_a_tool_that_goes_on_finds_the_controller_where_the_link_leads_now(plcrt):
+    with plctool.connect(f"serial:{plcrt.port}") as plc:
+        plc.status()
+        before = os.path.realpath(plcrt.port)
+        plcrt.stop(signal.SIGKILL)
+        with pytest.raises(LinkError):
+            plc.status()
+        plcrt.start()
+        assert os.path.realpath(plcrt.port) != before
+        plc.status()
+
+
 def test_eight_tools_at_once(tool, plcrt, program):
     def work(number: int) -> int:
         return tool.ok("read", "--port", plcrt.port, "Main.kept")["values"]["Main.kept"]
