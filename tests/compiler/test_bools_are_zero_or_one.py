@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from plctool import Simulator
 from plctool.compiler.build import build_program
+from plctool.compiler.codegen import lower_expr
+from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
 from plctool.compiler.source import Source
@@ -74,3 +76,18 @@ def test_every_result_is_the_byte_zero_or_one(level: int, terms: list[Term]) -> 
             plc.write({f"Main.{name}": value for name, value in values.items()})
             plc.run_cycles(1)
             assert plc.read("Main.raw") == [int(term.value(values)) for term in terms]
+
+
+def test_a_chain_of_twice_as_many_terms_is_twice_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    negates = lower_expr._negates
+    monkeypatch.setattr(lower_expr, "_negates", lambda *args: asked.append(1) or negates(*args))
+    work = []
+    for count in (50, 100):
+        asked.clear()
+        text = f"PROGRAM Main VAR a, b : BOOL; END_VAR b := {' AND '.join(['a'] * count)}; END_PROGRAM"
+        found = check_sources([Source("main.st", text)])
+        assert found.program, found.diagnostics
+        lower(found.program, Options(find_target("x86_64-linux")))
+        work.append(len(asked))
+    assert work[1] < 2.2 * work[0]

@@ -154,9 +154,12 @@ def _lowest_bit(frame: Frame, e: Expr) -> Value:
     return frame.value(e)
 
 
-def _negates(e: Expr) -> bool:
-    """Whether there is a NOT in an expression of BOOLs."""
-    return isinstance(e, Unary) or (isinstance(e, Binary) and e.op in LOGIC and (_negates(e.left) or _negates(e.right)))
+def _negates(e: Expr, depth: int = 3) -> bool:
+    """Whether there is a NOT in an expression of BOOLs. It is looked for in a few levels only, or a long chain, in
+    which each AND asks, would take more than proportional time."""
+    if depth > 0 and isinstance(e, Binary) and e.op in LOGIC:
+        return _negates(e.left, depth - 1) or _negates(e.right, depth - 1)
+    return isinstance(e, Unary)
 
 
 def _short_circuit(frame: Frame, e: Binary) -> Value:
