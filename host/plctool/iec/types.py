@@ -8,9 +8,11 @@ bytes, NUL-terminated, as in the CODESYS family.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import Enum
+from operator import attrgetter
 
 
 class Kind(Enum):
@@ -362,8 +364,11 @@ class StructType(Type):
 
     def padding_after(self, offset: int, size: int) -> int:
         """How many bytes after the field there belong to none."""
+        if self.union:
+            return 0
         end = offset + size
-        return 0 if self.union else min((f.offset for f in self.fields if f.offset >= end), default=self.size) - end
+        following = bisect_left(self.fields, end, key=attrgetter("offset"))
+        return (self.fields[following].offset if following < len(self.fields) else self.size) - end
 
     def member(self, name: str) -> Field | None:
         key = name.casefold()

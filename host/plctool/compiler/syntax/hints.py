@@ -191,8 +191,8 @@ _HINTS = (
     _Hint(r"\bARRAY\s*\[\s*(?P<count>\d+)\s*\]", _count),
     _Hint(r":=\s*(?P<here>\{(?P<values>[^{};']*)\}\s*)", _list, "here"),
     _Hint(r"\b(?:IF|ELSIF|WHILE|UNTIL)\b[^;]*?(?P<here>:=)", "a comparison is written =; := assigns", "here"),
-    _Hint(r"[^'\s(,=](?P<here>'(?='))", "a quote within a string is written $'", "here"),
-    _Hint(r"\\(?P<here>'[ \t]*)", "a quote within a string is written $'", "here", ends=True),
+    _Hint(r"[^'\s(,=](?P<here>'(?='))", slips.QUOTE, "here"),
+    _Hint(r"\\(?P<here>'[ \t]*)", slips.QUOTE, "here", ends=True),
     _Hint(rf"(?P<here>\b(?:__)?NEW\s+(?P<name>{_NAME})\s*(?:\([^;)]*\))?)",
           "an instance is taken from its pool by __NEW({name})", "here", "body"),
     _Hint(rf"(?P<here>\b(?P<word>__DELETE|DELETE)\s+(?P<name>{_VALUE})\s*)", "what __NEW gave is given back by "

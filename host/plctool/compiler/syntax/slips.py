@@ -35,6 +35,7 @@ SIGNS = {
 }
 """Operators of other languages, and these, alike."""
 
+QUOTE = "a quote within a string is written $'"
 CHOICE = "a choice between two values is written SEL(condition, value_if_false, value_if_true)"
 CHARACTERS = {"#": "a comment is written // or (* *)", "?": CHOICE}
 """Characters that begin nothing, and what may have been meant."""
@@ -46,7 +47,7 @@ BEGINNINGS = (
     (re.compile(r"%E[XBWDL]?\d", re.IGNORECASE), "inputs (E) are at %I"),
     (re.compile(r"%A[XBWDL]?\d", re.IGNORECASE), "outputs (A) are at %Q"),
     (re.compile(r"(?<=\d)%"), "50 % is written 0.5"),
-    (re.compile(r"\\'"), "a quote within a string is written $'"),
+    (re.compile(r"\\'"), QUOTE),
     (re.compile(r"@\s*%"), "a variable at an address is written name AT %IX0.0 : BOOL;"),
 )
 """Beginnings of what is no token, and what may have been meant."""
