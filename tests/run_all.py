@@ -191,6 +191,8 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=(os.cpu_count() or 1) + 2, help="processes that run at once")
     parser.add_argument("builds", nargs="+", type=Path)
     args = parser.parse_args()
+    if args.jobs < 1:
+        parser.error("--jobs takes 1 or more")
     signal.signal(signal.SIGINT, signal.default_int_handler)  # tests send it; `make test &` would have it ignored
     jobs = [job for build in args.builds for job in jobs_of(args.meson, build.resolve())]
     jobs.sort(key=lambda job: -job.seconds)
