@@ -50,6 +50,18 @@ def test_a_line_that_is_lost_is_reported_to_every_tool(served: Served, eventuall
         second.read("Main.count")
 
 
+def test_a_tool_is_told_only_once_that_the_line_was_lost(served: Served, eventually: Eventually) -> None:
+    tool = served.connect()
+    tool.read("Main.count")
+    served.line.gone = True
+    with pytest.raises(LinkError, match="lost"):
+        tool.read("Main.count")
+    eventually(lambda: served.has_ended)
+    served.line.gone = False
+    served.start()
+    assert tool.read("Main.count") == 0
+
+
 def test_tools_learn_that_it_was_ended_by_command(served: Served, eventually: Eventually) -> None:
     tool, asking = served.connect(), served.guest(asks_only=True, tool="plctool gateway")
     tool.read("Main.count")

@@ -20,6 +20,7 @@ from plctool.gateway.frames import (
     AHEAD,
     ENDING,
     GOODBYE,
+    LOST,
     PROTOCOL,
     Closed,
     Frame,
@@ -410,12 +411,12 @@ class GatewayConnection:
                 continue  # WAIT, or what remains of a stream that was aborted
             if frame.kind is not Kind.FAILED:
                 return frame
-            if frame.number == GOODBYE:
-                self._drop()
             try:
                 error = failure(frame.document)
             except FrameError:
                 raise self._nonsense() from None
+            if frame.number == GOODBYE or error.code == LOST:  # its farewell would say the same once more
+                self._drop()
             if isinstance(error, ChannelLost):
                 self._generation = None
             raise error

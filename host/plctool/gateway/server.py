@@ -24,6 +24,7 @@ from plctool.gateway.frames import (
     BUSY,
     ENDING,
     GOODBYE,
+    LOST,
     PROTOCOL,
     Closed,
     Frame,
@@ -49,7 +50,6 @@ _HELLO_PATIENCE = 5.0
 _SEND_PATIENCE = 5.0  # of a tool that does not read
 _GOODBYE_PATIENCE = 0.2
 _CLOSE_PATIENCE = 1.0
-_LOST = "link-lost"
 
 
 class Gateway:
@@ -83,7 +83,7 @@ class Gateway:
                 elif descriptor == self._woken.fileno():
                     self._woken.recv(100)
                 elif event & (select.POLLHUP | select.POLLERR | select.POLLNVAL):
-                    self.stop(f"The serial line {self.line} was lost; check the cable and try again.", _LOST)
+                    self.stop(f"The serial line {self.line} was lost; check the cable and try again.", LOST)
 
     def stop(self, message: str, code: str) -> None:
         """Makes `run` return, from any thread or signal handler. Tools get the message."""
@@ -269,8 +269,8 @@ class _Guest:
                     raise FrameError(f"{frame.kind.name} is not a request")
         except PlcError as error:
             self._send(_failure(frame.number, error))
-            if error.code == _LOST:
-                self._gateway.stop(error.message, _LOST)
+            if error.code == LOST:
+                self._gateway.stop(error.message, LOST)
 
     def _exchange(self, frame: Frame) -> None:
         request = Request.decode(frame.payload)
