@@ -9,7 +9,6 @@ import threading
 import time
 import tty
 from collections.abc import Iterator
-from contextlib import suppress
 from itertools import groupby
 
 import pytest
@@ -81,14 +80,15 @@ class Device:
         self._last = b""
         self._data = bytearray()
         self._done = threading.Event()
-        threading.Thread(target=self._run, daemon=True).start()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
 
     def close(self) -> None:
-        self._done.set()
-        time.sleep(0.05)
-        for fd in (self.end, self.near):
-            with suppress(OSError):
-                os.close(fd)
+        if not self._done.is_set():
+            self._done.set()
+            self._thread.join()
+            os.close(self.end)
+            os.close(self.near)
 
     def _run(self) -> None:
         frame = b""
