@@ -14,6 +14,7 @@ from plctool.compiler import Level, compile_sources
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.emit import emit_object
 from plctool.compiler.codegen.link import link
+from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.memory_functions import MEMORY_FUNCTIONS, memory_object
 from plctool.compiler.codegen.partition import Part
 from plctool.compiler.codegen.relocations import OutOfReach, stub
@@ -181,7 +182,7 @@ def test_an_undefined_function_is_named(name: str) -> None:
     target = find_target(name)
     text = ir("declare void @mystery()\ndefine void @entry() {\n call void @mystery()\n ret void\n}", target)
     with pytest.raises(UsageError, match="mystery"):
-        link([emit_object(Part(text), target, 2)], target, ["entry"], 0)
+        link([emit_object(Part(text), Options(target))], target, ["entry"], 0)
 
 
 @pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
@@ -189,7 +190,7 @@ def test_writable_data_are_refused(target: Target) -> None:
     entry = "define i32 @entry() {\n %o = atomicrmw add ptr @state, i32 1 monotonic\n ret i32 %o\n}"
     text = ir(f"@state = internal global i32 5\n{entry}", target)
     with pytest.raises(UsageError, match=r"\.data|__atomic|__sync"):
-        link([emit_object(Part(text), target, 2)], target, ["entry"], 0)
+        link([emit_object(Part(text), Options(target))], target, ["entry"], 0)
 
 
 def test_absolute_addresses_are_refused() -> None:
@@ -202,7 +203,7 @@ def test_absolute_addresses_are_refused() -> None:
         target,
     )
     with pytest.raises(UsageError, match=r"position independent|writable"):
-        link([emit_object(Part(text), target, 2)], target, ["entry"], 0)
+        link([emit_object(Part(text), Options(target))], target, ["entry"], 0)
 
 
 @pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
@@ -216,7 +217,7 @@ def test_frames_of_memory_functions_are_known(target: Target) -> None:
 def test_unreachable_sections_are_left_out() -> None:
     target = find_target("x86_64-linux")
     text = ir('define void @entry() {\n ret void\n}\ndefine void @far() section ".text.far" {\n ret void\n}\n', target)
-    linked = link([emit_object(Part(text), target, 2)], target, ["entry"], 0)
+    linked = link([emit_object(Part(text), Options(target))], target, ["entry"], 0)
     assert "far" not in linked.symbols
 
 

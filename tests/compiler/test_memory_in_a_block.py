@@ -96,7 +96,7 @@ def test_constants_in_a_block_leave_what_is_beside_them_alone(packed: str, types
 def test_a_timer_is_reset_by_one_store() -> None:
     target = find_target("x86_64-linux")
     (part,) = lower(program(main("t : TON; on : BOOL;", "t(IN := on, PT := T#1s);")), Options(target)).parts
-    module, machine = optimised(part, target, 2)
+    module, machine = optimised(part, Options(target))
     assert len(re.findall(r"mov[bwlq]\t\$0, \d+\(%r\w+\)", machine.emit_assembly(module))) == 1
 
 

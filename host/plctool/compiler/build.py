@@ -66,7 +66,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
     target = options.target
     with room_for_nesting():
         lowered = lower(program, options)
-    objects = emit_objects(lowered.parts, target, options.opt_level)
+    objects = emit_objects(lowered.parts, options)
     linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], len(lowered.imports))
     symbols = _symbols(program, lowered, linked, target, info.project)
     kept = kept_parts(v for v in program.globals if v.area is Area.RETAIN)

@@ -57,6 +57,11 @@ class Target:
         """Whether programs are in a small flash."""
         return self.pointer_size == 4
 
+    @property
+    def shortens(self) -> bool:
+        """Whether instructions are of different length, and the short ones reach only some of the registers."""
+        return self.compact and self.machine is not Machine.THUMB_V6M
+
     def saves_room(self, opt_level: int) -> bool:
         """Whether code for a small flash is to stay small, at that level of optimisation."""
         return self.compact and opt_level < 3

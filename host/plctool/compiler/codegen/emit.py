@@ -7,6 +7,7 @@ from functools import cache
 
 import llvmlite.binding as llvm
 
+from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.partition import Part
 from plctool.image.targets import Target
 
@@ -18,6 +19,10 @@ def _initialise() -> None:
     # How far back an earlier load of a variable is looked for. What is loaded once and used far apart has to be kept
     # on the stack, which costs more than to load it again.
     llvm.set_option("", "-memdep-block-scan-limit=30")
+    # A comparison would make words of the bytes before it: BOOLs would lose AND NOT, which is one instruction on Arm.
+    llvm.set_option("", "-disable-type-promotion")
+    # Code that several functions share would have no line of its own.
+    llvm.set_option("", "-enable-machine-outliner=never")
 
 
 def target_machine(target: Target, opt_level: int) -> llvm.TargetMachine:
@@ -28,25 +33,28 @@ def target_machine(target: Target, opt_level: int) -> llvm.TargetMachine:
     )
 
 
-def optimised(part: Part, target: Target, opt_level: int) -> tuple[llvm.ModuleRef, llvm.TargetMachine]:
+def optimised(part: Part, options: Options) -> tuple[llvm.ModuleRef, llvm.TargetMachine]:
     """The module after LLVM's standard pipeline of the level. Of a large program's level 2, what pays in code that is
     long and has few loops: level 1, and dead stores. It takes half the time, and the code is as fast and smaller.
     What is plain needs still less."""
+    target, opt_level = options.target, options.opt_level
     machine = target_machine(target, opt_level)
     module = llvm.parse_assembly(part.text, llvm.create_context())
     module.verify()
     shorter = part.large and opt_level == 2
-    options = llvm.create_pipeline_tuning_options(speed_level=1 if shorter else opt_level)
-    options.loop_unrolling = not target.saves_room(opt_level)
-    options.loop_vectorization = opt_level >= 2 and not shorter
-    options.slp_vectorization = opt_level >= 3  # slow, and seldom of use for what programs of controllers do
-    builder = llvm.create_pass_builder(machine, options)
+    tuning = llvm.create_pipeline_tuning_options(speed_level=1 if shorter else opt_level)
+    tuning.loop_unrolling = not target.saves_room(opt_level)
+    tuning.loop_vectorization = opt_level >= 2 and not shorter
+    tuning.slp_vectorization = opt_level >= 3  # slow, and seldom of use for what programs of controllers do
+    builder = llvm.create_pass_builder(machine, tuning)
     if shorter and part.plain:
         _simplify(module, builder)
     else:
         builder.getModulePassManager().run(module, builder)
     if shorter:
         _remove_dead_stores(module, builder)
+    if options.size and target.shortens:
+        _shorten(module)
     return module, machine
 
 
@@ -65,43 +73,51 @@ def _remove_dead_stores(module: llvm.ModuleRef, builder: llvm.PassBuilder) -> No
     _run(manager, module, builder)
 
 
+def _shorten(module: llvm.ModuleRef) -> None:
+    """Has short instructions chosen, and registers that they reach. Only now: with this attribute hardly anything is
+    inlined, and the code is larger."""
+    for function in module.functions:
+        if not function.is_declaration:
+            function.add_function_attribute("minsize")
+
+
 def _run(manager: llvm.FunctionPassManager, module: llvm.ModuleRef, builder: llvm.PassBuilder) -> None:
     for function in module.functions:
         if not function.is_declaration:
             manager.run(function, builder)
 
 
-def emit_object(part: Part, target: Target, opt_level: int) -> bytes:
+def emit_object(part: Part, options: Options) -> bytes:
     """The ELF object of a module. A module that LLVM refuses is a bug of the lowering and raises RuntimeError."""
-    module, machine = optimised(part, target, opt_level)
+    module, machine = optimised(part, options)
     data: bytes = machine.emit_object(module)
     return data
 
 
-def emit_objects(parts: list[Part], target: Target, opt_level: int) -> list[bytes]:
+def emit_objects(parts: list[Part], options: Options) -> list[bytes]:
     """The objects of the parts of a program, several if it is large: side by side in processes of their own where
     the system can fork; the result is the same either way."""
     if len(parts) < 2 or not hasattr(os, "fork") or (os.cpu_count() or 1) < 2:
-        return [emit_object(part, target, opt_level) for part in parts]
+        return [emit_object(part, options) for part in parts]
     _initialise()
-    children = [_Child(part, target, opt_level) for part in parts[1:]]
-    objects = [emit_object(parts[0], target, opt_level)]
+    children = [_Child(part, options) for part in parts[1:]]
+    objects = [emit_object(parts[0], options)]
     for part, child in zip(parts[1:], children, strict=True):
-        objects.append(child.result() or emit_object(part, target, opt_level))
+        objects.append(child.result() or emit_object(part, options))
     return objects
 
 
 class _Child:
     """A process that emits one of several objects. A process, because llvmlite lets one thread at a time into LLVM."""
 
-    def __init__(self, part: Part, target: Target, opt_level: int) -> None:
+    def __init__(self, part: Part, options: Options) -> None:
         read, write = os.pipe()
         self._pid = os.fork()
         if self._pid == 0:
             status = 1
             try:
                 with open(write, "wb") as pipe:
-                    pipe.write(emit_object(part, target, opt_level))
+                    pipe.write(emit_object(part, options))
                 status = 0
             finally:
                 os._exit(status)

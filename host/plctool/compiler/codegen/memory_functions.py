@@ -10,7 +10,7 @@ from functools import cache
 
 from plctool.compiler.codegen.emit import emit_object
 from plctool.compiler.codegen.ir import Function, Module, Value, number
-from plctool.compiler.codegen.lower_unit import function_attributes
+from plctool.compiler.codegen.lower_unit import Options, function_attributes
 from plctool.compiler.codegen.partition import Part
 from plctool.image.targets import Target
 
@@ -36,7 +36,7 @@ def memory_object(target: Target) -> bytes:
         fn = Function(f"ptr @{signature}", f'{attributes} section ".text.{name}"')
         write(fn)
         definitions.append(fn.definition("hidden"))
-    return emit_object(Part(module.text(definitions)), target, 2)
+    return emit_object(Part(module.text(definitions)), Options(target))
 
 
 MEMORY_FUNCTIONS = frozenset(("memcpy", "memset", "memmove"))
