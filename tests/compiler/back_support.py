@@ -117,6 +117,7 @@ uint32_t helper_call(void (*fn)(const void *, uint32_t), const void *context, ui
 uintptr_t helper_where(void) { return where; }
 double helper_twice(double x) { return 2 * x; }
 int8_t helper_negate(int8_t x, uint8_t doit) { return doit ? -x : x; }
+uint8_t helper_high_bits(int8_t x) { return x & 0xF0; }
 """
 
 
@@ -160,10 +161,10 @@ class Running:
         for i, area in enumerate(self.areas):
             self.context.area[i] = align_up(ctypes.addressof(area), 16)
         self.context.area[5] = self.base
-        functions = {"iecraise": "helper_raise", "twice": "helper_twice", "negate": "helper_negate"}
         table = (ctypes.c_void_p * max(len(self.image.externals), 1))()
         for i, external in enumerate(self.image.externals):
-            table[i] = ctypes.cast(helper()[functions[external.name]], ctypes.c_void_p).value
+            name = external.name.removeprefix("iec")
+            table[i] = ctypes.cast(helper()[f"helper_{name}"], ctypes.c_void_p).value
         self._table = table
         self.context.imports = ctypes.addressof(table)
         self.initialise()

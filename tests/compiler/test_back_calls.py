@@ -14,6 +14,7 @@ from plctool.compiler.typed import (
     BinaryOp,
     Call,
     CallStatement,
+    Convert,
     Direction,
     Expr,
     External,
@@ -233,6 +234,20 @@ def test_c_functions_are_called_with_the_conventions_of_c() -> None:
     assert run["n"] == 5
     assert [(e.name, e.offset) for e in run.image.externals] == [("twice", 0), ("negate", 8)]
     assert run.image.externals[0].signature == interface_signature("twice(LREAL):LREAL")
+
+
+def test_what_a_c_function_calls_true_is_one() -> None:
+    high_bits = external("high_bits", "high_bits(SINT):BOOL", BOOL, SINT)
+    p = ProgramBuilder()
+    b, n = p.variable("b", BOOL), p.variable("n", SINT)
+    run = p.run(
+        assign(b, Call(high_bits, [load(n)], BOOL, POS)),
+        assign(n, Convert(load(b), SINT, POS)),
+    )
+    for number, expected in ((0x20, 1), (-1, 1), (0x0F, 0), (0, 0)):
+        run["n"] = number
+        run.cycle()
+        assert run["n"] == expected
 
 
 # ---- function blocks ----

@@ -38,6 +38,10 @@ def below(name: str) -> Term:
     return Term(f"(n < BOOL_TO_INT({name}))", lambda values: values[name])
 
 
+def below_any(term: Term) -> Term:
+    return Term(f"(n < BOOL_TO_INT({term.text}))", term.value)
+
+
 def negated(term: Term) -> Term:
     return Term(f"NOT {term.text}", lambda values: not term.value(values))
 
@@ -57,7 +61,11 @@ def both(parts: tuple[str, Term, Term]) -> Term:
 
 LEAVES = st.sampled_from(INPUTS).map(leaf) | st.sampled_from(INPUTS).map(below)
 WORDS = st.sampled_from(["AND", "AND", "OR", "XOR", "AND_THEN", "OR_ELSE", "="])
-TERMS = st.recursive(LEAVES, lambda terms: terms.map(negated) | st.tuples(WORDS, terms, terms).map(both), max_leaves=8)
+TERMS = st.recursive(
+    LEAVES,
+    lambda terms: terms.map(negated) | terms.map(below_any) | st.tuples(WORDS, terms, terms).map(both),
+    max_leaves=8,
+)
 
 
 @settings(max_examples=25)
@@ -65,7 +73,10 @@ TERMS = st.recursive(LEAVES, lambda terms: terms.map(negated) | st.tuples(WORDS,
 @pytest.mark.parametrize("level", [0, 2])
 def test_every_result_is_the_byte_zero_or_one(level: int, terms: list[Term]) -> None:
     declared = f"{', '.join(INPUTS)} : BOOL; n : INT; r : ARRAY[1..{len(terms)}] OF BOOL; p : POINTER TO BYTE;"
-    body = "".join(f"r[{i}] := {term.text}; p := ADR(r[{i}]); raw[{i}] := p^;\n" for i, term in enumerate(terms, 1))
+    body = "".join(
+        f"r[{i}] := {term.text}; p := ADR(r[{i}]); raw[{i}] := p^; IF {term.text} THEN raw[{i}].7 := TRUE; END_IF\n"
+        for i, term in enumerate(terms, 1)
+    )
     text = f"PROGRAM Main VAR {declared} raw : ARRAY[1..{len(terms)}] OF BYTE; END_VAR\n{body}END_PROGRAM"
     found = check_sources([Source("main.st", text)])
     assert found.program, found.diagnostics
@@ -75,7 +86,7 @@ def test_every_result_is_the_byte_zero_or_one(level: int, terms: list[Term]) -> 
             values = dict(zip(INPUTS, bits, strict=True))
             plc.write({f"Main.{name}": value for name, value in values.items()})
             plc.run_cycles(1)
-            assert plc.read("Main.raw") == [int(term.value(values)) for term in terms]
+            assert plc.read("Main.raw") == [0x81 * term.value(values) for term in terms]
 
 
 def test_a_chain_of_twice_as_many_terms_is_twice_the_work(monkeypatch: pytest.MonkeyPatch) -> None:

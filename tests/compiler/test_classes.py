@@ -56,12 +56,12 @@ def code(text: str) -> str:
 def test_call_is_direct_when_only_one_class_has_instances() -> None:
     text = code(FAMILY + CALL.format(instances="d : Derived;"))
     assert "@class." not in text
-    assert "call i16 @st.Derived.Value" in text
+    assert "call signext i16 @st.Derived.Value" in text
 
 
 def test_call_is_decided_by_the_class_when_there_are_several() -> None:
     text = code(FAMILY + CALL.format(instances="b : Base; d : Derived;"))
-    assert re.search(r"call i16 @class\.Base\.Value\(", text)
+    assert re.search(r"call signext i16 @class\.Base\.Value\(", text)
 
 
 def test_call_of_a_declared_instance_is_direct() -> None:

@@ -4,7 +4,7 @@ IR knows the functions it calls."""
 from __future__ import annotations
 
 from plctool.compiler.codegen.ir import Function, Value, number
-from plctool.compiler.codegen.lower_arith import constant, lowest_bit, resize
+from plctool.compiler.codegen.lower_arith import constant, resize
 from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.codegen.lower_unit import Options, Unit
 from plctool.compiler.codegen.signatures import SELF
@@ -27,7 +27,6 @@ def test_only_integers_are_constants_of_the_lowering() -> None:
 def test_a_constant_is_not_converted() -> None:
     f = frame()
     assert resize(f, number(-5), INT, 64) == number(-5)
-    assert lowest_bit(f, number(1)) == number(1)
     assert f.fn.size == 0
     assert resize(f, Value("%x"), INT, 64).constant is None
     assert "sext i16 %x to i64" in f.fn.definition("")

@@ -1,8 +1,8 @@
 """Function blocks that are closed: a call touches nothing but the variables of its instance, which are scalars, and
 raises no exception. The timers, counters and edges of the standard library are.
 
-So what a caller knows of other variables holds after the call. The first outputs come back in registers as well, since
-most are used right after the call, and what does not ask for the time gets no context (`signatures.py`).
+So what a caller knows of other variables holds after the call. The first output comes back in a register as well,
+since most are used right after the call, and what does not ask for the time gets no context (`signatures.py`).
 """
 
 from __future__ import annotations
@@ -38,15 +38,14 @@ _PLAIN = (Assign, BitPlace, Case, If, Load, Return, Unary)
 _OPEN = (Intrinsic.EXCHANGE, Intrinsic.STRING_SIZE)
 _TIMES = (Intrinsic.TIME, Intrinsic.LTIME)
 _LARGEST = 1000  # expressions and statements: a larger body may become several functions
-_RETURNED = 2  # values that come back in registers on every target
 
 
 @dataclass(frozen=True)
 class Closed:
-    """What the function of a closed block is like: the outputs that it returns, whether it gets the context, and how
+    """What the function of a closed block is like: the output that it returns, whether it gets the context, and how
     many calls of it the program has."""
 
-    returned: list[Variable]
+    returned: Variable | None
     has_context: bool
     calls: int
 
@@ -61,8 +60,8 @@ def closed_block(pou: Pou, target: Target, calls: int) -> Closed | None:
             return None
         has_context |= isinstance(node, IntrinsicCall) and node.intrinsic in _TIMES
     outputs = [p.variable for p in pou.parameters if p.direction is Direction.OUTPUT]
-    fitting = [v for v in outputs if is_scalar(v.type) and v.type.size <= target.pointer_size]
-    return Closed(fitting[:_RETURNED], has_context, calls)
+    fitting = (v for v in outputs if is_scalar(v.type) and v.type.size <= target.pointer_size)
+    return Closed(next(fitting, None), has_context, calls)
 
 
 def _is_harmless(node: object) -> bool:

@@ -13,7 +13,14 @@ from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Form, Options, Unit, value_type
 from plctool.compiler.codegen.partition import Part, parts
 from plctool.compiler.codegen.sections import sections
-from plctool.compiler.codegen.signatures import CONTEXT, SELF, block_signatures, parameter_list, result_type
+from plctool.compiler.codegen.signatures import (
+    CONTEXT,
+    SELF,
+    block_signatures,
+    parameter_list,
+    returned_type,
+    returned_variable,
+)
 from plctool.compiler.codegen.string_functions import string_function
 from plctool.compiler.codegen.transient import TransientVariables
 from plctool.compiler.internal import note_position
@@ -101,8 +108,8 @@ def _task_entry(unit: Unit, number: int, task: Task) -> str:
 
 def _pou(unit: Unit, pou: Pou, effects: Effects, form: Form) -> None:
     closed = unit.closed.get(pou)
-    result, name = result_type(pou, closed), unit.symbol(pou, form)
-    signature = f"{result} @{name}({parameter_list(pou, unit.handed, form, closed)})"
+    returned, name = returned_variable(pou, closed), unit.symbol(pou, form)
+    signature = f"{returned_type(returned)} @{name}({parameter_list(pou, unit.handed, form, closed)})"
     fn = Function(signature, unit.attributes(pou), unit.inlining(pou))
     body = Body(unit, fn, pou, effects, form)
     body.open_scope(pou.name, pou.pos)
@@ -111,7 +118,7 @@ def _pou(unit: Unit, pou: Pou, effects: Effects, form: Form) -> None:
         write_calls(body, [unit.section(part, form) for part in cut])
     else:
         write_body(body)
-    body.write_given_up(result)
+    body.write_given_up(returned)
     unit.module.add(name, fn)
 
 

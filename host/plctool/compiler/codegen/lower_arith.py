@@ -60,8 +60,6 @@ def compare(frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type) -> V
     """The i1 of a comparison of two values of `t`."""
     integer, real = _COMPARE[op]
     text = value_type(t)
-    if is_bool(t):
-        left, right = lowest_bit(frame, left), lowest_bit(frame, right)
     if text in ("float", "double"):
         return frame.fn.value(f"fcmp {real} {text} {left}, {right}")
     if op not in (BinaryOp.EQ, BinaryOp.NE):
@@ -142,9 +140,7 @@ def convert(frame: Frame, value: Value, source: Type, target: Type, *, rounding:
     old, new = value_type(source), value_type(target)
     fn = frame.fn
     if is_bool(target):
-        return value if is_bool(source) else fn.value(f"zext i1 {is_not_zero(frame, value, source)} to i8")
-    if is_bool(source):
-        value = lowest_bit(frame, value)
+        return value if is_bool(source) else to_bool(frame, value, source)
     if old == new:
         return value
     if old == "ptr" or new == "ptr":
@@ -162,9 +158,9 @@ def convert(frame: Frame, value: Value, source: Type, target: Type, *, rounding:
     return fn.value(f"{word} {old} {value} to {new}")
 
 
-def lowest_bit(frame: Frame, value: Value) -> Value:
-    """A BOOL as 0 or 1."""
-    return value if value.constant in (0, 1) else frame.fn.value(f"and i8 {value}, 1")
+def to_bool(frame: Frame, value: Value, source: Type) -> Value:
+    """0 for what is zero, 1 for everything else."""
+    return frame.fn.value(f"zext i1 {is_not_zero(frame, value, source)} to i8")
 
 
 def is_not_zero(frame: Frame, value: Value, t: Type) -> Value:

@@ -9,7 +9,7 @@ from plctool.compiler.codegen.lower_arith import convert, is_real
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Frame, Ref, rule
 from plctool.compiler.codegen.lower_string import copy_literal, copy_string
 from plctool.compiler.codegen.lower_unit import Form
-from plctool.compiler.codegen.signatures import CONTEXT, SELF, parameter_value, passed_type, result_type
+from plctool.compiler.codegen.signatures import CONTEXT, SELF, in_order, parameter_value, passed_type, returned_type
 from plctool.compiler.typed import (
     Binary,
     BinaryOp,
@@ -50,7 +50,10 @@ def fb_call(frame: Frame, s: FbCall) -> None:
         form = frame.form_of(s.block, s.dispatch)
         handed_on = [f"ptr {frame.raised}"] if form is Form.RAISING else []
         symbol = frame.unit.target_of(s.block, s.dispatch, form)
-        _call(frame, s.block, symbol, [*handed_on, f"ptr {base}", *arguments], (named, instance))
+        closed = frame.unit.closed.get(s.block)
+        context = [CONTEXT] if closed is None or closed.has_context else []
+        arguments = in_order(arguments, [*context, *handed_on, f"ptr {base}"])
+        _call(frame, s.block, symbol, arguments, (named, instance))
         if form is Form.RAISING:
             frame.after_call(s.pos)
     for variable, place in s.outputs:
@@ -60,21 +63,17 @@ def fb_call(frame: Frame, s: FbCall) -> None:
 def _call(frame: Frame, block: Pou, symbol: str, arguments: list[str], instances: tuple[Ref, ...]) -> None:
     """The call itself. `instances`: the instance, in the ways that it is reached here."""
     closed = frame.unit.closed.get(block)
-    if closed is None or closed.has_context:
-        arguments = [CONTEXT, *arguments]
     if closed is None:
         frame.fn.call(symbol, arguments)
         return
     assert block.instance is not None
-    result, tag = result_type(block, closed), frame.unit.members_tag(block.instance)
-    if not closed.returned:
+    tag = frame.unit.members_tag(block.instance)
+    if closed.returned is None:
         frame.fn.call(symbol, arguments, tag)
         return
-    results = frame.fn.call_value(result, symbol, arguments, tag)
-    for number, variable in enumerate(closed.returned):
-        value = frame.fn.value(f"extractvalue {result} {results}, {number}")
-        for instance in instances:
-            frame.note(_member(frame, block, instance, variable), value)
+    value = frame.fn.call_value(returned_type(closed.returned), symbol, arguments, tag)
+    for instance in instances:
+        frame.note(_member(frame, block, instance, closed.returned), value)
 
 
 def _inputs(frame: Frame, s: FbCall, instance: Ref) -> list[str]:

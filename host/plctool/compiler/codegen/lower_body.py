@@ -9,8 +9,6 @@ from plctool.compiler.codegen import (  # noqa: F401  their rules
     lower_places,
     lower_stmt,
 )
-from plctool.compiler.codegen.ir import Value
-from plctool.compiler.codegen.lengths import length_variable
 from plctool.compiler.codegen.lower_blocks import take_inputs
 from plctool.compiler.codegen.lower_frame import NO_CAPACITY, Body, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise
@@ -25,7 +23,7 @@ from plctool.compiler.codegen.signatures import (
     parameter_length,
     parameter_value,
     result_in_memory,
-    result_type,
+    returned_variable,
 )
 from plctool.compiler.typed import Pou, PouKind, Variable, VarPlace
 from plctool.iec.types import StringType, is_scalar
@@ -51,24 +49,13 @@ def write_body(frame: Body) -> None:
         initialise(frame, frame.locals[var], var.initial)
     frame.statements(pou.body)
     fn.begin(frame.on_return)
-    if pou.result is not None and is_scalar(pou.result.type):
-        fn.terminate(f"ret {value_type(pou.result.type)} {frame.load(frame.locals[pou.result])}")
+    returned = returned_variable(pou, frame.unit.closed.get(pou))
+    if returned is None:
+        fn.terminate("ret void")
     else:
-        fn.terminate(f"ret {_outputs(frame, pou)}")
+        value = frame.load(frame.ref(VarPlace(returned, returned.type, pou.pos)))
+        fn.terminate(f"ret {value_type(returned.type)} {value}")
     frame.write_raises()
-
-
-def _outputs(frame: Body, pou: Pou) -> str:
-    """What is returned besides the result of a function, with its type."""
-    length = length_variable(pou)
-    if length is not None:
-        return f"i32 {frame.load(frame.locals[length])}"
-    closed = frame.unit.closed.get(pou)
-    result, whole = result_type(pou, closed), Value("poison")
-    for number, variable in enumerate(closed.returned if closed else []):
-        value = frame.load(frame.ref(VarPlace(variable, variable.type, pou.pos)))
-        whole = frame.fn.value(f"insertvalue {result} {whole}, {value_type(variable.type)} {value}, {number}")
-    return result if result == "void" else f"{result} {whole}"
 
 
 def write_calls(frame: Body, parts: list[str]) -> None:

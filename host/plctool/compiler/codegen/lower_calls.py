@@ -11,12 +11,12 @@ from plctool.compiler.codegen.lengths import (
     length_variable,
     takes_lengths,
 )
-from plctool.compiler.codegen.lower_arith import convert, is_bool, lowest_bit
+from plctool.compiler.codegen.lower_arith import convert, is_bool, to_bool
 from plctool.compiler.codegen.lower_frame import Body, Frame, Ref
 from plctool.compiler.codegen.lower_places import materialised
 from plctool.compiler.codegen.lower_string import append_string, move_characters
 from plctool.compiler.codegen.lower_unit import Form, value_type
-from plctool.compiler.codegen.signatures import CONTEXT, extension, parameter_types
+from plctool.compiler.codegen.signatures import CONTEXT, parameter_types, returned_type, returned_variable
 from plctool.compiler.typed import (
     Call,
     Const,
@@ -29,7 +29,7 @@ from plctool.compiler.typed import (
     Pou,
     VarPlace,
 )
-from plctool.iec.types import StringType, is_scalar
+from plctool.iec.types import BOOL, StringType, is_scalar
 
 _LONGEST = 32_767  # characters that LEN gives
 
@@ -150,21 +150,19 @@ def _call_instruction(
     frame: Frame, pou: Pou, dispatch: Dispatch | None, arguments: list[str], form: Form
 ) -> Value | None:
     unit, fn = frame.unit, frame.fn
-    result = pou.result.type if pou.result is not None and is_scalar(pou.result.type) else None
+    returned = returned_variable(pou, None)
     if pou.external:
         target = frame.import_function(unit.import_slot(pou.external))
         convention = f"{unit.target.external_convention} " if unit.target.external_convention else ""
-        returned = "void" if result is None else f"{extension(result)} {value_type(result)}".lstrip()
-        text = f"call {convention}{returned} {target}({', '.join(arguments)}) {unit.external_call}"
-        if result is not None:
-            return fn.value(text)
+        text = f"call {convention}{returned_type(returned)} {target}({', '.join(arguments)}) {unit.external_call}"
+        if returned is not None:
+            value = fn.value(text)
+            return to_bool(frame, value, BOOL) if is_bool(returned.type) else value  # TRUE is not 1 everywhere in C
         fn.do(text)
         return None
     symbol = unit.target_of(pou, dispatch, form)
-    if length_variable(pou) is not None:
-        return fn.call_value("i32", symbol, arguments)
-    if result is not None:
-        return fn.call_value(value_type(result), symbol, arguments)
+    if returned is not None:
+        return fn.call_value(returned_type(returned), symbol, arguments)
     fn.call(symbol, arguments)
     return None
 
@@ -178,8 +176,7 @@ def _operand(
         ref = frame.temporary(t)
     elif not isinstance(argument, Place):
         if is_scalar(t) and not parameter.by_reference:
-            value = frame.value(argument)
-            return lowest_bit(frame, value) if pou.external and is_bool(t) else value
+            return frame.value(argument)
         ref = _aligned(frame, materialised(frame, argument))
     else:
         ref = frame.ref(argument)

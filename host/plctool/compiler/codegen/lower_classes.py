@@ -7,17 +7,17 @@ from __future__ import annotations
 from plctool.compiler.codegen.ir import FALSE, Function
 from plctool.compiler.codegen.lower_frame import ACCESS_VIOLATION, Frame
 from plctool.compiler.codegen.lower_unit import Form, Unit, value_type
-from plctool.compiler.codegen.signatures import SELF, formals, parameter_list
+from plctool.compiler.codegen.signatures import SELF, formals, parameter_list, returned_type, returned_variable
 from plctool.compiler.typed import Dispatch
-from plctool.iec.types import CLASS_NUMBER, is_scalar
+from plctool.iec.types import CLASS_NUMBER
 
 
 def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch, form: Form) -> None:
     """The function `name`, which has the parameters of its targets. An instance of another class was reached through a
     wrong pointer."""
     pou = dispatch.function
-    result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
-    fn = Function(f"{result} @{name}({parameter_list(pou, unit.handed, form)})", unit.plain)
+    returned = returned_variable(pou, None)
+    fn = Function(f"{returned_type(returned)} @{name}({parameter_list(pou, unit.handed, form)})", unit.plain)
     frame = Frame(unit, fn, None, form)
     frame.open_scope(pou.name, pou.pos)
     arguments = [formal.argument for formal in formals(pou, unit.handed, form)]
@@ -31,14 +31,15 @@ def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch, form: Form) -> N
     fn.terminate(f"switch i32 {loaded}, label %{unknown} [ {cases} ]")
     for symbol, label in labels.items():
         fn.begin_detached(label)
-        if result == "void":
+        if returned is None:
             fn.call(symbol, arguments, tail=True)
             fn.terminate("ret void")
         else:
-            fn.terminate(f"ret {result} {fn.call_value(result, symbol, arguments, tail=True)}")
+            value = fn.call_value(returned_type(returned), symbol, arguments, tail=True)
+            fn.terminate(f"ret {value_type(returned.type)} {value}")
     fn.begin_detached(unknown)
     frame.require(FALSE, ACCESS_VIOLATION, pou.pos)
     fn.terminate("unreachable")
     frame.write_raises()
-    frame.write_given_up(result)
+    frame.write_given_up(returned)
     unit.module.add(name, fn)

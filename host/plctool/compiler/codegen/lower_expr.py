@@ -116,7 +116,7 @@ def truth(frame: Frame, e: Expr) -> Value:
         return frame.fn.value(f"xor i1 {truth(frame, e.operand)}, true")
     if isinstance(e, Convert) and not is_bool(e.operand.type):
         return is_not_zero(frame, frame.value(e.operand), e.operand.type)
-    return frame.fn.value(f"trunc i8 {frame.value(e)} to i1")
+    return is_not_zero(frame, frame.value(e), e.type)
 
 
 @rule(VALUES, Binary)

@@ -290,11 +290,11 @@ class Frame:
                 handler.raise_code(self, code)
         fn.debug = keep
 
-    def write_given_up(self, result: str) -> None:
-        """Writes how a function returns that has raised. `result`: its LLVM type."""
+    def write_given_up(self, returned: Variable | None) -> None:
+        """Writes how a function returns that has raised. `returned`: the variable whose value it returns otherwise."""
         if self.raised is RAISED:
             self.fn.begin_detached(_GIVEN_UP)
-            self.fn.terminate("ret void" if result == "void" else f"ret {result} poison")
+            self.fn.terminate("ret void" if returned is None else f"ret {value_type(returned.type)} poison")
 
     # ---- memory ----
 

@@ -94,7 +94,7 @@ RAISE = External("iecraise", interface_signature("iecraise(UDINT)"), 0x00010000)
 
 
 def value_type(t: Type) -> str:
-    """The LLVM type of a scalar. A BOOL is an i8 whose lowest bit counts: it goes to and from memory as it is."""
+    """The LLVM type of a scalar. A BOOL is an i8 that is 0 or 1: it goes to and from memory as it is."""
     base = base_of(t)
     if isinstance(base, PointerType):
         return "ptr"

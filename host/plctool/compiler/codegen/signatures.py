@@ -1,22 +1,23 @@
 """Parameters of compiled functions: the context, the instance, room for a result in memory, then what the program
-declares.
+declares; of a function block its first input comes first.
 
 A function block finds its inputs in its instance. Those that every call of the block gives, it is passed as parameters,
 as far as there are registers for them, and stores them itself: that is smaller and faster than to store them before
-each call and to load them in the block. Inputs that are not kept in memory are passed in any case. The first outputs of
-a closed block (`closed.py`) come back as its results, beside their values in the instance: most are used right after
-the call.
+each call and to load them in the block. Inputs that are not kept in memory are passed in any case. The first output of
+a closed block (`closed.py`) comes back as its result, beside its value in the instance: most are used right after the
+call.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from typing import TypeVar
 
 from plctool.compiler.codegen.closed import Closed, closed_block
 from plctool.compiler.codegen.ir import FixedPointer, Value
 from plctool.compiler.codegen.lengths import length_variable
-from plctool.compiler.codegen.lower_arith import is_bool, is_real, is_signed
+from plctool.compiler.codegen.lower_arith import is_real, is_signed
 from plctool.compiler.codegen.lower_frame import RAISED
 from plctool.compiler.codegen.lower_unit import Form, Options, value_type
 from plctool.compiler.codegen.transient import TransientVariables, transient_variables
@@ -30,6 +31,7 @@ SELF = FixedPointer("%self")  # the instance
 RESULT = FixedPointer("%result")  # where a result goes that comes back in memory
 RESULT_CAPACITY = Value("%result.capacity")
 
+Passed = TypeVar("Passed")
 HandedInputs = dict[Pou, list[Variable]]
 ClosedBlocks = dict[Pou, Closed]
 
@@ -60,15 +62,13 @@ def parameter_types(pou: Pou, parameter: Parameter, form: Form) -> list[str]:
 
 
 def passed_type(t: Type) -> str:
-    """The LLVM type of a parameter inside the image; of a structure its address is passed. A short integer fills its
-    register: constants and what is loaded do so anyway. Of a BOOL only the lowest bit counts."""
-    if not is_scalar(t):
-        return "ptr"
-    return value_type(t) if is_bool(t) else f"{value_type(t)} {extension(t)}".rstrip()
+    """The LLVM type of a parameter inside the image; of a structure its address is passed. What is short fills its
+    register: constants and what is loaded do so anyway."""
+    return f"{value_type(t)} {extension(t)}".rstrip() if is_scalar(t) else "ptr"
 
 
 def extension(t: Type) -> str:
-    """How a scalar parameter or result of a C function fills its register, as an attribute; "" for none."""
+    """How a scalar parameter or result fills its register, as an attribute; "" for none."""
     if value_type(t) in ("i8", "i16"):
         return "signext" if is_signed(t) else "zeroext"
     return ""
@@ -115,8 +115,14 @@ def formals(pou: Pou, handed: HandedInputs, form: Form, closed: Closed | None = 
             values = (parameter_value(number), parameter_capacity(number), parameter_length(number))
             types = parameter_types(pou, parameter, form)
             found += [Formal(text, value) for text, value in zip(types, values, strict=False)]
-    found += [Formal(passed_type(v.type), parameter_value(n)) for n, v in enumerate(handed.get(pou, ()))]
-    return found
+    inputs = [Formal(passed_type(v.type), parameter_value(n)) for n, v in enumerate(handed.get(pou, ()))]
+    return in_order(inputs, found)
+
+
+def in_order(inputs: list[Passed], others: list[Passed]) -> list[Passed]:
+    """What a function block is passed. The first input is in the register in which results come: most often it is the
+    output of another block."""
+    return [*inputs[:1], *others, *inputs[1:]]
 
 
 def parameter_list(pou: Pou, handed: HandedInputs, form: Form, closed: Closed | None = None) -> str:
@@ -170,15 +176,16 @@ def _inputs_of_all_calls(program: TypedProgram) -> tuple[HandedInputs, Counter[P
     return given, calls, list(reached)
 
 
-def result_type(pou: Pou, closed: Closed | None) -> str:
-    """The LLVM type of what the function of a unit returns."""
+def returned_variable(pou: Pou, closed: Closed | None) -> Variable | None:
+    """The variable whose value the function of a unit returns."""
     if pou.result is not None and is_scalar(pou.result.type):
-        return value_type(pou.result.type)
-    if length_variable(pou) is not None:
-        return "i32"
-    if closed is None or not closed.returned:
-        return "void"
-    return f"{{ {', '.join(value_type(v.type) for v in closed.returned)} }}"
+        return pou.result
+    return length_variable(pou) or (closed.returned if closed is not None else None)
+
+
+def returned_type(variable: Variable | None) -> str:
+    """What the function returns, as it stands in its define line and in calls of it."""
+    return "void" if variable is None else f"{extension(variable.type)} {value_type(variable.type)}".lstrip()
 
 
 def _restrict(given: HandedInputs, call: FbCall, others: list[Pou]) -> None:
