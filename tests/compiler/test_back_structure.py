@@ -294,6 +294,13 @@ def test_a_bool_is_tested_as_the_byte_that_it_is(condition: str) -> None:
     assert "trunc" not in code
 
 
+@pytest.mark.parametrize(("target", "tests"), [("x86_64-linux", 1), ("aarch64-linux", 1), ("cortex-m3", 3)])
+def test_a_condition_of_variables_is_one_test_where_branches_are_dear(target: str, tests: int) -> None:
+    body = "IF a AND NOT b OR c THEN n := 1; END_IF"
+    text = lowered(f"PROGRAM Main VAR a, b, c : BOOL; n : INT; END_VAR {body} END_PROGRAM", target)
+    assert text.count("icmp ne i8") == tests
+
+
 @pytest.mark.parametrize(("target", "short"), [("cortex-m3", True), ("rv32imac", True), ("cortex-m0", False)])
 def test_small_code_takes_short_instructions_where_there_are_others(target: str, short: bool) -> None:
     text = lowered("PROGRAM Main VAR a : BOOL; END_VAR a := NOT a; END_PROGRAM", target, size=True)

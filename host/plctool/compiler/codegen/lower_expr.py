@@ -35,7 +35,7 @@ from plctool.compiler.codegen.lower_frame import (
     rule,
 )
 from plctool.compiler.codegen.lower_string import compare_strings, equals_literal, literal_text
-from plctool.compiler.codegen.lower_unit import Check, value_type
+from plctool.compiler.codegen.lower_unit import FASTEST, Check, value_type
 from plctool.compiler.ranges import type_range, value_range
 from plctool.compiler.typed import (
     AddressOf,
@@ -107,6 +107,8 @@ def truth(frame: Frame, e: Expr) -> Value:
         if e.op in _SHORT_CIRCUIT:
             return _short_circuit(frame, e)
         if e.op not in COMPARISONS:
+            if _is_one_test(frame, e):
+                return is_not_zero(frame, frame.value(e), e.type)
             left, right = truth(frame, e.left), truth(frame, e.right)
             return frame.fn.value(f"{LOGIC[e.op]} i1 {left}, {right}")
         if isinstance(e.left.type, StringType):
@@ -117,6 +119,20 @@ def truth(frame: Frame, e: Expr) -> Value:
     if isinstance(e, Convert) and not is_bool(e.operand.type):
         return is_not_zero(frame, frame.value(e.operand), e.operand.type)
     return is_not_zero(frame, frame.value(e), e.type)
+
+
+def _is_one_test(frame: Frame, e: Binary) -> bool:
+    """Whether a condition of several operands is worked out and tested once. Small processors branch for each of them
+    in less, and where -O3 has inlined much, comparisons are better left to branches."""
+    options = frame.unit.options
+    return not options.target.compact and (options.opt_level < FASTEST or _is_stored(e))
+
+
+def _is_stored(e: Expr) -> bool:
+    """Whether a BOOL is made of variables only, which are bytes."""
+    if isinstance(e, Binary):
+        return e.op in LOGIC and _is_stored(e.left) and _is_stored(e.right)
+    return isinstance(e, Load) or (isinstance(e, Unary) and _is_stored(e.operand))
 
 
 @rule(VALUES, Binary)
