@@ -27,7 +27,7 @@
 
 RTS_RESULT SysWatchdog_Hook(CMP_HOOK hook);
 
-enum { VARIABLES = 4, PATIENCE_S = 20, STOP_MS = 3000 };
+enum { VARIABLES = 4, PATIENCE_S = 20, STOP_MS = 20000 };
 #define NS_PER_MS 1000000LL
 
 /* The code area: all functions of this program are within it. */

@@ -1,8 +1,12 @@
-"""What Linux knows of processes."""
+"""Processes: one for a while, and what Linux knows of them."""
 
 from __future__ import annotations
 
+import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
 
 PROCESS_CLOCK = 2  # CPUCLOCK_SCHED: what clock_getcpuclockid(3) makes of a process id
 
@@ -11,3 +15,13 @@ def processor_ns(pid: int) -> int:
     """Processor time of all threads so far, of those that have ended too: exactly, where /proc/PID/stat counts clock
     ticks."""
     return time.clock_gettime_ns(~pid << 3 | PROCESS_CLOCK)
+
+
+@contextmanager
+def started(command: list[str], **options: Any) -> Iterator[subprocess.Popen[Any]]:
+    """A process that is killed if it still runs at the end of the block."""
+    with subprocess.Popen(command, **options) as process:
+        try:
+            yield process
+        finally:
+            process.kill()

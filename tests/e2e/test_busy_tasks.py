@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections import Counter
 
 import pytest
 
@@ -38,7 +39,7 @@ CONFIGURATION Config
     PROGRAM Other WITH Low : Below;
 END_CONFIGURATION
 """
-CYCLE = 0.2  # processor time of a cycle to aim at [s]
+CYCLE = 0.5  # processor time of a cycle to aim at [s]
 
 
 @pytest.fixture
@@ -56,12 +57,14 @@ def test_many_requests_are_answered_within_one_long_cycle(tool, connected, event
         connected.write({"turns": turns})
         before = connected.read("ended")
         eventually(lambda before=before: connected.read("ended") > before + 1)
-    begun, below = connected.read("begun"), connected.read("below")
-    requests = 0
-    while connected.read("begun") < begun + 5:
-        requests += 1
-    assert requests > 25  # that is one per cycle where communication waits for it
-    assert connected.read("below") > below + 5
+    below = connected.read("below")
+
+    def most_in_one_cycle() -> int:
+        """Requests; one or two where communication waits for the end of a cycle."""
+        return max(Counter(connected.read("begun") for _ in range(40)).values())
+
+    eventually(lambda: most_in_one_cycle() > 3)
+    eventually(lambda: connected.read("below") > below + 5)
 
 
 def test_values_of_a_freewheeling_task_are_read_between_its_cycles(tool, connected, eventually):

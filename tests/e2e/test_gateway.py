@@ -37,6 +37,7 @@ def runtime(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     folder = tempfile.mkdtemp(prefix="gw")
     monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
     monkeypatch.setenv("PLCTOOL_GATEWAY_IDLE", "600")
+    monkeypatch.setattr("plctool.gateway.control._ANSWER_PATIENCE", PATIENCE)  # one that is late is not stuck
     yield
     for pid in _gateways_of(folder):
         with suppress(ProcessLookupError):
@@ -285,6 +286,7 @@ def test_a_write_says_so_when_the_gateway_is_killed_in_the_middle_of_it(plcrt, p
             os.kill(only_gateway()["pid"], signal.SIGKILL)
             with pytest.raises(LinkError, match="which may have been carried out; look, and try again"):
                 writing.result(PATIENCE)
+        eventually(lambda: slow.is_quiet)  # the rest of the write is lost too
         slow.to_device.damage = Damage()
         assert plc.read("Main.step") == 2
 

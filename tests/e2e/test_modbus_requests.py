@@ -35,7 +35,7 @@ baud = 38400
 [[modbus.rs485.device]]
 name = "Meter"
 unit = 3
-timeout = "T#500ms"
+timeout = "T#5s"
 [[modbus.rs485.device.read]]
 function = 3
 address = 40001
@@ -52,6 +52,9 @@ port = {port}
 name = "Drive"
 unit = 1
 """
+
+NO_REPLY = 0x104  # ErrorID
+TRIES = 5
 
 
 @pytest.fixture(scope="module")
@@ -71,13 +74,16 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Plc, Devic
 
 
 def ask(plc: Plc, block: str, **inputs: object) -> int:
-    """Makes a request; its ErrorID."""
+    """Makes a request; its ErrorID. One that a busy machine has cut in two has no reply, and is made again."""
     start = {"read": "Main.get", "write": "Main.set"}[block]
-    plc.write({f"Main.{name}": value for name, value in inputs.items()} | {start: True})
-    eventually(lambda: plc.read(f"Main.{block}.Done") or plc.read(f"Main.{block}.Error"))
-    error = int(plc.read(f"Main.{block}.ErrorID"))
-    plc.write({start: False})
-    eventually(lambda: not (plc.read(f"Main.{block}.Done") or plc.read(f"Main.{block}.Error")))
+    for _ in range(TRIES):
+        plc.write({f"Main.{name}": value for name, value in inputs.items()} | {start: True})
+        eventually(lambda: plc.read(f"Main.{block}.Done") or plc.read(f"Main.{block}.Error"))
+        error = int(plc.read(f"Main.{block}.ErrorID"))
+        plc.write({start: False})
+        eventually(lambda: not (plc.read(f"Main.{block}.Done") or plc.read(f"Main.{block}.Error")))
+        if error != NO_REPLY or inputs["device"] == "Absent":
+            break
     return error
 
 
@@ -110,7 +116,7 @@ def test_what_a_device_refuses_is_its_exception(plant: tuple[Plc, Devices, Devic
 
 def test_a_device_that_is_not_there_is_an_error_and_holds_up_no_other(plant: tuple[Plc, Devices, Devices]) -> None:
     plc, meter, _ = plant
-    assert ask(plc, "read", device="Absent", reference=40001, readBy=3, count=1) == 0x104
+    assert ask(plc, "read", device="Absent", reference=40001, readBy=3, count=1) == NO_REPLY
     before = meter.count(3)
     eventually(lambda: meter.count(3) > before + 5)
 

@@ -17,15 +17,16 @@ from pathlib import Path
 import pytest
 from elftools.elf.elffile import ELFFile
 from elftools.elf.enums import ENUM_DT_FLAGS
-from processes import processor_ns
+from processes import processor_ns, started
 
 from plctool import connect
-from plctool.link import simplecom
+from plctool.core import lib
+from plctool.link import names, router, simplecom
 from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
 from plctool.link.services import read_identity, read_status
 from plctool.link.session import Session
-from plctool.link.transport import NO_PLACES
+from plctool.link.transport import NO_PLACES, TOOL_ADDRESS
 from plctool.testing.plcrt import Plcrt, find_plcrt, find_worker
 
 PATIENCE = 60  # for what is bound to happen [s]
@@ -37,6 +38,15 @@ def run_plcrt(*options: str, prepare: Callable[[], object] | None = None) -> sub
     return subprocess.run(
         [find_plcrt(), *options], capture_output=True, text=True, timeout=PATIENCE, check=False, preexec_fn=prepare
     )
+
+
+def ask_without_reading(port: str, questions: int) -> None:
+    """Sends name requests, and leaves all replies on the line."""
+    request = router.Packet(int(lib.ROUTER_SVC_NAME_REQUEST), router.BROADCAST, TOOL_ADDRESS, names.encode_request(1))
+    transport = SerialTransport(port)
+    for _ in range(questions):
+        transport.send(router.encode(request))
+    transport.close()
 
 
 def device_name(port: str) -> str:
@@ -150,7 +160,7 @@ def test_a_limit_of_file_sizes_is_an_error_and_not_a_signal(tmp_path):
 def test_a_closed_standard_output_is_not_replaced_by_the_flash_file(tmp_path, eventually):
     flash = tmp_path / "flash"
     command = [find_plcrt(), "--flash", str(flash), "--serial", "pty"]
-    with subprocess.Popen(command, preexec_fn=lambda: os.close(1)) as process:
+    with started(command, preexec_fn=lambda: os.close(1)) as process:
         eventually(lambda: find_worker(process.pid))
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
@@ -166,7 +176,7 @@ def test_the_device_answers_on_the_terminal_it_names(plcrt):
 
 def test_without_a_link_it_names_the_terminal_itself(tmp_path):
     command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", "pty"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with started(command, stdout=subprocess.PIPE, text=True) as process:
         port = process.stdout.readline().removeprefix("serial: ").strip()
         assert port.startswith("/dev/pts/") and device_name(port) == "plcrt"
         process.terminate()
@@ -204,11 +214,7 @@ def test_garbage_on_the_line_does_no_harm(plcrt):
 
 def test_replies_that_are_not_read_do_not_block_it(plcrt, eventually):
     """Name requests without end from a client that never reads: the terminal fills up."""
-    transport = SerialTransport(plcrt.port)
-    connection = Connection(transport)
-    for _ in range(2000):
-        connection.scan(0)
-    transport.close()
+    ask_without_reading(plcrt.port, 2000)
     assert device_name(plcrt.port) == "plcrt"
 
 
@@ -220,13 +226,10 @@ def test_it_ends_in_order_when_asked_to(plcrt, number):
 def test_it_ends_when_asked_to_though_the_signal_was_blocked_before_it_started(tmp_path):
     command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", "pty"]
     block = lambda: signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])  # noqa: E731
-    with subprocess.Popen(command, stdout=subprocess.PIPE, preexec_fn=block) as process:
+    with started(command, stdout=subprocess.PIPE, preexec_fn=block) as process:
         assert process.stdout.readline()
         process.terminate()
-        try:
-            assert process.wait(PATIENCE) == 0
-        finally:
-            process.kill()
+        assert process.wait(PATIENCE) == 0
 
 
 @pytest.mark.parametrize("failed_before", [False, True])
@@ -252,7 +255,7 @@ def test_it_goes_on_when_its_output_is_not_read(tmp_path, eventually):
     reader, writer = os.pipe()
     os.close(reader)
     command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", "pty"]
-    with subprocess.Popen(command, stdout=writer) as process:
+    with started(command, stdout=writer) as process:
         os.close(writer)
         eventually(lambda: find_worker(process.pid))
         with pytest.raises(subprocess.TimeoutExpired):
@@ -279,7 +282,7 @@ def test_it_starts_again_after_being_killed_at_any_moment_of_its_start(tmp_path)
     flash = tmp_path / "flash"
     command = [find_plcrt(), "--flash", str(flash), "--serial", "pty"]
     for _ in range(20):
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        with started(command, stdout=subprocess.DEVNULL) as process:
             time.sleep(chance.random() * 0.02)
             process.kill()
     with Plcrt(flash) as running, Connection(SerialTransport(running.port)) as connection:
@@ -289,16 +292,12 @@ def test_it_starts_again_after_being_killed_at_any_moment_of_its_start(tmp_path)
 @pytest.mark.parametrize("questions", [1, 2000])
 def test_it_needs_next_to_no_processor_time_when_idle(plcrt, questions):
     """Also when the line is full of replies that no tool reads, and when it was."""
-    transport = SerialTransport(plcrt.port)
-    connection = Connection(transport)
-    for _ in range(questions):
-        connection.scan(0)
-    transport.close()
+    ask_without_reading(plcrt.port, questions)
     device_name(plcrt.port)
     pids = (plcrt.process.pid, plcrt.worker)
-    before, started = sum(map(processor_ns, pids)), time.monotonic_ns()
+    before, begun = sum(map(processor_ns, pids)), time.monotonic_ns()
     time.sleep(2)
-    share = (sum(map(processor_ns, pids)) - before) / (time.monotonic_ns() - started)
+    share = (sum(map(processor_ns, pids)) - before) / (time.monotonic_ns() - begun)
     assert share < IDLE_SHARE
 
 
@@ -319,7 +318,7 @@ with Plcrt(sys.argv[1]) as running:
     time.sleep(60)
 """
     command = [sys.executable, "-c", code, str(tmp_path / "flash")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as test:
+    with started(command, stdout=subprocess.PIPE, text=True) as test:
         pid = int(test.stdout.readline())
         assert is_alive(pid)
         test.kill()
@@ -341,7 +340,7 @@ def test_no_function_is_looked_up_by_the_linker_while_it_runs():
 
 def test_it_runs_without_any_line(tmp_path, eventually):
     command = [find_plcrt(), "--flash", str(tmp_path / "flash")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with started(command, stdout=subprocess.PIPE, text=True) as process:
         eventually(lambda: find_worker(process.pid))
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
@@ -353,7 +352,7 @@ def test_it_runs_without_any_line(tmp_path, eventually):
 def test_two_do_not_share_a_serial_device(tmp_path):
     ours, theirs = os.openpty()
     options = ["--serial", os.ttyname(theirs), "--flash"]
-    with subprocess.Popen([find_plcrt(), *options, str(tmp_path / "a")]) as process:
+    with started([find_plcrt(), *options, str(tmp_path / "a")]) as process:
         with Connection(Wire(ours)) as connection:
             assert read_identity(Session(connection)).device_name == "plcrt"
             done = run_plcrt(*options, str(tmp_path / "b"))
@@ -401,7 +400,7 @@ class Wire:
 def test_it_serves_a_serial_device_by_its_path(tmp_path):
     ours, theirs = os.openpty()
     command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", os.ttyname(theirs), "--baud", "9600"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with started(command, stdout=subprocess.PIPE, text=True) as process:
         with Connection(Wire(ours)) as connection:
             assert read_identity(Session(connection)).device_name == "plcrt"
         os.close(theirs)

@@ -192,7 +192,7 @@ def test_ones_alone_are_the_udp_address_of_all(device, receiver):
     dialect = Dialect(receiver=bytes.fromhex(receiver), sender=b"\x12\x34")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
         line.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        line.settimeout(10)
+        line.settimeout(60)
         line.sendto(packet(dialect, 3, struct.pack("<HHI", 0xC202, 0x0400, 1)), ("127.255.255.255", int(port)))
         while line.recvfrom(600)[1] != (host, int(port)):
             pass  # of a device of another test on this machine

@@ -89,8 +89,8 @@ def test_the_shell_stops_and_starts_the_program(tool, plcrt, counter):
     assert answers == ["Application", "stopprg: done", "stop", "startprg: done", "run"]
 
 
-def test_scan_finds_the_device(tool, plcrt):
-    found = tool.ok("scan", "--port", plcrt.port)
+def test_scan_finds_the_device(tool, plcrt, eventually):
+    found = eventually(lambda: (done := tool("scan", "--port", plcrt.port, "--json")).status == 0 and done.json)
     assert len(found["devices"]) == 1
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from processes import started
 
 from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
@@ -39,6 +42,13 @@ def runs(pid: int) -> bool:
 
 def exists(pid: int) -> bool:
     return Path(f"/proc/{pid}").exists()
+
+
+def is_pending(pid: int, number: signal.Signals) -> bool:
+    """Whether a process has not taken a signal yet."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    masks = re.findall(r"^(?:SigPnd|ShdPnd):\s*(\w+)", status, re.MULTILINE)
+    return any(int(mask, 16) >> number - 1 & 1 for mask in masks)
 
 
 def answer(port: str) -> str:
@@ -72,15 +82,16 @@ def test_it_answers_on_the_same_line_after_a_death_and_says_what_it_died_of(tool
     assert any("was started again" in text and said in text for text in log_texts(tool, plcrt))
 
 
-def test_it_is_there_again_within_a_second(plcrt, kill_worker):
-    """The best of five: machines under load are slow."""
-    seconds = []
-    for _ in range(5):
+def test_it_is_there_again_within_a_second(plcrt, kill_worker, eventually):
+    """Once at least: machines under load are slow."""
+
+    def is_quick() -> bool:
         begin = time.monotonic()
         kill_worker(OUTSIDE)
         answer(plcrt.port)
-        seconds.append(time.monotonic() - begin)
-    assert min(seconds) < 1
+        return time.monotonic() - begin < 1
+
+    eventually(is_quick)
 
 
 def test_nothing_is_left_of_those_that_died(plcrt, kill_worker):
@@ -118,12 +129,13 @@ def test_a_worker_that_is_asked_to_end_ends_plcrt(plcrt):
     assert plcrt.process.wait(PATIENCE) == 0
 
 
-def test_a_second_signal_ends_both_at_once(plcrt):
+def test_a_second_signal_ends_both_at_once(plcrt, eventually):
     worker = plcrt.worker
     os.kill(worker, signal.SIGSTOP)
     plcrt.process.terminate()
     with pytest.raises(subprocess.TimeoutExpired):
         plcrt.process.wait(0.3)
+    eventually(lambda: not is_pending(plcrt.process.pid, signal.SIGTERM))  # two that wait are one
     plcrt.process.terminate()
     assert plcrt.process.wait(PATIENCE) == -signal.SIGTERM
     assert not runs(worker)
@@ -178,7 +190,7 @@ def test_it_runs_where_ended_children_are_ignored(tmp_path):
     """As a shell may start it; the kernel then forgets how a child ended."""
     ignore = lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # noqa: E731
     command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", "pty"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, preexec_fn=ignore) as process:
+    with started(command, stdout=subprocess.PIPE, preexec_fn=ignore) as process:
         assert process.stdout.readline()
         process.terminate()
         assert process.wait(PATIENCE) == 0
@@ -195,14 +207,23 @@ def test_a_serial_device_is_opened_again_by_the_next_worker(tmp_path, eventually
     import pty
 
     ours, theirs = pty.openpty()
-    command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", os.ttyname(theirs)]
-    with subprocess.Popen(command) as process:
+    line = os.ttyname(theirs)
+
+    def opened(pid: int) -> bool:
+        """Whether a process has the line open."""
+        for file in Path(f"/proc/{pid}/fd").iterdir():
+            with suppress(OSError):  # closed meanwhile
+                if os.readlink(file) == line:
+                    return True
+        return False
+
+    command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", line]
+    with started(command) as process:
         plcrt = Plcrt(tmp_path / "flash")
         plcrt.process = process
         worker = eventually(lambda: plcrt.worker)
-        opened = lambda pid: os.ttyname(theirs) in [os.readlink(f) for f in Path(f"/proc/{pid}/fd").iterdir()]  # noqa: E731
         eventually(lambda: opened(worker))
-        assert not opened(process.pid)  # a device that goes away is not held by the supervisor
+        eventually(lambda: not opened(process.pid))  # a device that goes away is not held by the supervisor
         os.kill(worker, OUTSIDE)
         eventually(lambda: plcrt.worker not in (None, worker))
         eventually(lambda: opened(plcrt.worker))

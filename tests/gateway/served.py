@@ -29,6 +29,13 @@ BAUD = 115200
 PATIENCE = 30.0
 
 
+def answer_on(pipe: Pipe) -> Frame:
+    """The next frame that says more than that a request waits for its turn."""
+    while (frame := pipe.receive(PATIENCE)).kind is Kind.WAIT:
+        pass
+    return frame
+
+
 class Served:
     """A controller with an application, the gateway that owns its line, and tools that use it."""
 
@@ -99,7 +106,7 @@ class Served:
     def call(self, pipe: Pipe, op: str, number: int = 7, **arguments: Any) -> Frame:
         """Asks as a guest; the answer."""
         pipe.send(document_frame(Kind.CALL, number, {"op": op, **arguments}), PATIENCE)
-        return pipe.receive(PATIENCE)
+        return answer_on(pipe)
 
     def close(self) -> None:
         for tool in self._open:

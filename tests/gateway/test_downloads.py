@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from fake_device import image_crc
-from served import PATIENCE, Gate, Served
+from served import PATIENCE, Gate, Served, answer_on
 from small_app import make_application
 
 from plctool.core import lib
@@ -129,7 +129,7 @@ def test_a_tool_that_leaves_in_mid_download_leaves_the_old_program_and_the_devic
     for offset in (0, 1000):
         message = block(image, offset, opened["session"])
         guest.send(Frame(Kind.STREAM, 8, Request(opened["generation"], 8.0, message, more=True).encode()), PATIENCE)
-    assert guest.receive(PATIENCE).kind is Kind.REPLY
+    assert answer_on(guest).kind is Kind.REPLY
     with pytest.raises(LinkError, match="is downloading"):
         other.read("Main.count")
     guest.close()

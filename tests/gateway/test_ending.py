@@ -9,6 +9,7 @@ import pytest
 from served import BAUD, PATIENCE, Gate, Served
 
 from plctool.errors import LinkError
+from plctool.gateway import server
 from plctool.gateway.client import Ended, connect, greet
 from plctool.gateway.frames import GOODBYE, Kind, document_frame
 
@@ -90,7 +91,10 @@ def test_one_that_wants_the_line_alone_gets_it_from_an_idle_gateway_only(
     eventually(lambda: served.has_ended)
 
 
-def test_the_device_learns_that_the_channel_closes(served: Served, eventually: Eventually) -> None:
+def test_the_device_learns_that_the_channel_closes(
+    served: Served, monkeypatch: pytest.MonkeyPatch, eventually: Eventually
+) -> None:
+    monkeypatch.setattr(server, "_CLOSE_PATIENCE", PATIENCE)
     served.connect().read("Main.count")
     assert served.device._id
     served.gateway.stop("over", "over")

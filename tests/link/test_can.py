@@ -86,21 +86,21 @@ def test_an_address_that_is_taken_or_claimed_is_left(wire: Wire) -> None:
     holder = wire.tool(first=200)
     other = wire.bus()
 
-    class Defender(can.Listener):
-        def on_message_received(self, msg: can.Message) -> None:
-            if msg.arbitration_id == BASE | ALL << 8 | 201:  # claimed by another one at the same time
-                other.send(
-                    can.Message(arbitration_id=msg.arbitration_id, data=b"\x41\0\0\0\1\2\3\4", is_extended_id=True)
-                )
-            elif msg.arbitration_id == BASE | ALL << 8 | 202:
-                other.send(
-                    can.Message(arbitration_id=msg.arbitration_id, data=b"\x42\0\0\0\1\2\3\4", is_extended_id=True)
-                )
+    class Contested(PythonCanBus):
+        """A bus where the others answer at once."""
 
-    with can.Notifier(other, [Defender()]):
-        late = wire.tool(first=201)
-        assert late.local_address == b"\x00\xcb"
-        late.close()
+        def send(self, message: can.Message) -> None:
+            super().send(message)
+            identifier = message.arbitration_id
+            # The first is claimed by another one at the same time, the second is taken.
+            kind = {BASE | ALL << 8 | 201: b"\x41", BASE | ALL << 8 | 202: b"\x42"}.get(identifier)
+            if kind:
+                data = kind + b"\0\0\0\1\2\3\4"
+                other.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=True))
+
+    late = CanTransport("virtual", Contested(wire.bus()), random_source=Fixed(201))
+    assert late.local_address == b"\x00\xcb"
+    late.close()
     holder.close()
     other.shutdown()
 

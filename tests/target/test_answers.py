@@ -18,7 +18,7 @@ def test_every_configuration_answers_the_name_service(make_board, config):
     board = make_board(config)
     board.power_on()
     with Connection(board.line()) as connection:
-        (node,) = connection.scan(10, enough=1)
+        (node,) = connection.scan(60, enough=1)
     assert node.device_name == "STM32F405"
 
 

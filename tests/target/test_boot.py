@@ -39,7 +39,7 @@ def test_every_configuration_answers_the_name_service(make_board, config):
     board = make_board(config)
     board.power_on()
     with Connection(board.line()) as connection:
-        (node,) = connection.scan(10, enough=1)
+        (node,) = connection.scan(60, enough=1)
     assert node.device_name.startswith(
         {"virt": "QEMU virt", "lm3s6965evb": "LM3S6965", "netduinoplus2": "STM32F405"}.get(MACHINE, "MPS2 AN")
     )

@@ -18,6 +18,7 @@ from plctool.link.transports import parse_link
 
 TOOL = 200  # an address that plctool has not, because it begins elsewhere
 PATIENCE = "20000"  # [ms]
+LISTEN_PATIENCE = 60.0  # [s]
 FLASHED = 1999, 3  # index and value of an element of the program
 
 pytestmark = pytest.mark.skipif(shutil.which("candump") is None, reason="there is no can-utils: make test-vcan")
@@ -29,6 +30,20 @@ def interface_of(bus: str) -> str:
 
 def identifier(target: int, source: int) -> int:
     return lib.CAN_ID_BASE | target << lib.CAN_TARGET_SHIFT | source
+
+
+def listeners(interface: str) -> int:
+    """How many filters the kernel has for frames of an interface."""
+    lines = [line.split() for file in Path("/proc/net/can").glob("rcvlist_*") for line in file.read_text().splitlines()]
+    return sum(words[:1] == [interface] for words in lines)
+
+
+def wait_for_listener(interface: str, before: int) -> None:
+    """Until there is one more; candump does not say when it listens."""
+    end = time.monotonic() + LISTEN_PATIENCE
+    while listeners(interface) <= before:
+        assert time.monotonic() < end, "candump does not listen"
+        time.sleep(0.01)
 
 
 @contextmanager
@@ -47,8 +62,9 @@ def test_a_scan_that_is_typed_is_answered_by_all(bus: str, tmp_path: Path) -> No
     interface = interface_of(bus)
     answers = f"{interface},{identifier(TOOL, 0):08X}:{identifier(0xFF, 0):08X}"
     dump = ["candump", "-L", "-n", str(len(NODES)), "-T", PATIENCE, answers]
+    before = listeners(interface)
     with subprocess.Popen(dump, stdout=subprocess.PIPE, text=True) as listening:
-        time.sleep(0.5)  # candump does not say when it listens
+        wait_for_listener(interface, before)
         request = f"{identifier(lib.CAN_TO_ALL, TOOL):08X}#{lib.CAN_FRAME_SCAN:02X}0A000401020304"
         subprocess.run(["cansend", interface, request], check=True)
         frames = [line.split()[2] for line in listening.communicate()[0].splitlines()]
@@ -73,8 +89,9 @@ def test_a_download_that_was_recorded_and_is_played_again_changes_nothing(
 ) -> None:
     interface = interface_of(bus)
     log = tmp_path / "flash.log"
+    before = listeners(interface)
     with started("candump", "-L", interface, output=log):
-        time.sleep(0.5)  # candump does not say when it listens
+        wait_for_listener(interface, before)
         with plctool.connect(bus + "1") as plc:
             plc.flash(image, force=True)
     frames = log.read_text().count("\n")

@@ -97,6 +97,7 @@ class SerialLine:
         back = Damage(damage.lose, damage.double, damage.flip, damage.seed + 1)
         self.to_device = _Direction(self._master, self._device, byte_time, damage)
         self.to_client = _Direction(self._device, self._master, byte_time, back)
+        self._moving = threading.Lock()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -110,6 +111,13 @@ class SerialLine:
         for fd in (self._device, self._master, self._slave):
             os.close(fd)
 
+    @property
+    def is_quiet(self) -> bool:
+        """Whether no byte is on its way."""
+        with self._moving:
+            ready, _, _ = select.select([self._master, self._device], [], [], 0)
+            return not (ready or self.to_device.queue or self.to_client.queue)
+
     def _run(self) -> None:
         directions = {self._master: self.to_device, self._device: self.to_client}
         while not self._stop.is_set():
@@ -117,10 +125,11 @@ class SerialLine:
             readable = [fd for fd, d in directions.items() if len(d.queue) < CHUNK]
             ready, _, _ = select.select(readable, [], [], 0.001 if waiting else 0.02)
             now = time.monotonic()
-            for d in directions.values():
-                d.give(now)
-            for fd in ready:
+            for fd, d in directions.items():
                 try:
-                    directions[fd].take()
+                    with self._moving:
+                        d.give(now)
+                        if fd in ready:
+                            d.take()
                 except OSError:  # the other end is gone for now
                     time.sleep(0.005)
