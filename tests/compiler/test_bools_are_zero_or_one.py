@@ -89,16 +89,46 @@ def test_every_result_is_the_byte_zero_or_one(level: int, terms: list[Term]) -> 
             assert plc.read("Main.raw") == [0x81 * term.value(values) for term in terms]
 
 
-def test_a_chain_of_twice_as_many_terms_is_twice_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("level", [0, 2, 3])
+def test_a_wrong_byte_in_a_bool_is_true_and_does_not_lead_out_of_an_array(level: int) -> None:
+    text = """PROGRAM Main
+    VAR flag AT %MB0 : BOOL; byte_ AT %MB0 : BYTE := 5; two : ARRAY[0..1] OF INT := [10, 11];
+        beside : ARRAY[0..9] OF INT; taken, answer : INT; small : INT(0..1); END_VAR
+    taken := two[BOOL_TO_INT(flag)];
+    two[BOOL_TO_INT(flag)] := 1234;
+    small := BOOL_TO_INT(flag);
+    IF flag THEN answer := 1; END_IF
+    END_PROGRAM"""
+    found = check_sources([Source("main.st", text)])
+    assert found.program, found.diagnostics
+    built = build_program(found.program, Options(find_target("x86_64-linux"), level))
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        assert [plc.read(f"Main.{name}") for name in ("taken", "two", "small", "answer", "flag")] == [
+            11, [10, 1234], 1, 1, True,
+        ]  # fmt: skip
+        assert not any(plc.read("Main.beside"))
+
+
+@pytest.mark.parametrize(
+    ("level", "statement"),
+    [(2, "b := {};".format), (2, "IF n = 1 AND {} THEN b := a; END_IF".format),
+     (3, "IF n = 1 AND {} THEN b := a; END_IF".format), (3, "IF {} THEN b := a; END_IF".format)],
+)  # fmt: skip
+def test_a_chain_of_twice_as_many_terms_is_twice_the_work(
+    monkeypatch: pytest.MonkeyPatch, level: int, statement: Callable[[str], str]
+) -> None:
     asked: list[int] = []
-    negates = lower_expr._negates
+    negates, is_stored = lower_expr._negates, lower_expr._is_stored
     monkeypatch.setattr(lower_expr, "_negates", lambda *args: asked.append(1) or negates(*args))
+    monkeypatch.setattr(lower_expr, "_is_stored", lambda *args: asked.append(1) or is_stored(*args))
     work = []
     for count in (50, 100):
         asked.clear()
-        text = f"PROGRAM Main VAR a, b : BOOL; END_VAR b := {' AND '.join(['a'] * count)}; END_PROGRAM"
+        text = f"PROGRAM Main VAR a, b : BOOL; n : INT; END_VAR {statement(' AND '.join(['a'] * count))} END_PROGRAM"
         found = check_sources([Source("main.st", text)])
         assert found.program, found.diagnostics
-        lower(found.program, Options(find_target("x86_64-linux")))
+        lower(found.program, Options(find_target("x86_64-linux"), level))
         work.append(len(asked))
+    assert work[0] > 50
     assert work[1] < 2.2 * work[0]

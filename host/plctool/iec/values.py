@@ -50,7 +50,7 @@ def decode(t: Type, data: bytes) -> Any:
     if isinstance(t, EnumType):
         return next((name for name, value in t.values.items() if value == number), number)
     if base.kind is Kind.BOOL:
-        return bool(number & 1)
+        return number != 0
     if base.kind is Kind.DATE:
         return format_date(number, base)
     if base.kind is Kind.CHAR:

@@ -18,6 +18,7 @@ from plctool.compiler.codegen.signatures import (
     SELF,
     block_signatures,
     parameter_list,
+    passed_type,
     returned_type,
     returned_variable,
 )
@@ -141,10 +142,10 @@ def _code_init(unit: Unit, variables: list[Variable]) -> None:
 def _global_init(unit: Unit, startup: Pou) -> None:
     """Initial values that are calculated, and FB_Init."""
     fn = Function(f"void @{GLOBAL_INIT}(ptr noalias nonnull readonly %ctx, i32 %init_retains)", unit.plain)
-    flag, text = fn.value("icmp ne i32 %init_retains, 0"), value_type(BOOL)
-    operand = flag if text == "i1" else fn.value(f"zext i1 {flag} to {text}")
+    flag = fn.value("icmp ne i32 %init_retains, 0")
+    operand = fn.value(f"zext i1 {flag} to {value_type(BOOL)}")
     # Not inlined, because it has lines and this has none.
-    fn.call(unit.symbol(startup), [CONTEXT, f"{text} {operand}"], " noinline")
+    fn.call(unit.symbol(startup), [CONTEXT, f"{passed_type(BOOL)} {operand}"], " noinline")
     fn.terminate("ret void")
     unit.module.add(GLOBAL_INIT, fn, linkage="")
 

@@ -141,6 +141,8 @@ def convert(frame: Frame, value: Value, source: Type, target: Type, *, rounding:
     fn = frame.fn
     if is_bool(target):
         return value if is_bool(source) else to_bool(frame, value, source)
+    if is_bool(source):  # it may index an array: a wrong byte in it must not lead out of that
+        value = to_bool(frame, value, source)
     if old == new:
         return value
     if old == "ptr" or new == "ptr":

@@ -128,11 +128,11 @@ def _is_one_test(frame: Frame, e: Binary) -> bool:
     return not options.target.compact and (options.opt_level < FASTEST or _is_stored(e))
 
 
-def _is_stored(e: Expr) -> bool:
-    """Whether a BOOL is made of variables only, which are bytes."""
-    if isinstance(e, Binary):
-        return e.op in LOGIC and _is_stored(e.left) and _is_stored(e.right)
-    return isinstance(e, Load) or (isinstance(e, Unary) and _is_stored(e.operand))
+def _is_stored(e: Expr, depth: int = 10) -> bool:
+    """Whether a BOOL is made of variables only, which are bytes. In how many levels is limited as in `_negates()`."""
+    if depth > 0 and isinstance(e, Binary):
+        return e.op in LOGIC and _is_stored(e.left, depth - 1) and _is_stored(e.right, depth - 1)
+    return isinstance(e, Load) or (depth > 0 and isinstance(e, Unary) and _is_stored(e.operand, depth - 1))
 
 
 @rule(VALUES, Binary)
