@@ -50,19 +50,20 @@ def fb_call(frame: Frame, s: FbCall) -> None:
         form = frame.form_of(s.block, s.dispatch)
         handed_on = [f"ptr {frame.raised}"] if form is Form.RAISING else []
         symbol = frame.unit.target_of(s.block, s.dispatch, form)
-        closed = frame.unit.closed.get(s.block)
-        context = [CONTEXT] if closed is None or closed.has_context else []
-        arguments = in_order(arguments, [*context, *handed_on, f"ptr {base}"])
-        _call(frame, s.block, symbol, arguments, (named, instance))
+        _call(frame, s.block, symbol, arguments, [*handed_on, f"ptr {base}"], (named, instance))
         if form is Form.RAISING:
             frame.after_call(s.pos)
     for variable, place in s.outputs:
         _copy_out(frame, _member(frame, s.block, instance, variable), frame.ref(place))
 
 
-def _call(frame: Frame, block: Pou, symbol: str, arguments: list[str], instances: tuple[Ref, ...]) -> None:
+def _call(
+    frame: Frame, block: Pou, symbol: str, inputs: list[str], others: list[str], instances: tuple[Ref, ...]
+) -> None:
     """The call itself. `instances`: the instance, in the ways that it is reached here."""
     closed = frame.unit.closed.get(block)
+    context = [CONTEXT] if closed is None or closed.has_context else []
+    arguments = in_order(inputs, [*context, *others])
     if closed is None:
         frame.fn.call(symbol, arguments)
         return
