@@ -54,6 +54,8 @@ def test_to_every_integer_type(source: str) -> None:
         @given(REALS)
         @example(math.nan)
         @example(-math.inf)
+        @example(2147483647.5)
+        @example(2147483647.75)
         def check(value: float) -> None:
             given_value = single(value) if source == "REAL" else value
             plc.write({"Main.x": given_value})

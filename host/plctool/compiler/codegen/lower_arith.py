@@ -213,7 +213,8 @@ def _by_instruction(frame: Frame, value: Value, text: str, width: int) -> Value 
     operand = fn.value(f"insertelement {vector} poison, {text} {value}, i32 0")
     wide = "64" if width == 64 else ""
     whole = fn.value(f"call i{width} @llvm.x86.{name}{wide}({vector} {operand})")  # the least one if it does not fit
-    beyond = fn.value(f"fcmp oge {text} {value}, {float_literal(2.0 ** (width - 1), 64)}")
+    limit = 2.0**31 - 0.5 if width == 32 and text == "double" else 2.0 ** (width - 1)  # becomes 2^31 (2^63)
+    beyond = fn.value(f"fcmp oge {text} {value}, {float_literal(limit, 64)}")
     whole = fn.value(f"select i1 {beyond}, i{width} {(1 << width - 1) - 1}, i{width} {whole}")
     no_number = fn.value(f"fcmp uno {text} {value}, {value}")
     return fn.value(f"select i1 {no_number}, i{width} 0, i{width} {whole}")
