@@ -363,12 +363,13 @@ class StructType(Type):
         self._size = align_up(max(end, 1), align)
 
     def padding_after(self, offset: int, size: int) -> int:
-        """How many bytes after the field there belong to none."""
+        """How many bytes between the field there and the next one belong to none. None after the last: a block that
+        is derived may have variables there."""
         if self.union:
             return 0
         end = offset + size
         following = bisect_left(self.fields, end, key=attrgetter("offset"))
-        return (self.fields[following].offset if following < len(self.fields) else self.size) - end
+        return self.fields[following].offset - end if following < len(self.fields) else 0
 
     def member(self, name: str) -> Field | None:
         key = name.casefold()
