@@ -97,11 +97,12 @@ def _inputs(frame: Frame, s: FbCall, instance: Ref) -> list[str]:
 
 
 def _passed(frame: Frame, value: Expr, lasting: bool) -> Value:
-    """What is passed: a scalar, or the address of a structure. `lasting`: what else the call needs may change that."""
+    """What is passed: a scalar, or the address of a structure, of a copy if the block could not read it there.
+    `lasting`: what else the call needs may change it."""
     if is_scalar(value.type):
         return frame.value(value)
     source = frame.aggregate(value)
-    if lasting:
+    if lasting or source.unaligned:
         copy = frame.temporary(value.type)
         frame.copy(copy, source, value.type.size)
         source = copy
