@@ -84,8 +84,12 @@ def literal_text(frame: Frame, text: str, *, wide: bool) -> Ref:
 
 
 def _length_of(text: str) -> Value:
-    """Up to the NUL that a constant may have ('ab$00c')."""
-    return number(len(text.partition("\0")[0]))
+    return number(len(_up_to_nul(text)))
+
+
+def _up_to_nul(text: str) -> str:
+    """What a constant means that has a NUL ('ab$00c')."""
+    return text.partition("\0")[0]
 
 
 def _terminate(frame: Frame, target: Ref, length: int) -> None:
@@ -106,6 +110,7 @@ def compare_strings(frame: Frame, op: BinaryOp, left: Ref, right: Ref) -> Value:
 def equals_literal(frame: Frame, ref: Ref, text: str) -> Value | None:
     """The i1 of a comparison with a short constant, without a loop; None when that is not possible."""
     assert isinstance(ref.type, StringType)
+    text = _up_to_nul(text)
     data, at = encode_text(text + "\0", ref.type), 0
     size = len(data)
     if ref.capacity.constant is None or size > _INLINE_COMPARE:
