@@ -287,7 +287,9 @@ def _exchange(frame: Frame, address: Value, old: Value, new: Value) -> Value:
 def _choose(frame: Frame, selector: Value, selector_type: Type, values: list[Value], text: str) -> Value:
     """MUX: the last value for every selector that is not the index of another one."""
     result = values[-1]
-    for index in reversed(range(len(values) - 1)):
+    limits = type_range(selector_type)
+    assert limits is not None
+    for index in reversed(range(min(len(values) - 1, limits[1] + 1))):
         hit = frame.fn.value(f"icmp eq {value_type(selector_type)} {selector}, {index}")
         result = frame.fn.value(f"select i1 {hit}, {text} {values[index]}, {text} {result}")
     return result
