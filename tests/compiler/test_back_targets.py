@@ -233,9 +233,19 @@ def test_stubs_jump_through_their_slot(slot: int) -> None:
     assert (lw >> 20, lw >> 15 & 31, lw >> 7 & 31, jr >> 15 & 31, jr & 0x7F) == (4 * slot, 27, 6, 6, 0x67)
 
 
-def test_a_stub_out_of_reach_is_an_error() -> None:
+@pytest.mark.parametrize(("machine", "slots"), [(Machine.THUMB, 1024), (Machine.THUMB_V6M, 64), (Machine.RISCV32, 512)])
+def test_a_stub_out_of_reach_is_an_error(machine: Machine, slots: int) -> None:
+    assert stub(machine, slots - 1)
     with pytest.raises(OutOfReach):
-        stub(Machine.THUMB_V6M, 64)
+        stub(machine, slots)
+
+
+@pytest.mark.parametrize("name", ["cortex-m0", "cortex-m3", "rv32imac"])
+def test_a_program_with_too_many_imports_is_refused(name: str) -> None:
+    target = find_target(name)
+    text = ir("define double @entry(double %x) {\n %y = fadd double %x, %x\n ret double %y\n}", target)
+    with pytest.raises(UsageError, match=r"too large for .* imports"):
+        link([emit_object(Part(text), Options(target))], target, ["entry"], 1024)
 
 
 def test_constants_are_reached_at_any_distance_from_the_code() -> None:

@@ -173,7 +173,13 @@ class _Linker:
         for slot, name in enumerate(names, self._first_slot):
             code += bytes(align_up(len(code), 4) - len(code))
             self._stubs[name] = len(code)
-            code += stub(self._target.machine, slot)
+            try:
+                code += stub(self._target.machine, slot)
+            except OutOfReach:
+                raise self._too_large(f"its imports and its functions of arithmetic ({name}) are too many") from None
+
+    def _too_large(self, why: str) -> UsageError:
+        return UsageError(f"The program is too large for {self._target.name}: {why}.", "too-large")
 
     def _resolved(self, symbol: _ElfSymbol) -> _ElfSymbol:
         """The definition, which may be in another object, or the symbol itself when there is none."""
@@ -211,10 +217,7 @@ class _Linker:
             try:
                 apply(code, Relocation(section.offset + offset, target, addend, function, paired))
             except OutOfReach:
-                raise UsageError(
-                    f"The program is too large for {self._target.name}: '{symbol.name}' is out of reach of its caller.",
-                    "too-large",
-                ) from None
+                raise self._too_large(f"'{symbol.name}' is out of reach of its caller") from None
 
     def _check_pages(self, section: _Section) -> None:
         """AArch64: every low part must have the ADRP of exactly its target, which becomes an ADR."""

@@ -243,16 +243,20 @@ ABSOLUTE: dict[Machine, dict[int, int]] = {
 }
 
 
+_SLOTS = {Machine.THUMB: 4096 // 4, Machine.THUMB_V6M: 2 * 128 // 4, Machine.RISCV32: 2048 // 4}  # that a stub reaches
+
+
 def stub(machine: Machine, slot: int) -> bytes:
-    """Jumps to import `slot`; the base of the import table is in r9 (Thumb) or s11 (RISC-V)."""
+    """Jumps to import `slot`; the base of the import table is in r9 (Thumb) or s11 (RISC-V). OutOfReach if there is
+    none so far from it."""
+    if slot >= _SLOTS[machine]:
+        raise OutOfReach
     if machine is Machine.THUMB:  # ldr.w ip, [r9, #4*slot]; bx ip; nop
         return struct.pack("<HHHH", 0xF8D9, 0xC000 | 4 * slot, 0x4760, 0xBF00)
     if (
         machine is Machine.THUMB_V6M
     ):  # push {r4}; mov r4, r9; adds r4, #128*n; ldr r4, [r4, #..]; mov ip, r4; pop {r4}; bx ip; nop
         far, near = slot // 32, slot % 32
-        if far > 1:
-            raise OutOfReach
         return struct.pack(
             "<HHHHHHHH", 0xB410, 0x464C, 0x3400 | 128 * far, 0x6824 | near << 6, 0x46A4, 0xBC10, 0x4760, 0xBF00
         )
