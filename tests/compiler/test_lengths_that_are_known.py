@@ -22,6 +22,17 @@ CYCLES = 3
 KINDS = ("program", "block", "function")
 OPTIMISED = len(KINDS)  # programs: one of each
 DECLARATIONS = "".join(f"{name} : STRING[{capacity}]; " for name, capacity in CAPACITIES.items())
+OTHER_NAMES = "p : POINTER TO BYTE; holder : Holder; " + "".join(
+    f"to_{name} : POINTER TO STRING[{capacity}]; " for name, capacity in CAPACITIES.items()
+)
+UNITS = """
+FUNCTION Change : STRING[9] VAR_IN_OUT x : STRING; END_VAR x := 'changed'; Change := '*'; END_FUNCTION
+FUNCTION Twice : STRING[9] VAR_INPUT x : STRING; END_VAR Twice := CONCAT(x, x); END_FUNCTION
+FUNCTION_BLOCK Holder VAR_IN_OUT held : STRING; END_VAR
+METHOD Put held := 'put'; END_METHOD
+METHOD Marked : STRING Marked := CONCAT('-', held); END_METHOD
+END_FUNCTION_BLOCK
+"""
 
 
 Step = tuple[str, Callable[[], None]]  # a statement, and what it does
@@ -82,6 +93,9 @@ class Model:
             self._assign(y, "changed")
             self._assign(x, (t(x) + "*")[:LONGEST_RESULT])
 
+        def marked() -> None:
+            self._assign(x, ("-" + t("b"))[:80])
+
         text, change = choose(
             [
                 (f"{x} := '{literal}';", lambda: self._assign(x, literal)),
@@ -98,6 +112,11 @@ class Model:
                 (f"{x} := DELETE({x}, {n}, {k + 1});", lambda: self._assign(x, (t(x)[:k] + t(x)[k + n :])[:255])),
                 (f"{x} := DELETE({y}, {n}, {k + 1});", lambda: self._assign(x, (t(y)[:k] + t(y)[k + n :])[:255])),
                 (f"{x} := INSERT({x}, {y}, {k});", lambda: self._assign(x, (t(x)[:k] + t(y) + t(x)[k:])[:255])),
+                (f"to_{y} := ADR({y}); {x} := CONCAT({z}, to_{y}^);", lambda: self._assign(x, appended(z, y))),
+                (f"to_{x} := ADR({x}); {x} := CONCAT({z}, to_{x}^);", lambda: self._assign(x, appended(z, x))),
+                (f"to_{x} := ADR({x}); to_{x}^ := {y};", lambda: self._assign(x, t(y))),
+                (f"holder(held := b); b := '{literal}'; holder.Put();", lambda: self._assign("b", "put")),
+                (f"holder(held := b); {x} := holder.Marked();", marked),
                 *[(f"{x}[{place}] := 0;", cut)] * 2,
                 *[(f"p := ADR({x}) + {place}; p^ := 0;", cut)] * 2,
                 (f"IF LEN({y}) > {k} THEN {x} := '{literal}'; END_IF", conditional),
@@ -127,12 +146,10 @@ class Model:
 
 
 def program(model: Model, kind: str) -> str:
-    rest = f"p : POINTER TO BYTE; lengths : ARRAY[0..{STATEMENTS - 1}] OF INT; END_VAR"
-    change = "FUNCTION Change : STRING[9] VAR_IN_OUT x : STRING; END_VAR x := 'changed'; Change := '*'; END_FUNCTION\n"
-    twice = "FUNCTION Twice : STRING[9] VAR_INPUT x : STRING; END_VAR Twice := CONCAT(x, x); END_FUNCTION\n"
+    rest = f"{OTHER_NAMES} lengths : ARRAY[0..{STATEMENTS - 1}] OF INT; END_VAR"
     if kind == "block":
         return (
-            f"{change}{twice}FUNCTION_BLOCK Work VAR {DECLARATIONS} {rest}\n{model.body}\nEND_FUNCTION_BLOCK\n"
+            f"{UNITS}FUNCTION_BLOCK Work VAR {DECLARATIONS} {rest}\n{model.body}\nEND_FUNCTION_BLOCK\n"
             "PROGRAM Main VAR work : Work; END_VAR work(); END_PROGRAM"
         )
     if kind == "function":  # its variables, which live on the stack, are put back from those of the program
@@ -141,12 +158,12 @@ def program(model: Model, kind: str) -> str:
         kept = "".join(f"kept_{name} : STRING[{capacity}]; " for name, capacity in CAPACITIES.items())
         arguments = ", ".join(f"kept_{name} := {name}" for name in CAPACITIES)
         return (
-            f"{change}{twice}FUNCTION Work : BOOL VAR {DECLARATIONS} p : POINTER TO BYTE; END_VAR "
+            f"{UNITS}FUNCTION Work : BOOL VAR {DECLARATIONS} {OTHER_NAMES} END_VAR "
             f"VAR_IN_OUT {kept} lengths : ARRAY[0..{STATEMENTS - 1}] OF INT; END_VAR\n"
             f"{back}\n{model.body}\n{keep}\nEND_FUNCTION\n"
             f"PROGRAM Main VAR {DECLARATIONS} {rest} Work({arguments}, lengths := lengths); END_PROGRAM"
         )
-    return f"{change}{twice}PROGRAM Main VAR {DECLARATIONS} {rest}\n{model.body}\nEND_PROGRAM"
+    return f"{UNITS}PROGRAM Main VAR {DECLARATIONS} {rest}\n{model.body}\nEND_PROGRAM"
 
 
 @pytest.mark.parametrize("seed", range(9))

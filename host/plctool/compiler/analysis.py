@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from plctool.compiler.typed import (
-    AddressOf,
     Assign,
     Call,
     Const,
@@ -12,13 +11,16 @@ from plctool.compiler.typed import (
     For,
     Load,
     MemberPlace,
+    Place,
     Pou,
     SelfPlace,
     Storage,
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.compiler.typed_nodes import referenced_places, root_of, walk, written_places
+from plctool.iec.areas import EXCLUSIVE_AREAS
+from plctool.iec.types import ArrayType, StructType, Type
 
 
 def only_copies(pou: Pou) -> bool:
@@ -38,13 +40,15 @@ class Effects:
         known = self._local.get(pou)
         if known is None:
             self._local[pou] = False  # the answer within a recursion
-            known = pou.external is None and all(self._is_local_node(node) for node in walk(pou.body))
+            known = pou.external is None and all(self._is_local_node(node, pou) for node in walk(pou.body))
             self._local[pou] = known
         return known
 
-    def _is_local_node(self, node: object) -> bool:
+    def _is_local_node(self, node: object, pou: Pou) -> bool:
         if isinstance(node, VarPlace):
-            return node.var.storage in (Storage.LOCAL, Storage.REFERENCE)
+            if node.var.storage is Storage.REFERENCE:  # in a method it may be one of the block
+                return any(parameter.variable is node.var for parameter in pou.parameters)
+            return node.var.storage is Storage.LOCAL
         if isinstance(node, Call):
             return node.dispatch is None and self.is_local(node.function)
         if isinstance(node, FbCall):
@@ -56,13 +60,11 @@ class Effects:
         if not isinstance(loop.var, VarPlace) or loop.var.var.storage is Storage.REFERENCE:
             return None
         var = loop.var.var
-        if var in self._addressed_in(pou):
+        if self.has_address_taken(var, pou):
             return None
         for node in walk([*loop.body, loop.stop, loop.step] if loop.each_turn else loop.body):
-            for place in written_places(node):
-                root = root_of(place)
-                if root is var or (root is None and var.storage is not Storage.LOCAL):
-                    return None
+            if any(self.may_share(place, var, pou) for place in written_places(node)):
+                return None
             if var.storage is not Storage.LOCAL and not self._leaves_alone(node):
                 return None
         return var
@@ -72,15 +74,38 @@ class Effects:
             return node.dispatch is None and self.is_local(node.function)
         return not isinstance(node, FbCall)
 
-    def has_address_taken(self, variable: Variable, pou: Pou) -> bool:
-        """Whether the POU takes the address of a variable or of a part of it."""
-        return variable in self._addressed_in(pou)
+    def may_share(self, place: Place, variable: Variable, pou: Pou) -> bool:
+        """Whether a place that the POU names may have memory of a variable that it names. `variable`: a local one only
+        if its address is not taken."""
+        root = root_of(place)
+        if root is None:
+            return variable.storage is not Storage.LOCAL
+        return root is variable or may_overlap(root, variable, pou)
 
-    def _addressed_in(self, pou: Pou) -> set[Variable]:
-        """Variables whose address the POU takes."""
+    def has_address_taken(self, variable: Variable, pou: Pou) -> bool:
+        """Whether the POU takes the address of a variable, or of a part of it, so that it may be kept."""
         known = self._addressed.get(pou)
         if known is None:
-            places = [node.place for node in walk(pou.body) if isinstance(node, AddressOf)]
+            places = [place for node in walk(pou.body) for place in referenced_places(node)]
             known = {root for place in places if (root := root_of(place)) is not None}
             self._addressed[pou] = known
-        return known
+        return variable in known
+
+
+def may_overlap(one: Variable, other: Variable, pou: Pou | None) -> bool:
+    """Whether two variables that a POU names, none of them a reference, may have the same memory."""
+    if one.storage is other.storage is Storage.AREA:
+        if one.area is not other.area or one.area in EXCLUSIVE_AREAS:
+            return False
+        return one.offset < other.offset + other.type.size and other.offset < one.offset + one.type.size
+    if {one.storage, other.storage} != {Storage.AREA, Storage.SELF}:
+        return False
+    outside = one if one.storage is Storage.AREA else other
+    return pou is not None and pou.instance is not None and _holds(outside.type, pou.instance.root)
+
+
+def _holds(t: Type, block: StructType) -> bool:
+    """Whether a variable of the type is or contains an instance of a block, or of one that is derived from it."""
+    if isinstance(t, ArrayType):
+        return _holds(t.element, block)
+    return isinstance(t, StructType) and (t.root is block or any(_holds(f.type, block) for f in t.fields))

@@ -16,3 +16,6 @@ class Area(Enum):
     OUTPUT = int(lib.APP_AREA_OUTPUT)
     MEMORY = int(lib.APP_AREA_MEMORY)
     CODE = int(lib.APP_AREA_CODE)
+
+
+EXCLUSIVE_AREAS = frozenset((Area.DATA, Area.RETAIN))  # in the others variables may overlap (%MW0, %MX0.3)

@@ -8,7 +8,7 @@ from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_body import write_body, write_calls
 from plctool.compiler.codegen.lower_classes import write_dispatcher
-from plctool.compiler.codegen.lower_frame import TAGGED_AREAS, Body, Frame, Ref, string_capacity
+from plctool.compiler.codegen.lower_frame import Body, Frame, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Form, Options, Unit, value_type
 from plctool.compiler.codegen.partition import Part, parts
@@ -29,7 +29,7 @@ from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
 from plctool.debug.bounds import BoundsCheck
 from plctool.errors import UsageError
-from plctool.iec.areas import Area
+from plctool.iec.areas import EXCLUSIVE_AREAS, Area
 from plctool.iec.types import BOOL
 
 CODE_INIT = "code_init"
@@ -162,7 +162,7 @@ def _overwriting(variables: list[Variable]) -> set[Variable]:
     found = set()
     written: set[tuple[Area, int]] = set()
     for var in variables:
-        if var.area in TAGGED_AREAS or var.initial is None:
+        if var.area in EXCLUSIVE_AREAS or var.initial is None:
             continue
         own = {(var.area, var.offset + i) for i in range(var.type.size)}
         if own & written:

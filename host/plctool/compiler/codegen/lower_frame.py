@@ -23,7 +23,6 @@ from plctool.core import ffi, lib
 from plctool.iec.areas import Area
 from plctool.iec.types import DINT, MAX_ALIGN, Elementary, StringType, Type, alignment_at, base_of, is_scalar
 
-TAGGED_AREAS = frozenset((Area.DATA, Area.RETAIN))  # variables of the other areas may overlap (%MW0, %MX0.3)
 FrameType = TypeVar("FrameType", bound="Frame")
 Node = TypeVar("Node")
 Written = TypeVar("Written")
@@ -376,10 +375,19 @@ class Frame:
         lengths = {}
         if known and ref.direct and ref.pointer.fixed:
             here = range(ref.offset, ref.offset + ref.type.size)
-            lengths = {place: n for place, n in known.items() if place[0] != ref.pointer or place[1] not in here}
+            lengths = {
+                (base, at): n
+                for (base, at), n in known.items()
+                if (at not in here if base == ref.pointer else self._are_apart(base, ref.pointer))
+            }
         if length is not None and ref.direct and (ref.tag or ref.pointer.on_stack):  # which no other variable overlaps
             lengths[ref.pointer, ref.offset] = length
         self._lengths.set(lengths, self.fn.writes)
+
+    def _are_apart(self, one: Value, other: Value) -> bool:
+        """Whether two bases lead to different memory: an instance may be a global one, which is in an area."""
+        areas = self._bases.values()
+        return one.on_stack or other.on_stack or (one in areas) == (other in areas)
 
     def lengths(self) -> KnownLengths:
         """All lengths that are known."""

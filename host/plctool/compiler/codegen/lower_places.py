@@ -10,7 +10,6 @@ from plctool.compiler.codegen.lower_frame import (
     ACCESS_VIOLATION,
     ARRAY_BOUNDS,
     REFS,
-    TAGGED_AREAS,
     Frame,
     Ref,
     rule,
@@ -33,6 +32,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
+from plctool.iec.areas import EXCLUSIVE_AREAS
 from plctool.iec.types import BYTE, DINT, UDINT, ArrayType, PointerType, StringType, StructType, Type, is_scalar
 
 
@@ -43,7 +43,7 @@ def variable(frame: Frame, place: VarPlace) -> Ref:
     if var.storage is Storage.AREA:
         assert var.bit is None or place.type is BYTE, "a bit is written as a bit of its byte"
         tag = ""
-        if var.area in TAGGED_AREAS:
+        if var.area in EXCLUSIVE_AREAS:
             tag = frame.unit.tag("globals" if is_scalar(t) else (var.area, var.offset))
         return Ref(frame.area_base(var.area), var.offset, t, tag, True, string_capacity(t))
     if var.storage is Storage.SELF and var not in frame.locals:

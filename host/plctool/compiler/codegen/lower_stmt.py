@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from plctool.compiler.analysis import may_overlap
 from plctool.compiler.codegen.ir import FALSE
 from plctool.compiler.codegen.lengths import KnownLengths, known_by_all
 from plctool.compiler.codegen.lower_blocks import assign_aggregate
@@ -17,6 +18,7 @@ from plctool.compiler.typed import (
     CallStatement,
     Case,
     Continue,
+    DerefPlace,
     Exit,
     Expr,
     If,
@@ -24,9 +26,12 @@ from plctool.compiler.typed import (
     Jump,
     Label,
     Load,
+    Node,
     Place,
+    Pou,
     Raise,
     Return,
+    SelfPlace,
     Storage,
     Variable,
     VarPlace,
@@ -73,11 +78,15 @@ def _may_write_directly(frame: Body, target: Place, call: Call) -> bool:
     arguments = (
         call.args[1:] if pou.in_place and _is_whole(call.args[0], root) and _is_whole(target, root) else call.args
     )
-    return root is not None and all(
-        node.var is not root and node.var.storage is not Storage.REFERENCE
-        for node in walk(arguments)
-        if isinstance(node, VarPlace)
-    )
+    return root is not None and all(_is_apart(frame.pou, node, root) for node in walk(arguments))
+
+
+def _is_apart(pou: Pou | None, node: Node, target: Variable) -> bool:
+    """Whether a node of an argument does not name memory of the target."""
+    if isinstance(node, VarPlace):
+        same = node.var is target or node.var.storage is Storage.REFERENCE
+        return not same and not may_overlap(node.var, target, pou)
+    return not isinstance(node, DerefPlace | SelfPlace)
 
 
 @rule(STATEMENTS, Initialise)

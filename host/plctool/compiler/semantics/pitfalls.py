@@ -53,7 +53,7 @@ from plctool.compiler.typed import (
     VarPlace,
     While,
 )
-from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.compiler.typed_nodes import walk, written_places
 from plctool.iec.areas import Area
 from plctool.iec.types import (
     BOOL,
@@ -190,10 +190,8 @@ def _may_change(loop: While | Repeat | JumpLoop, variable: Variable, pou: Pou, e
         return True
     condition = loop.until if isinstance(loop, Repeat) else loop.condition
     for node in walk([loop.body, condition]):
-        for place in written_places(node):
-            root = root_of(place)
-            if root is variable or (root is None and variable.storage is not Storage.LOCAL):
-                return True
+        if any(effects.may_share(place, variable, pou) for place in written_places(node)):
+            return True
         if variable.storage is not Storage.LOCAL and _may_reach(node, effects):
             return True
     return False
