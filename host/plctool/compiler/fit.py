@@ -46,5 +46,5 @@ def board_meant(target: Target, board: Board | None, device: DeviceFile | None) 
 def _boards_like(target: Target) -> list[Board]:
     """The boards with this processor; of one that no board has, those with a processor of its size."""
     boards = {t.name: [b for b in known_boards() if b.device_id == getattr(lib, t.device_id)] for t in TARGETS.values()}
-    alike = [b for t in TARGETS.values() if t.compact == target.compact for b in boards[t.name]]
+    alike = [b for t in TARGETS.values() if t.small_flash == target.small_flash for b in boards[t.name]]
     return boards[target.name] or alike

@@ -65,7 +65,7 @@ class Board:
     @property
     def is_program(self) -> bool:
         """Whether it is plcrt, which does not know what board it runs on unless its user says so."""
-        return not TARGETS[self.target].compact
+        return not TARGETS[self.target].small_flash
 
     @property
     def title(self) -> str:

@@ -8,6 +8,8 @@ from enum import Enum
 
 from plctool.errors import UsageError
 
+FASTEST = 3  # the level of optimisation that is for speed only
+
 
 class Machine(Enum):
     """Instruction sets, as far as the linker distinguishes them."""
@@ -53,18 +55,18 @@ class Target:
         return self.machine is not Machine.THUMB_V6M
 
     @property
-    def compact(self) -> bool:
+    def small_flash(self) -> bool:
         """Whether programs are in a small flash."""
         return self.pointer_size == 4
 
     @property
     def shortens(self) -> bool:
         """Whether instructions are of different length, and the short ones reach only some of the registers."""
-        return self.compact and self.machine is not Machine.THUMB_V6M
+        return self.small_flash and self.machine is not Machine.THUMB_V6M
 
     def saves_room(self, opt_level: int) -> bool:
         """Whether code for a small flash is to stay small, at that level of optimisation."""
-        return self.compact and opt_level < 3
+        return self.small_flash and opt_level < FASTEST
 
 
 TARGETS: dict[str, Target] = {

@@ -1,4 +1,5 @@
-"""From the typed program to LLVM IR: one module with an external function per task and one for initialisation."""
+"""From the typed program to LLVM IR: one module with an external function per task, those for initialisation and one
+for the end."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ from plctool.compiler.codegen.partition import Part, parts
 from plctool.compiler.codegen.sections import sections
 from plctool.compiler.codegen.signatures import (
     CONTEXT,
+    CONTEXT_PARAMETER,
     SELF,
     block_signatures,
     parameter_list,
@@ -99,7 +101,7 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
 def _task_entry(unit: Unit, number: int, task: Task) -> str:
     """Calls the programs of a task in order."""
     name = f"task.{number}"
-    fn = Function(f"void @{name}(ptr noalias nonnull readonly %ctx)", unit.plain)
+    fn = Function(f"void @{name}({CONTEXT_PARAMETER})", unit.plain)
     for pou in task.programs:
         fn.call(unit.symbol(pou), [CONTEXT])
     fn.terminate("ret void")
@@ -125,7 +127,7 @@ def _pou(unit: Unit, pou: Pou, effects: Effects, form: Form) -> None:
 
 def _code_init(unit: Unit, variables: list[Variable]) -> None:
     """Gives all variables their constant initial values; what is kept is put back afterwards, by the runtime."""
-    fn = Function(f"void @{CODE_INIT}(ptr noalias nonnull readonly %ctx)", unit.plain)
+    fn = Function(f"void @{CODE_INIT}({CONTEXT_PARAMETER})", unit.plain)
     frame = Frame(unit, fn, None)
     overwriting = _overwriting(variables)
     for var in variables:
@@ -141,7 +143,7 @@ def _code_init(unit: Unit, variables: list[Variable]) -> None:
 
 def _global_init(unit: Unit, startup: Pou) -> None:
     """Initial values that are calculated, and FB_Init."""
-    fn = Function(f"void @{GLOBAL_INIT}(ptr noalias nonnull readonly %ctx, i32 %init_retains)", unit.plain)
+    fn = Function(f"void @{GLOBAL_INIT}({CONTEXT_PARAMETER}, i32 %init_retains)", unit.plain)
     flag = fn.value("icmp ne i32 %init_retains, 0")
     operand = fn.value(f"zext i1 {flag} to {value_type(BOOL)}")
     # Not inlined, because it has lines and this has none.
@@ -151,7 +153,7 @@ def _global_init(unit: Unit, startup: Pou) -> None:
 
 
 def _global_exit(unit: Unit, shutdown: Pou) -> None:
-    fn = Function(f"void @{GLOBAL_EXIT}(ptr noalias nonnull readonly %ctx)", unit.plain)
+    fn = Function(f"void @{GLOBAL_EXIT}({CONTEXT_PARAMETER})", unit.plain)
     fn.call(unit.symbol(shutdown), [CONTEXT], " noinline")
     fn.terminate("ret void")
     unit.module.add(GLOBAL_EXIT, fn, linkage="")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.codegen.ir import NULL, Value, float_literal, number
 from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, Frame, zero
-from plctool.compiler.codegen.lower_unit import Check, value_type
+from plctool.compiler.codegen.lower_unit import REALS, Check, value_type
 from plctool.compiler.typed import BinaryOp, Const, Intrinsic, Pos, Rounding, UnaryOp
 from plctool.iec.types import BOOL, Elementary, Kind, Type, base_of
 from plctool.image.targets import Machine
@@ -31,6 +31,11 @@ def is_real(t: Type) -> bool:
     return isinstance(base, Elementary) and base.kind is Kind.REAL
 
 
+def _suffix(text: str) -> str:
+    """What the names of intrinsics have for an LLVM type of reals."""
+    return "f32" if text == "float" else "f64"
+
+
 def is_bool(t: Type) -> bool:
     return base_of(t) is BOOL
 
@@ -49,7 +54,7 @@ def bits_of(t: Type) -> int:
 def constant(value: int | float | str, t: Type) -> Value:
     """A scalar constant as an LLVM operand."""
     text = value_type(t)
-    if text in ("float", "double"):
+    if text in REALS:
         return float_literal(float(value), bits_of(t))
     if text == "ptr":
         return Value(f"inttoptr (i64 {int(value)} to ptr)") if int(value) else NULL
@@ -60,7 +65,7 @@ def compare(frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type) -> V
     """The i1 of a comparison of two values of `t`."""
     integer, real = _COMPARE[op]
     text = value_type(t)
-    if text in ("float", "double"):
+    if text in REALS:
         return frame.fn.value(f"fcmp {real} {text} {left}, {right}")
     if op not in (BinaryOp.EQ, BinaryOp.NE):
         integer = ("s" if is_signed(t) else "u") + integer
@@ -70,7 +75,7 @@ def compare(frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type) -> V
 def binary(frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type) -> Value:
     """An operator that cannot fail. `t`: type of both operands and of the result."""
     text = value_type(t)
-    table = _REAL if text in ("float", "double") else _INTEGER
+    table = _REAL if text in REALS else _INTEGER
     return frame.fn.value(f"{table[op]} {text} {left}, {right}")
 
 
@@ -130,7 +135,7 @@ def unary(frame: Frame, op: UnaryOp, operand: Value, t: Type) -> Value:
     text = value_type(t)
     if op is UnaryOp.NOT:
         return frame.fn.value(f"xor {text} {operand}, {1 if is_bool(t) else -1}")
-    if text in ("float", "double"):
+    if text in REALS:
         return frame.fn.value(f"fneg {text} {operand}")
     return frame.fn.value(f"sub {text} 0, {operand}")
 
@@ -179,7 +184,7 @@ def _to_integer(frame: Frame, value: Value, source: Type, target: Type, rounding
             return whole
         value = _round_to_even(frame, value, text)
     word = "fptosi" if is_signed(target) else "fptoui"
-    suffix = "f32" if text == "float" else "f64"
+    suffix = _suffix(text)
     whole = frame.fn.value(f"call {integer} @llvm.{word}.sat.{integer}.{suffix}({text} {value})")
     return _away_from_zero(frame, value, text, whole) if rounding is Rounding.AWAY else whole
 
@@ -202,7 +207,7 @@ def _nearest_integer(frame: Frame, value: Value, text: str, target: Type) -> Val
 
 def _by_instruction(frame: Frame, value: Value, text: str, width: int) -> Value | None:
     """The nearest signed integer of 32 or 64 bits; the limits for what is beyond them, and 0 for what is no number."""
-    fn, target, real = frame.fn, frame.unit.target, "f32" if text == "float" else "f64"
+    fn, target, real = frame.fn, frame.unit.target, _suffix(text)
     if target.machine is Machine.AARCH64:
         return fn.value(f"call i{width} @llvm.aarch64.neon.fcvtns.i{width}.{real}({text} {value})")
     if target.machine is Machine.THUMB and target.registers[1] and text == "float" and width == 32:
@@ -223,7 +228,7 @@ def _by_instruction(frame: Frame, value: Value, text: str, width: int) -> Value 
 def _away_from_zero(frame: Frame, value: Value, text: str, whole: Value) -> Value:
     """`whole`: the LINT of a real, cut towards zero; all that is at most 2^63 in size is exact there."""
     fn = frame.fn
-    suffix = "f32" if text == "float" else "f64"
+    suffix = _suffix(text)
     rest = fn.value(f"fsub {text} {value}, {fn.value(f'sitofp i64 {whole} to {text}')}")
     for word, limit in (("oge", 0.5), ("ole", -0.5)):
         further = fn.value(f"fcmp {word} {text} {rest}, {float_literal(limit, 64)}")
@@ -238,7 +243,7 @@ def _round_to_even(frame: Frame, value: Value, text: str) -> Value:
     """Adding and taking away 2^23 (2^52) with the sign of the value leaves no room for a fraction; larger values
     have none. For processors without an instruction for it."""
     fn = frame.fn
-    suffix, magic = ("f32", 2.0**23) if text == "float" else ("f64", 2.0**52)
+    suffix, magic = _suffix(text), 2.0**23 if text == "float" else 2.0**52
     literal = float_literal(magic, 64)
     size = fn.value(f"call {text} @llvm.fabs.{suffix}({text} {value})")
     bias = fn.value(f"call {text} @llvm.copysign.{suffix}({text} {literal}, {text} {value})")
@@ -301,7 +306,7 @@ def extreme(frame: Frame, op: Intrinsic, left: Value, right: Value, t: Type) -> 
     text = value_type(t)
     if is_bool(t):
         return binary(frame, BinaryOp.AND if op is Intrinsic.MIN else BinaryOp.OR, left, right, t)
-    if text in ("float", "double"):
+    if text in REALS:
         first = compare(frame, BinaryOp.LT if op is Intrinsic.MIN else BinaryOp.GT, left, right, t)
         return select(frame, first, left, right, t)
     word = ("s" if is_signed(t) else "u") + op.value.lower()

@@ -35,7 +35,7 @@ from plctool.compiler.codegen.lower_frame import (
     rule,
 )
 from plctool.compiler.codegen.lower_string import compare_strings, equals_literal, literal_text
-from plctool.compiler.codegen.lower_unit import FASTEST, Check, value_type
+from plctool.compiler.codegen.lower_unit import REALS, Check, value_type
 from plctool.compiler.ranges import type_range, value_range
 from plctool.compiler.typed import (
     AddressOf,
@@ -53,6 +53,7 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.iec.types import UDINT, StringType, Type
+from plctool.image.targets import FASTEST
 
 _SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 
@@ -125,7 +126,7 @@ def _is_one_test(frame: Frame, e: Binary) -> bool:
     """Whether a condition of several operands is worked out and tested once. Small processors branch for each of them
     in less, and where -O3 has inlined much, comparisons are better left to branches."""
     options = frame.unit.options
-    return not options.target.compact and (options.opt_level < FASTEST or _is_stored(e))
+    return not options.target.small_flash and (options.opt_level < FASTEST or _is_stored(e))
 
 
 def _is_stored(e: Expr, depth: int = 10) -> bool:
@@ -143,7 +144,7 @@ def binary_value(frame: Frame, e: Binary) -> Value:
     if e.op is BinaryOp.AND and is_bool(e.type):
         return _both(frame, e)
     left, right = frame.value(e.left), frame.value(e.right)
-    if e.op in (BinaryOp.DIV, BinaryOp.MOD) and value_type(e.type) not in ("float", "double"):
+    if e.op in (BinaryOp.DIV, BinaryOp.MOD) and value_type(e.type) not in REALS:
         return divide(frame, e.op, left, right, e.type, e.pos, known_integer(e.right))
     return binary(frame, e.op, left, right, e.type)
 
@@ -297,7 +298,7 @@ def _choose(frame: Frame, selector: Value, selector_type: Type, values: list[Val
 
 @rule(AGGREGATES, Const)
 def constant_text(frame: Frame, e: Const) -> Ref:
-    """A text."""
+    """A constant string."""
     return literal_text(frame, str(e.value), wide=isinstance(e.type, StringType) and e.type.wide)
 
 

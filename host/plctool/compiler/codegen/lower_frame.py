@@ -15,7 +15,7 @@ from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.bounds import bounds_check
 from plctool.compiler.codegen.ir import NULL, FixedPointer, Function, Value, number
 from plctool.compiler.codegen.lengths import KnownLengths, Lengths
-from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, Check, Form, Unit, value_type
+from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, REALS, Check, Form, Unit, value_type
 from plctool.compiler.codegen.memory import Memory
 from plctool.compiler.internal import note_position
 from plctool.compiler.typed import Dispatch, Expr, Label, Place, Pos, Pou, Statement, Variable
@@ -531,7 +531,7 @@ def zero(t: Type) -> Value:
     text = value_type(t)
     if text == "ptr":
         return NULL
-    return Value("0.0") if text in ("float", "double") else number(0)
+    return Value("0.0") if text in REALS else number(0)
 
 
 DIVIDE_BY_ZERO = int(lib.RTSEXCPT_DIVIDEBYZERO)

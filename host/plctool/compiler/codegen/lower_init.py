@@ -1,4 +1,5 @@
-"""Initial values: of local variables at every call, of everything else in GlobalInit.
+"""Initial values: of local variables at every call, of everything else in CodeInit if they are constant, in GlobalInit
+if they are calculated.
 
 Memory is zeroed before, so only what is not zero is written. A struct or function block type with defaults gets one
 function that writes them; arrays are filled by loops; runs of different numbers are copied from a constant in the

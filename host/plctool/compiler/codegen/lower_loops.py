@@ -13,7 +13,7 @@ from plctool.compiler.typed import BinaryOp, For, Repeat, Statement, Variable, W
 
 @rule(STATEMENTS, While)
 def while_loop(frame: Body, s: While) -> None:
-    """The test comes before each round."""
+    """The test comes before each iteration."""
     fn = frame.fn
     again, body, end = fn.label("while"), fn.label("do"), fn.label("endwhile")
     fn.begin(again)

@@ -71,7 +71,7 @@ def _unsure_reference(frame: Frame, var: Variable, pos: Pos) -> Ref:
     assert frame.pou is not None and frame.pou.instance is not None
     tag = frame.unit.member_tag(frame.pou.instance, var.offset)
     pointer = frame.load(Ref(SELF, var.offset, PointerType(var.type), tag))
-    return _behind(frame, pointer, var.type, pos)
+    return _pointed_to(frame, pointer, var.type, pos)
 
 
 @rule(REFS, MemberPlace)
@@ -90,10 +90,10 @@ def member(frame: Frame, place: MemberPlace) -> Ref:
 def dereferenced(frame: Frame, place: DerefPlace) -> Ref:
     """What a pointer points to."""
     pointer = frame.value(place.pointer)
-    return _behind(frame, pointer, place.type, place.pos)
+    return _pointed_to(frame, pointer, place.type, place.pos)
 
 
-def _behind(frame: Frame, pointer: Value, t: Type, pos: Pos) -> Ref:
+def _pointed_to(frame: Frame, pointer: Value, t: Type, pos: Pos) -> Ref:
     """What a pointer that may be NULL points to."""
     if Check.NULL in frame.checks:
         frame.require(frame.fn.value(f"icmp ne ptr {pointer}, null"), ACCESS_VIOLATION, pos)

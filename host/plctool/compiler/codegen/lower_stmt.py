@@ -143,7 +143,7 @@ def exit_statement(frame: Body, s: Exit) -> None:
 
 @rule(STATEMENTS, Continue)
 def continue_statement(frame: Body, s: Continue) -> None:
-    """To the end of the round."""
+    """To the end of the iteration."""
     again, _, depth = frame.loops[-1]
     frame.leave(again, depth)
 

@@ -19,12 +19,11 @@ from plctool.debug.bounds import BoundsCheck
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import Elementary, Kind, PointerType, StructType, Type, base_of
-from plctool.image.targets import Target
+from plctool.image.targets import FASTEST, Target
 
 _ALWAYS = 'nounwind "no-builtins"'
 _PROBES = ' "probe-stack"="inline-asm"'
 _LARGE_FRAME, _LARGE_FRAME_OF_CONTROLLER = 4096, 256  # bytes of local variables
-FASTEST = 3  # the level that is for speed only
 _INLINED = 225  # LLVM's measure of what it inlines when it does not have to save room
 _INLINED_FOR_SPEED = 450  # where room is of no concern
 
@@ -72,8 +71,8 @@ class Options:
 
     @property
     def compact(self) -> bool:
-        """Whether loops are not unrolled and blocks of the library are not inlined: where memory is small, unless
-        level 3 asks for it."""
+        """Whether blocks of the library are not inlined, unless they are as small as a call: where memory is small and
+        level 3 does not ask for it."""
         return self.size or self.target.saves_room(self.opt_level)
 
 
@@ -91,6 +90,9 @@ def interface_signature(text: str) -> int:
 
 
 RAISE = External("iecraise", interface_signature("iecraise(UDINT)"), 0x00010000)
+
+
+REALS = ("float", "double")  # LLVM types
 
 
 def value_type(t: Type) -> str:
@@ -150,7 +152,7 @@ class Unit:
         self._program = self.plain
         if options.compact and not options.size:
             self._program = module.attributes(f'optsize {always} "function-inline-threshold"="{_INLINED}"')
-        elif options.opt_level >= FASTEST and not options.target.compact:
+        elif options.opt_level >= FASTEST and not options.target.small_flash:
             self._program = module.attributes(f'{always} "function-inline-threshold"="{_INLINED_FOR_SPEED}"')
         # LLVM's fast instruction selection (level 0) takes a call that only reads memory for dead.
         reads = " memory(read)" if options.opt_level > 0 else ""
@@ -248,10 +250,6 @@ class Unit:
     @property
     def imports_offset(self) -> int:
         return self.area_offset + int(lib.APP_AREA_COUNT) * self.target.pointer_size
-
-    @property
-    def context_size(self) -> int:
-        return self.imports_offset + self.target.pointer_size
 
     # ---- metadata ----
 

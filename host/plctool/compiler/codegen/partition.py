@@ -101,10 +101,11 @@ def _cut(functions: dict[str, Definition]) -> list[list[str]]:
 def _part(own: list[str], functions: dict[str, Definition], calls: dict[str, Counter[str]]) -> list[str]:
     """The functions of one part, and what they call in others: a copy when it may be inlined, else a declaration."""
     found, seen, todo = [], set(own), list(own)
+    here = frozenset(own)
     while todo:
         name = todo.pop()
         function, linkage = functions[name].function, functions[name].linkage
-        if name in own:
+        if name in here:
             found.append(function.definition("hidden" if linkage else ""))
         elif function.inlining == "noinline":
             found.append(function.declaration("hidden"))

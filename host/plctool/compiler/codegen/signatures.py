@@ -27,6 +27,8 @@ from plctool.iec.types import StringType, Type, is_scalar
 from plctool.image.targets import Target
 
 CONTEXT = "ptr %ctx"  # the argument that hands the context on
+_CONTEXT_IS = "noalias nonnull readonly"
+CONTEXT_PARAMETER = f"ptr {_CONTEXT_IS} %ctx"
 SELF = FixedPointer("%self")  # the instance
 RESULT = FixedPointer("%result")  # where a result goes that comes back in memory
 RESULT_CAPACITY = Value("%result.capacity")
@@ -58,12 +60,12 @@ def parameter_types(pou: Pou, parameter: Parameter, form: Form) -> list[str]:
         return ["ptr", "i32", "i32"] if form is Form.MEASURED else ["ptr", "i32"]
     if parameter.by_reference or not is_scalar(t):
         return ["ptr"]
-    return [f"{value_type(t)} {extension(t)}".rstrip() if pou.external else passed_type(t)]
+    return [passed_type(t)]
 
 
 def passed_type(t: Type) -> str:
-    """The LLVM type of a parameter inside the image; of a structure its address is passed. What is short fills its
-    register: constants and what is loaded do so anyway."""
+    """The LLVM type of a parameter; of a structure its address is passed. What is short fills its register: constants
+    and what is loaded do so anyway."""
     return f"{value_type(t)} {extension(t)}".rstrip() if is_scalar(t) else "ptr"
 
 
@@ -102,7 +104,7 @@ def formals(pou: Pou, handed: HandedInputs, form: Form, closed: Closed | None = 
     """The parameters of the function of a unit."""
     found = []
     if closed is None or closed.has_context:
-        found.append(Formal("ptr", Value("%ctx"), "noalias nonnull readonly"))
+        found.append(Formal("ptr", Value("%ctx"), _CONTEXT_IS))
     if form is Form.RAISING:
         found.append(Formal("ptr", RAISED, "noalias nonnull"))
     if pou.kind in (PouKind.FUNCTION_BLOCK, PouKind.METHOD):
