@@ -56,12 +56,13 @@ RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS
     return ERR_NO_OBJECT;
 }
 
-/* Write here, for a field bus: what the receive interrupt noted of SysTimeGetNs. */
+/* Of a UART the bytes leave by themselves: nothing to do. */
 void SysComDiscard(RTS_UI32 index)
 {
     RTS_UNUSED(index);
 }
 
+/* Write here, for a field bus: what SysTimeGetNs was in the last receive interrupt. */
 RTS_I64 SysComGetByteNs(RTS_UI32 index)
 {
     RTS_UNUSED(index);
