@@ -99,9 +99,9 @@ static RTS_RESULT send_frame(RTS_UI32 to, const RTS_UI8 *data, RTS_UI32 size)
 
 static RX_SESSION *find_rx(RTS_UI32 tool)
 {
-    FOR_EACH_RX(session)
-    if (session->tool == tool)
-        return session;
+    FOR_EACH_RX (session)
+        if (session->tool == tool)
+            return session;
     return NULL;
 }
 
@@ -163,10 +163,10 @@ static void take_data(RTS_UI32 tool, const CAN_FRAME *frame, RTS_UI32 now_ms)
 
 static void take_flow(RTS_UI32 tool, const CAN_FRAME *frame, RTS_UI32 now_ms)
 {
-    FOR_EACH_TX(session)
-    if (IsoTpIsSending(&session->tx) && session->tool == tool &&
-        IsoTpTakeFlow(&session->tx, frame->data, frame->size, now_ms) == ISOTP_TX_FAILED)
-        COMM_COUNT(counters.unsent);
+    FOR_EACH_TX (session)
+        if (IsoTpIsSending(&session->tx) && session->tool == tool &&
+            IsoTpTakeFlow(&session->tx, frame->data, frame->size, now_ms) == ISOTP_TX_FAILED)
+            COMM_COUNT(counters.unsent);
 }
 
 /* ---- scans ---- */
@@ -278,8 +278,7 @@ static TX_SESSION *claim_tx(RTS_UI32 tool)
 {
     TX_SESSION *found = NULL;
 
-    FOR_EACH_TX(session)
-    {
+    FOR_EACH_TX (session) {
         if (!IsoTpIsSending(&session->tx))
             found = session;
         else if (session->tool == tool)
@@ -332,8 +331,8 @@ static void transmit(RTS_UI32 now_ms)
 
     while (more) {
         more = false;
-        FOR_EACH_TX(session)
-        more = send_next(session, now_ms) || more;
+        FOR_EACH_TX (session)
+            more = send_next(session, now_ms) || more;
     }
 }
 
@@ -341,15 +340,13 @@ static void transmit(RTS_UI32 now_ms)
 
 static void expire(RTS_UI32 now_ms)
 {
-    FOR_EACH_RX(session)
-    {
+    FOR_EACH_RX (session) {
         if (IsoTpReceiveExpired(&session->rx, now_ms))
             COMM_COUNT(counters.aborted);
         if (session->tool != 0)
             send_flow(session);
     }
-    FOR_EACH_TX(session)
-    {
+    FOR_EACH_TX (session) {
         if (IsoTpIsUnheard(&session->tx, now_ms))
             RouterUnreachable(&can.driver, session->tool);
         if (IsoTpSendExpired(&session->tx, now_ms))

@@ -285,8 +285,8 @@ static RTS_UI32 count_of_host(const CONNECTION *one)
 {
     RTS_UI32 count = 0;
 
-    FOR_EACH_CONNECTION(connection)
-    count += !is_free(connection) && connection->host == one->host;
+    FOR_EACH_CONNECTION (connection)
+        count += !is_free(connection) && connection->host == one->host;
     return count;
 }
 
@@ -306,8 +306,7 @@ static CONNECTION *find_place(void)
 {
     CONNECTION *least = NULL;
 
-    FOR_EACH_CONNECTION(connection)
-    {
+    FOR_EACH_CONNECTION (connection) {
         if (is_free(connection))
             return connection;
         if (!RouterNeeds(&connection->driver) && (least == NULL || is_less(connection, least)))
@@ -345,15 +344,15 @@ static void open_all(void)
 {
     tcp.listener = SysSockOpen(SYSSOCK_TCP);
     tcp.waiting = RTS_INVALID_HANDLE;
-    FOR_EACH_CONNECTION(connection)
-    connection->socket = RTS_INVALID_HANDLE;
+    FOR_EACH_CONNECTION (connection)
+        connection->socket = RTS_INVALID_HANDLE;
 }
 
 static void free_ended(void)
 {
-    FOR_EACH_CONNECTION(connection)
-    if (connection->ended)
-        connection->socket = RTS_INVALID_HANDLE;
+    FOR_EACH_CONNECTION (connection)
+        if (connection->ended)
+            connection->socket = RTS_INVALID_HANDLE;
 }
 
 static void serve(CONNECTION *connection)
@@ -372,8 +371,8 @@ static void cycle(void)
         return;
     free_ended();
     accept_all();
-    FOR_EACH_CONNECTION(connection)
-    serve(connection);
+    FOR_EACH_CONNECTION (connection)
+        serve(connection);
 }
 
 static void close_all(void)
@@ -381,8 +380,7 @@ static void close_all(void)
     if (tcp.listener == NO_SOCKET)
         return;
     free_ended();
-    FOR_EACH_CONNECTION(connection)
-    {
+    FOR_EACH_CONNECTION (connection) {
         if (!is_free(connection)) {
             transmit(connection);
             end(connection);

@@ -49,8 +49,7 @@ static CONNECTION *find_place(void)
 {
     CONNECTION *idlest = all.connections;
 
-    FOR_EACH_CONNECTION(connection)
-    {
+    FOR_EACH_CONNECTION (connection) {
         if (connection->server == NULL)
             return connection;
         if (connection->link.moved_ns < idlest->link.moved_ns)
@@ -129,8 +128,7 @@ RTS_RESULT ModbusServerTcpOpen(MODBUS_SERVER *server, const SOCKADDRESS *own)
 
 void ModbusServerTcpClose(void)
 {
-    FOR_EACH_CONNECTION(connection)
-    {
+    FOR_EACH_CONNECTION (connection) {
         if (connection->server != NULL)
             ModbusTcpClose(&connection->link);
         connection->server = NULL;
@@ -147,8 +145,7 @@ void ModbusServerTcpPoll(RTS_I64 now_ns)
 {
     for (RTS_UI32 i = 0; i < all.count; i++)
         accept_all(&all.listeners[i], now_ns);
-    FOR_EACH_CONNECTION(connection)
-    {
+    FOR_EACH_CONNECTION (connection) {
         if (connection->server != NULL)
             serve(connection, now_ns);
     }
