@@ -71,8 +71,7 @@ void SimSetCycleLimit(RTS_UI32 ms);
 
 /* Who the device is from now on; the default is plctool's target for the machine it runs on. */
 void SimSetTarget(RTS_UI32 type, RTS_UI32 id, RTS_UI32 version);
-void SimSetBoard(const char *name);    /* the text stays; NULL: any board */
-void SimSetNodeName(const char *name); /* at most 31 characters are kept */
+void SimSetBoard(const char *name); /* the text stays; NULL: any board */
 
 enum { SIM_EVENT_NAME_SIZE = 64 };
 

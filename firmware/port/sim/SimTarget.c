@@ -9,20 +9,16 @@
 #include "Sim.h"
 #include "SysTarget.h"
 
-enum { NODE_NAME_SIZE = 32 };
-
 #if defined(__aarch64__)
 #define SIM_TARGET_ID TARGET_ID_AARCH64_LINUX
 #else
 #define SIM_TARGET_ID TARGET_ID_X86_64_LINUX
 #endif
 
-static char node_name[NODE_NAME_SIZE] = "simulator";
-
 static const char *board_name;
 
 static SYS_TARGET target = {
-    TARGET_TYPE_PROGRAMMABLE, SIM_TARGET_ID, 0x01000000, "plctool simulator", "plctool", node_name, "0",
+    TARGET_TYPE_PROGRAMMABLE, SIM_TARGET_ID, 0x01000000, "plctool simulator", "plctool", "simulator", "0",
 };
 
 const SYS_TARGET *SysTargetGet(void)
@@ -67,9 +63,4 @@ void SimSetTarget(RTS_UI32 type, RTS_UI32 id, RTS_UI32 version)
 void SimSetBoard(const char *name)
 {
     board_name = name;
-}
-
-void SimSetNodeName(const char *name)
-{
-    strncpy(node_name, name, NODE_NAME_SIZE - 1);
 }

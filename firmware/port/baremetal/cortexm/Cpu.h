@@ -23,7 +23,6 @@
 #define SYST_RVR REG32(0xE000E014u)
 #define SYST_CVR REG32(0xE000E018u)
 #define NVIC_ISER(n) REG32(0xE000E100u + 4u * (n))
-#define NVIC_ICER(n) REG32(0xE000E180u + 4u * (n))
 #define NVIC_ICPR(n) REG32(0xE000E280u + 4u * (n))
 #define NVIC_IPR(n) (*(volatile RTS_UI8 *)(uintptr_t)(0xE000E400u + (n)))
 #define NVIC_STIR REG32(0xE000EF00u) /* an IRQ written here becomes pending */
