@@ -315,10 +315,6 @@ static void take_can_option(OPTIONS *options, int option)
         parse_bit_rate(optarg, &options->can_options);
     } else if (option == OPTION_CAN_BASE) {
         options->can_options.base = parse_can_base(optarg);
-    } else if (option == OPTION_NAME) {
-        PortTargetSetName(optarg);
-    } else if (option == OPTION_BOARD) {
-        PortTargetSetBoard(parse_board(optarg));
     }
 }
 
@@ -342,6 +338,12 @@ static void take_option(OPTIONS *options, int option)
         break;
     case OPTION_RESET_PASSWORD:
         options->reset_password = true;
+        break;
+    case OPTION_NAME:
+        PortTargetSetName(optarg);
+        break;
+    case OPTION_BOARD:
+        PortTargetSetBoard(parse_board(optarg));
         break;
     case OPTION_VERSION:
         print_and_exit("plcrt " PLCRT_VERSION "\n");
