@@ -22,7 +22,10 @@ typedef struct {
     /* The flash as memory for reading, size bytes; NULL when it cannot be mapped. */
     const RTS_UI8 *mapped;
 
-    /* ERR_OK, or ERR_DEVICE when the hardware failed. SysFileFlash programs 16 bytes (FILE_ALIGN) at a time. */
+    /* ERR_OK, or ERR_DEVICE when the hardware failed or the flash has no such bytes; of program also when offset or size
+     * is not a multiple of program_size, or a unit is not erased (even if it is to keep its value); of erase also when
+     * no sector starts at offset. What is refused changes nothing: it is a mistake in the runtime or in the file map.
+     * SysFileFlash programs 16 bytes (FILE_ALIGN) at a time. */
     RTS_RESULT (*read)(RTS_UI32 offset, void *data, RTS_UI32 size);
     RTS_RESULT (*program)(RTS_UI32 offset, const void *data, RTS_UI32 size);
     RTS_RESULT (*erase)(RTS_UI32 offset); /* the sector that starts at offset */
@@ -34,9 +37,9 @@ const SYS_FLASH *SysFlashGet(void);
 
 /*
  * Makes `size` bytes of application code at flash `offset` executable for slot `slot` (0 or 1) and returns where they
- * run: the flash itself (execute in place), or RAM the port copies them to. 16-aligned. NULL when it is not possible.
- * Until SysFlashReleaseCode of that slot the code stays valid; the other slot may be mapped at the same time. From
- * main.
+ * run: the flash itself (execute in place), or RAM the port copies them to. 16-aligned. NULL when it is not possible:
+ * when they reach past the end of the flash, say, or are more than the RAM takes. Until SysFlashReleaseCode of that slot
+ * the code stays valid; the other slot may be mapped at the same time. From main.
  */
 const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size);
 void SysFlashReleaseCode(RTS_UI32 slot); /* does nothing when it is not mapped */

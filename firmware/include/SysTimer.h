@@ -23,16 +23,18 @@
 typedef void (*SYS_TIMER_CALLBACK)(void *param, RTS_I64 due_ns);
 
 /* Creates a stopped timer; priority 0 (highest) .. 31; interval 0: it is triggered. From main. ERR_NOMEMORY when all
- * timers are in use. */
+ * timers are in use, ERR_PARAMETER without a callback or with a priority above 31. */
 RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, RTS_UI32 priority,
                           RTS_HANDLE *timer);
 
-/* First call at once (due now), then once per interval, or trigger; without an interval a needless call now and then does
- * no harm. From main. */
+/* Starts a stopped timer: first call at once (due now), then once per interval, or trigger; without an interval a
+ * needless call now and then does no harm. From main. ERR_INVALID_HANDLE when there is no such timer, ERR_NOMEMORY when
+ * the system gives it no thread. */
 RTS_RESULT SysTimerStart(RTS_HANDLE timer);
 
 /* After it returns the callback is not running and is not called again; a callback that does not come to an end is the
- * watchdog's business. From main, never from a callback. */
+ * watchdog's business. Does nothing when it is stopped. From main, never from a callback. ERR_INVALID_HANDLE when there
+ * is no such timer. */
 RTS_RESULT SysTimerStop(RTS_HANDLE timer);
 
 /*
@@ -44,7 +46,7 @@ RTS_RESULT SysTimerStop(RTS_HANDLE timer);
  */
 void SysTimerTrigger(RTS_HANDLE timer, RTS_I64 due_ns);
 
-/* Stops and frees. */
+/* Stops and frees. From main, never from a callback. ERR_INVALID_HANDLE when there is no such timer. */
 RTS_RESULT SysTimerDelete(RTS_HANDLE timer);
 
 /* How many due times were skipped since the timer was created; 0 when there is no such timer. From main. */
