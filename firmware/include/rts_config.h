@@ -504,9 +504,9 @@
 #define SRV_INFORMATION 1
 #endif
 
-/* 1: what clients of others ask for (docs/compatibility.md): single cycle, deletion, addresses of areas, operation
- * mode, node name, names of loggers and components, refusals in the places where they look for them; 1.5 KiB of
- * flash. */
+/* 1: what clients of others ask for (docs/compatibility.md): single cycle, which `plctool cycle` needs too, deletion,
+ * addresses of areas, operation mode, node name, names of loggers and components, refusals in the places where they
+ * look for them; 1.5 KiB of flash. */
 #ifndef SRV_OTHER_CLIENTS
 #define SRV_OTHER_CLIENTS 0
 #endif
