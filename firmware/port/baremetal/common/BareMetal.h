@@ -108,17 +108,17 @@ void BoardAlarmSet(RTS_UI32 ns);
 #define BOARD_WATCHDOG_IS_MASKED 0
 #endif
 
-/* The hardware watchdog resets the controller unless the main loop kicks it more often than every `ms`. Started once, before
- * CMInit, never stopped. One that cannot wait so long: docs/porting.md, step 8. */
+/* The hardware watchdog resets the controller unless the main loop kicks it more often than every `ms`. Started once,
+ * before CMInit, never stopped. One that cannot wait so long: docs/porting.md, step 8. */
 void BoardWatchdogStart(RTS_UI32 ms);
 void BoardWatchdogKick(void);
 
 /* The lamp that shows whether the program runs (RunLamp.c, the full configuration); empty for a board without one. */
 void BoardRunLamp(bool on);
 
-/* Whether interrupts have brought the main loop something to do since the last call (received bytes, room to send): else it
- * sleeps until the next interrupt. With interrupts masked, so that none comes between answer and sleep. OneUart.c has
- * it for a board with one serial line. */
+/* Whether interrupts have brought the main loop something to do since the last call (received bytes, room to send):
+ * else it sleeps until the next interrupt. With interrupts masked, so that none comes between answer and sleep.
+ * OneUart.c has it for a board with one serial line. */
 bool BoardHasWork(void);
 
 #endif
