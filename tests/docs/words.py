@@ -25,7 +25,7 @@ BANNED = {
     r"brok(?:en|e) (?:off|out of)|breaks (?:off|out of)": "aborted",
     r"(?:the|an?) \w+ that is none|is no such thing|that are none": "not a valid ...",
     r"the (?:one|ones) before(?! the)": "the previous one",
-    r"of a folder all": "for a directory, all",
+    r"of a folder all": "for a folder, all",
     r"by (?:itself|themselves) found|found by (?:itself|themselves)": "found automatically",
 }
 _PATTERN = re.compile("|".join(rf"(?P<w{i}>\b(?:{words})\b)" for i, words in enumerate(BANNED)), re.IGNORECASE)
