@@ -88,11 +88,6 @@ class LibraryFiles:
         """What is read of it."""
         return [self.path] if is_zip(self.path) else [self.path / LIBRARY_FILE, *files_read([self.path])]
 
-    @property
-    def manifest_path(self) -> str:
-        """What messages call its library.toml."""
-        return str(self.path / LIBRARY_FILE)
-
     def error(self, pos: Pos, message: str) -> UsageError:
         """A mistake in its library.toml."""
         return error_at(pos, message, self.manifest)

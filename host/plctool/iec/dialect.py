@@ -45,15 +45,3 @@ def find_dialect(name: str | None) -> Dialect:
         hint = did_you_mean(name, DIALECTS) or f"; there are {', '.join(DIALECTS)}"
         raise UsageError(f"There is no dialect '{name}'{hint}.", "bad-dialect")
     return DIALECTS[name]
-
-
-def differences() -> list[list[str]]:
-    """The rows of the table in the documentation: a subject, and what it is without a dialect and in each of them."""
-    systems = [OWN, *DIALECTS.values()]
-    return [
-        ["", *(dialect.name or "default" for dialect in systems)],
-        ["numbers and enumerations mixed", *("error" if "enum" in d.errors else "warning" for d in systems)],
-        ["FOR computes its end and step", *("each turn" if d.limits_each_turn else "once" for d in systems)],
-        ["`REAL_TO_BYTE(2.5)`, halves", *("3, away from zero" if d.reals_wrap else "2, to even" for d in systems)],
-        ["`REAL_TO_BYTE(300.0)`", *("44, the low bits" if d.reals_wrap else "255, the limit" for d in systems)],
-    ]

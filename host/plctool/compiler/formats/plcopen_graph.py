@@ -66,11 +66,6 @@ class Network:
         for element in self._in_order():
             self._execute(element)
 
-    @property
-    def has_blocks(self) -> bool:
-        """Whether there is anything to execute."""
-        return any(e.tag in _SINKS or e.tag == "block" for e in self._order)
-
     def _in_order(self) -> list[Element]:
         numbered = sorted((e for e in self._order if _number(e) > 0), key=_number)
         rest = [e for e in self._order if _number(e) <= 0 and (e.tag in _SINKS or e.tag == "block")]

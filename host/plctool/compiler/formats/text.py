@@ -117,11 +117,6 @@ class Text:
         return Source(path, "".join(self._parts), name, shared, original, pieces, findings)
 
 
-def lines_of(text: str) -> list[Chunk]:
-    """A whole file, line by line."""
-    return [Chunk(line, number, 1) for number, line in enumerate(_lines(text), 1)]
-
-
 def _lines(text: str) -> list[str]:
     """With their ends; only a newline ends a line, as in every other place of the compiler."""
     if "\n" not in text:
