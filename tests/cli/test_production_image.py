@@ -12,7 +12,7 @@ import pytest
 from intelhex import IntelHex
 
 from plctool.core import ffi, lib
-from plctool.image.board import known_boards
+from plctool.image.board import Board, board_of, known_boards, read_firmware
 
 PROGRAM = "PROGRAM Main VAR n : DINT; END_VAR n := n + 1; END_PROGRAM"
 TASKS = "".join(f"PROGRAM P{i} VAR n : DINT; END_VAR n := n + 1; END_PROGRAM\n" for i in range(3)) + (
@@ -145,10 +145,30 @@ def test_a_firmware_of_another_board_is_refused(tool: Any, scratch: Path, for_m3
     refused(done, "firmware of MPS2 AN386 (standard)")
 
 
+@pytest.mark.parametrize("board", [board for board in known_boards() if board.config], ids=lambda board: board.slug)
+def test_the_firmware_of_a_board_goes_with_its_name(scratch: Path, board: Board) -> None:
+    """With and without its configuration; the flash of one may be divided in another way than that of the others."""
+    (scratch / "fw.elf").write_bytes(elf(facts(board.slug)))
+    for name in (board.slug, board.slug.partition("/")[0]):
+        assert board_of(name, read_firmware(scratch / "fw.elf")) == board
+
+
+def test_a_configuration_of_ones_own_has_the_map_of_any_other(tool: Any, scratch: Path, for_m3: Path) -> None:
+    words = ("image", "app.cdl", "--board", "mps2-an385", "--firmware", "fw.elf", "-o", "x.hex")
+    for slug in ("mps2-an385/standard", "mps2-an385/full"):
+        (scratch / "fw.elf").write_bytes(elf(facts(slug, config=b"own")))
+        assert tool(*words).status == 0
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/full", config=b"own", sector_size=8192)))
+    refused(tool(*words), "another map", "Leave --board out")
+
+
 def test_a_firmware_with_another_map_is_refused(tool: Any, scratch: Path, for_m3: Path) -> None:
     (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard", sector_size=8192)))
     done = tool("image", "app.cdl", "--board", "mps2-an385/standard", "--firmware", "fw.elf", "-o", "x.hex")
     refused(done, "another map", "sectors have 0x2000, not 0x1000")
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/full", config=b"standard")))
+    done = tool("image", "app.cdl", "--board", "mps2-an385", "--firmware", "fw.elf", "-o", "x.hex")
+    refused(done, "another map of the flash than MPS2 AN385 (standard)", "slot B is at 0x28000, not 0x36000")
 
 
 def test_firmware_over_the_programs_is_refused(tool: Any, scratch: Path, for_m3: Path) -> None:

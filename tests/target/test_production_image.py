@@ -41,11 +41,12 @@ def check_burned(board, built, flash):
 def test_firmware_describes_its_board(make_board, build, tmp_path):
     """It is in the same file as the program, unless programs have a memory of their own."""
     built, elf = build(COUNTER), firmware(CONFIG)
-    if read_firmware(elf).board.flash.address is None:
-        assert production(built.path, None, elf, tmp_path / "memory.bin")["burn_apart"] == str(elf)
+    board_facts = read_firmware(elf).board
+    if board_facts.flash.address is None:
+        assert production(built.path, board_facts.slug, elf, tmp_path / "memory.bin")["burn_apart"] == str(elf)
         check_burned(make_board(), built, tmp_path / "memory.bin")
         return
-    production(built.path, None, elf, tmp_path / "all.hex")
+    production(built.path, board_facts.slug, elf, tmp_path / "all.hex")
     board = make_board()
     board.starts_from = ["-device", f"loader,file={tmp_path / 'all.hex'}"]
     with board:

@@ -205,14 +205,22 @@ def board_of(name: str | None, firmware: Firmware | None) -> Board:
             "the firmware of the other.",
             "other-firmware",
         )
-    for known in known_boards():
-        if _slug(known.name) == _slug(board.name) and known.flash != board.flash:
-            raise UsageError(
-                f"{firmware.path} has another map of the flash than {known.name} of this plctool: "
-                f"{_difference(board.flash, known.flash)}. Leave --board out to go by the firmware, or build it again.",
-                "other-firmware",
-            )
+    _check_map(firmware)
     return board
+
+
+def _check_map(firmware: Firmware) -> None:
+    """The flash of a firmware is that of its configuration here; of one that is not from here, that of any other of
+    the board."""
+    board = firmware.board
+    of_board = [known for known in known_boards() if _slug(known.name) == _slug(board.name)]
+    known = [k for k in of_board if k.config == board.config] or of_board
+    if known and all(k.flash != board.flash for k in known):
+        raise UsageError(
+            f"{firmware.path} has another map of the flash than {known[0].title} of this plctool: "
+            f"{_difference(board.flash, known[0].flash)}. Leave --board out to go by the firmware, or build it again.",
+            "other-firmware",
+        )
 
 
 def _difference(of_firmware: Flash, known: Flash) -> str:
