@@ -289,3 +289,14 @@ def test_a_damaged_hex_names_the_line(tool: Any, for_m3: Path, scratch: Path, da
     (scratch / "flash.hex").write_text("\n".join(lines))
     done = tool("info", "flash.hex")
     assert done.status == 2 and "is not an Intel HEX file, or damaged in line 5" in done.err
+
+
+@pytest.mark.parametrize("lines", [0, 1, -1])
+def test_a_hex_that_is_cut_off_at_the_end_of_a_line_is_refused(
+    tool: Any, for_m3: Path, scratch: Path, lines: int
+) -> None:
+    """Also without a line missing but the end record: all of the program is there then."""
+    tool("image", str(for_m3), "--board", "mps2-an385/standard", "-o", "flash.hex")
+    whole = (scratch / "flash.hex").read_text().splitlines(keepends=True)
+    (scratch / "flash.hex").write_text("".join(whole[:lines]))
+    refused(tool("info", "flash.hex"), "flash.hex is cut off: its end record is missing")

@@ -28,6 +28,7 @@ from plctool.image.file import TAG, describe_image, image_crc, parse_image, targ
 from plctool.image.limits import check_fit, needs_of_image
 
 BIN, HEX = ".bin", ".hex"
+_HEX_TYPE, _HEX_END = slice(7, 9), "01"  # where a line of a .hex says what it is, and that it is the last one
 _FIRST = 1  # number of the first seal, and of the first record
 _MOST_BIN = 64 * 1024 * 1024  # bytes; a file with more of them has mostly gaps
 _ALIGN = int(lib.FILE_ALIGN)
@@ -184,12 +185,15 @@ def _segments(path: Path, data: bytes) -> Iterator[Segment]:
         return
     content = IntelHex()
     try:
-        content.loadhex(io.StringIO(data.decode("ascii")))
+        text = data.decode("ascii")
+        content.loadhex(io.StringIO(text))
     except HexReaderError as error:
         line = f" in line {error.line}" if hasattr(error, "line") else ""
         raise UsageError(f"{path} is not an Intel HEX file, or damaged{line}; write it again.", "bad-image") from None
     except UnicodeDecodeError:
         raise UsageError(f"{path} is not an Intel HEX file, or damaged; write it again.", "bad-image") from None
+    if not any(line[_HEX_TYPE] == _HEX_END for line in text.splitlines()):
+        raise UsageError(f"{path} is cut off: its end record is missing; write or copy it again.", "bad-image")
     for start, end in content.segments():
         yield Segment(start, bytes(content.tobinarray(start=start, end=end - 1)))
 
