@@ -13,6 +13,7 @@ from intelhex import IntelHex
 
 from plctool.core import ffi, lib
 from plctool.image.board import Board, board_of, known_boards, read_firmware
+from plctool.image.production import production_pieces, write_production
 
 PROGRAM = "PROGRAM Main VAR n : DINT; END_VAR n := n + 1; END_PROGRAM"
 TASKS = "".join(f"PROGRAM P{i} VAR n : DINT; END_VAR n := n + 1; END_PROGRAM\n" for i in range(3)) + (
@@ -39,7 +40,7 @@ def for_m3(build: Callable[..., Path]) -> Path:
     return build(PROGRAM, "--target", "cortex-m3")
 
 
-def facts(slug: str, **changes: int | bytes) -> bytes:
+def facts(slug: str, **changes: int | bytes | list[tuple[int, int]]) -> bytes:
     """Those of a board, with changes."""
     index = [board.slug for board in known_boards()].index(slug)
     copy = ffi.new("BOARD_FACTS *", lib.SimBoard(index)[0])
@@ -107,6 +108,46 @@ def test_logs_of_a_used_device_are_overwritten(tool: Any, scratch: Path, for_m3:
         assert set(range(begin, begin + flash.files[file].size)) <= set(content.addresses())
     slot = FLASH + flash.files[lib.FILE_SLOT_B].offset
     assert all(content[address] == 0xFF for address in range(slot, slot + flash.sector_size))
+
+
+def test_a_bin_without_firmware_erases_only_what_is_for_programs(scratch: Path, for_m3: Path) -> None:
+    """Here sectors for firmware, of any size, come before those for programs and after them."""
+    whole = {board.slug: board for board in known_boards()}["mps2-an385/standard"].flash.files
+    moved = [(file.offset + 0x8000, file.size) for file in whole]
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard", flash_size=0x100000, file=moved)))
+    board = read_firmware(scratch / "fw.elf").board
+    assert write_production(scratch / "x.bin", production_pieces(for_m3.read_bytes(), board, None), board) == 0x21008000
+    assert (scratch / "x.bin").stat().st_size == 0x80000
+    assert (scratch / "x.bin").read_bytes().startswith(for_m3.read_bytes())
+
+
+def test_a_bin_that_would_erase_the_firmware_is_refused(tool: Any, scratch: Path, build: Any) -> None:
+    build(PROGRAM, "--target", "cortex-m4f")
+    done = tool("image", "app.cdl", "--board", "stm32f405/standard", "-o", "x.bin")
+    refused(done, "would erase 0x0800C000 to 0x0803FFFF", "--firmware", "write x.hex")
+    assert not (scratch / "x.bin").exists()
+    (scratch / "fw.elf").write_bytes(elf(facts("stm32f405/standard"), address=0x0800_0000))
+    done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.bin")
+    assert "burn it at 0x08000000" in done.out
+    assert (scratch / "x.bin").stat().st_size == 0x100000
+
+
+@pytest.mark.parametrize(
+    ("board", "address"), [("mps2-an385/full", "21000000"), ("lm3s6965-board/standard", "00000000")]
+)
+def test_the_address_of_a_bin_is_said(tool: Any, for_m3: Path, board: str, address: str) -> None:
+    words = ("image", "app.cdl", "--board", board, "-o")
+    assert f"burn it at 0x{address}" in tool(*words, "x.bin").out
+    assert "burn it at" not in tool(*words, "x.hex").out
+    assert tool(*words, "x.bin", "--json").json["burn_at"] == address
+    assert tool(*words, "x.hex", "--json").json["burn_at"] is None
+
+
+def test_info_of_a_bin_says_that_it_counts_from_0(tool: Any, for_m3: Path) -> None:
+    for name, addresses in (("x.bin", "file"), ("x.hex", "memory")):
+        assert tool("image", "app.cdl", "--board", "mps2-an385/standard", "-o", name).status == 0
+        assert tool("info", name, "--json").json["addresses"] == addresses
+        assert ("these count from its beginning" in tool("info", name).out) == (addresses == "file")
 
 
 def test_firmware_is_burned_too(tool: Any, scratch: Path, for_m3: Path) -> None:

@@ -10,8 +10,8 @@ from plctool.files import read_image
 
 
 def production(image: Path, board: str | None, firmware: Path | None, output: Path) -> Document:
-    """Writes what a programmer burns to `output`; "burn_apart" is the firmware that cannot be in it. Raises UsageError
-    when the parts do not go together."""
+    """Writes what a programmer burns to `output`; "burn_at" is the address that a .bin belongs to, "burn_apart" the
+    firmware that cannot be in it. Raises UsageError when the parts do not go together."""
     from plctool.image.board import board_of, read_firmware
     from plctool.image.file import image_crc, read_program
     from plctool.image.production import is_production, production_pieces, write_production
@@ -28,7 +28,7 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
             "other-board",
         )
     pieces = production_pieces(data, wanted, of_firmware)
-    write_production(output, pieces, wanted)
+    start = write_production(output, pieces, wanted)
     apart = None if firmware is None or wanted.flash.address is not None else str(firmware)
     return {
         "output": str(output),
@@ -38,6 +38,7 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
         "pieces": [
             {"address": f"{p.segment.address:08X}", "size": len(p.segment.data), "what": p.what} for p in pieces
         ],
+        "burn_at": None if start is None else f"{start:08X}",
         "burn_apart": apart,
     }
 

@@ -222,6 +222,8 @@ def production_text(document: dict[str, Any]) -> str:
     pieces = [{**p, "address": f"0x{p['address']}"} for p in document["pieces"]]
     head = f"{document['output']}: {document['board']} with program CRC {document['crc']}"
     lines = [head, table(pieces, ("address", "size", "what"))]
+    if document["burn_at"]:
+        lines.append(f"A .bin has no addresses: burn it at 0x{document['burn_at']}.")
     if document["burn_apart"]:
         lines.append(f"Programs have a memory of their own: burn {document['burn_apart']} into the processor as it is.")
     return "\n".join(lines)
@@ -231,6 +233,8 @@ def production_info_text(document: dict[str, Any]) -> str:
     """The parts, and each program as an image is described."""
     parts = [{**p, "address": f"0x{p['address']}"} for p in document["parts"]]
     lines = [table(parts, ("address", "size"))]
+    if document["addresses"] == "file":
+        lines.append("A .bin has no addresses: these count from its beginning.")
     for program in document["programs"]:
         seal = "without a valid seal, so that no device runs it" if program["seal"] is None else "sealed"
         image = {name: value for name, value in program.items() if name not in ("address", "seal")}

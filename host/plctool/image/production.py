@@ -128,14 +128,16 @@ def _commit_record(image: bytes, board: Board) -> bytes:
 # ---- files ----------------------------------------------------------------------------------------------------------
 
 
-def write_production(path: Path, pieces: Iterable[Piece], board: Board) -> None:
-    """Writes .hex: the pieces, or else everything from the first to the last byte, all of the flash included. Raises
-    UsageError."""
+def write_production(path: Path, pieces: Iterable[Piece], board: Board) -> int | None:
+    """Writes .hex: the pieces, or else everything from the first to the last byte. Returns the address that a .bin
+    belongs to. Raises UsageError."""
     segments = [piece.segment for piece in pieces]
     if path.suffix.lower() == HEX:
         write_atomically(path, _hex(segments))
-    else:
-        write_atomically(path, _bin(segments, board, path))
+        return None
+    start, end = _range(segments, board, path)
+    write_atomically(path, _bin(segments, board.flash.erased, start, end))
+    return start
 
 
 def _hex(segments: list[Segment]) -> bytes:
@@ -146,16 +148,36 @@ def _hex(segments: list[Segment]) -> bytes:
     return text.getvalue().encode("ascii")
 
 
-def _bin(segments: list[Segment], board: Board, path: Path) -> bytes:
-    base = board.flash.address or 0
-    start, end = min(base, segments[0].address), max(base + board.flash.size, segments[-1].end)
+def _range(segments: list[Segment], board: Board, path: Path) -> tuple[int, int]:
+    """Begin and end of a .bin: with firmware, or in a memory of their own, all of the flash; else what programs and
+    logs have of it, because firmware may be in the other sectors. Raises UsageError when that is no single range."""
+    flash, base = board.flash, board.flash.address or 0
+    used = _used(flash, base)
+    if flash.address is None or any(_is_outside(segment, used) for segment in segments):
+        start, end = min(base, segments[0].address), max(base + flash.size, segments[-1].end)
+    elif len(used) == 1:
+        return used[0]
+    else:
+        raise UsageError(
+            f"A .bin has no gaps: it would erase 0x{used[0][1]:08X} to 0x{used[1][0] - 1:08X}, which is not for "
+            f"programs: firmware may be there. Give its ELF file with --firmware, or write {path.stem}.hex.",
+            "bad-output",
+        )
     if end - start > _MOST_BIN:
         raise UsageError(
             f"From 0x{start:08X} to 0x{end - 1:08X} is too much for a .bin, which has no gaps; write {path.stem}.hex, "
             "or leave --firmware out.",
             "bad-output",
         )
-    data = bytearray([board.flash.erased]) * (end - start)
+    return start, end
+
+
+def _is_outside(segment: Segment, used: list[tuple[int, int]]) -> bool:
+    return not any(begin <= segment.address < end for begin, end in used)
+
+
+def _bin(segments: list[Segment], erased: int, start: int, end: int) -> bytes:
+    data = bytearray([erased]) * (end - start)
     for segment in segments:
         data[segment.address - start : segment.end - start] = segment.data
     return bytes(data)
@@ -167,8 +189,9 @@ def is_production(path: Path) -> bool:
 
 
 def describe_production(path: Path, data: bytes) -> dict[str, Any]:
-    """What `plctool info` shows of a .bin or .hex: the parts with content, and the programs with their seals. Addresses
-    of a .bin count from its beginning. Raises UsageError when no program is in it."""
+    """What `plctool info` shows of a .bin or .hex: the parts with content, and the programs with their seals.
+    "addresses" of a .bin are those in the "file": they count from its beginning. Raises UsageError when no program is
+    in it."""
     segments = list(_segments(path, data))
     programs = [program for segment in segments for program in _programs(segment)]
     if not programs:
@@ -176,7 +199,8 @@ def describe_production(path: Path, data: bytes) -> dict[str, Any]:
             f"{path} has no program of plctool in it, or not all of one; make it with 'plctool image'.", "bad-image"
         )
     parts = [{"address": f"{s.address:08X}", "size": len(s.data)} for s in segments]
-    return {"file": str(path), "parts": parts, "programs": programs}
+    addresses = "file" if path.suffix.lower() == BIN else "memory"
+    return {"file": str(path), "addresses": addresses, "parts": parts, "programs": programs}
 
 
 def _segments(path: Path, data: bytes) -> Iterator[Segment]:
