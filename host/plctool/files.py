@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import errno
 import os
+import sys
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
 from plctool.errors import UsageError
 
+STDOUT = Path("-")  # in place of the path of an output
 _SHOWN = 80  # characters of an invalid path
 
 
@@ -66,6 +68,22 @@ def write_atomically(path: Path, data: bytes) -> None:
             raise
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror}.", "cannot-write") from None
+
+
+def write_output(path: Path, data: bytes) -> None:
+    """Writes what a command is for: to a file, or to the standard output if that is what its user named."""
+    if path != STDOUT:
+        write_atomically(path, data)
+        return
+    sys.stdout.flush()
+    sys.stdout.buffer.write(data)
+
+
+def file_path(text: str) -> Path:
+    """The path of an output that only a file or folder can be. Raises UsageError for the standard output."""
+    if text == str(STDOUT):
+        raise UsageError("- is no file, and this cannot be written to the standard output; name a file.", "bad-output")
+    return usable_path(text)
 
 
 def read_utf8(path: Path, code: str) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from plctool.errors import UsageError
-from plctool.files import usable_path
+from plctool.files import file_path, usable_path
 from plctool.iec.dialect import DIALECTS
 from plctool.image.targets import DEFAULT_TARGET, TARGETS
 from plctool.link.transports import TRANSPORTS, Value
@@ -56,7 +56,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build = command("build", "compile a program to an image")
     _add_sources(build)
     build.add_argument(
-        "-o", "--output", type=usable_path, metavar="IMAGE", help="default: app.cdl, of a project beside plc.toml"
+        "-o", "--output", type=file_path, metavar="IMAGE", help="default: app.cdl, of a project beside plc.toml"
     )
     target = build.add_argument(
         "--target", metavar="NAME", help=f"processor; default: that of the board, or {DEFAULT_TARGET}"
@@ -90,7 +90,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         metavar="FILE.elf",
         help="burn it as well; a board of your own is read from it",
     )
-    image.add_argument("-o", "--output", type=usable_path, required=True, metavar="FILE.hex|.bin")
+    image.add_argument("-o", "--output", type=file_path, required=True, metavar="FILE.hex|.bin")
 
     symbols = command("symbols", "list the variables of an image with their types")
     _add_image(symbols)
@@ -136,14 +136,15 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         help="of a simulated device, with value and time: Tank=late:150@T#5s (docs/io.md); may be repeated",
     )
     run.add_argument(
-        "--trace", nargs="+", default=[], metavar="NAME", help="write the values after each cycle to a CSV file"
-    )
+        "--trace", nargs="+", action="extend", default=[], metavar="NAME",
+        help="write the values after each cycle to a CSV file; may be repeated",
+    )  # fmt: skip
     run.add_argument(
         "-o",
         "--output",
         type=usable_path,
         metavar="FILE",
-        help="of --trace; default: trace.csv",
+        help="of --trace, - for the standard output; default: trace.csv",
     )
 
     test = command("test", "run the unit tests of a program in this process, on a virtual clock")
@@ -155,10 +156,10 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         metavar="PATTERN",
         help="only tests whose name contains PATTERN (or matches it, with * and ?)",
     )
-    test.add_argument("--junit", type=usable_path, metavar="FILE", help="write a report in JUnit's format as well")
+    test.add_argument("--junit", type=file_path, metavar="FILE", help="write a report in JUnit's format as well")
     test.add_argument(
         "--coverage",
-        type=usable_path,
+        type=file_path,
         metavar="DIR",
         help="say which lines ran, and write index.html and cobertura.xml into this folder",
     )
@@ -168,7 +169,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 
     xml = command("export", "write a program as PLCopen XML, for CODESYS, TwinCAT, OpenPLC Editor and Beremiz")
     _add_sources(xml)
-    xml.add_argument("-o", "--output", dest="xml", type=usable_path, required=True, metavar="FILE.xml")
+    xml.add_argument("-o", "--output", dest="xml", type=file_path, required=True, metavar="FILE.xml")
     _add_warnings(xml)
     _add_io_files(xml)
 
@@ -177,7 +178,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "sources", nargs="*", type=usable_path, metavar="FILE.st|DIR", help="for a folder, all sources in it"
     )
     export.add_argument(
-        "-o", "--output", type=usable_path, default=Path(), metavar="DIR", help="default: the current folder"
+        "-o", "--output", type=file_path, default=Path(), metavar="DIR", help="default: the current folder"
     )
     export.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
     export.add_argument(
@@ -265,7 +266,10 @@ def _add_file_actions(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_link(action("list", "list the files"))
     get = action("get", "copy a file from the device")
     get.add_argument("name", metavar="NAME", help="as 'plctool files list' shows it")
-    get.add_argument("-o", "--output", type=usable_path, metavar="FILE", help="default: its name, in this folder")
+    get.add_argument(
+        "-o", "--output", type=usable_path, metavar="FILE",
+        help="- for the standard output; default: its name, in this folder",
+    )  # fmt: skip
     _add_link(get)
     put = action("put", "copy a file to the device, in place of the previous one of its name")
     put.add_argument("file", type=usable_path, metavar="FILE")
@@ -277,7 +281,7 @@ def _add_file_actions(command: Callable[..., argparse.ArgumentParser]) -> None:
 
     action = _actions(command("source", "keep the sources of the program on the device, and get them back"))
     get = action("get", "write the sources that the device keeps into a folder")
-    get.add_argument("-o", "--output", type=usable_path, default=Path("source"), metavar="DIR", help="default: source")
+    get.add_argument("-o", "--output", type=file_path, default=Path("source"), metavar="DIR", help="default: source")
     _add_link(get)
     put = action("put", "put the sources of the program that is on the device there as well")
     _add_sources(put)
@@ -305,7 +309,7 @@ def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     io_map = action("map", "list the channels of an image with their variables and tasks")
     _add_image(io_map)
     init = action("init", "write a description with comments, to begin with")
-    init.add_argument("file", type=usable_path, nargs="?", default=Path("main.io.toml"), metavar="FILE.io.toml")
+    init.add_argument("file", type=file_path, nargs="?", default=Path("main.io.toml"), metavar="FILE.io.toml")
     init.add_argument("--device", type=usable_path, metavar="FILE.toml", help="what the vendor says of the board")
     _add_link(action("status", "show how the devices of the running program are"))
     scan = action("scan", "list what is on a bus")

@@ -14,7 +14,7 @@ from plctool.cli.io_documents import Document
 from plctool.cli.overwriting import check_not_read, check_output
 from plctool.cli.plants import attached, files_of_plant, plan_faults
 from plctool.errors import LinkError, PlcError, UsageError
-from plctool.files import read_image, write_atomically
+from plctool.files import STDOUT, read_image, write_atomically, write_output
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
@@ -369,7 +369,7 @@ def run(
             "values": reading.values,
             "cycles": tasks[0].cycles if tasks else 0,
             "time_ms": plc.now_ns / 1e6,
-            **({"trace": str(trace.path)} if trace else {}),
+            **({"trace": str(trace.path)} if trace and trace.path != STDOUT else {}),
         }
         return document, reading.texts
 
@@ -397,7 +397,7 @@ def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: 
     from plctool.trace_file import trace_csv
 
     lines = trace_csv(plc, trace.names, cycles, time_ms)
-    write_atomically(trace.path, "".join(lines).encode())
+    write_output(trace.path, "".join(lines).encode())
     plc.check_running()
 
 

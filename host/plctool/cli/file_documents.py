@@ -11,7 +11,7 @@ from plctool.cli.io_documents import Document
 from plctool.cli.source_archive import Archive, archive_of, unpacked
 from plctool.debug.symbols import find_symbols
 from plctool.errors import DeviceError, UsageError
-from plctool.files import write_atomically
+from plctool.files import write_atomically, write_output
 from plctool.link.file_services import SOURCE_NAME, SYMBOLS_NAME
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def list_files(plc: Plc) -> Document:
 def get_file(plc: Plc, name: str, output: Path | None, progress: Progress) -> Document:
     path = Path(name) if output is None else output
     data = plc.read_file(name, progress)
-    write_atomically(path, data)
+    (write_atomically if output is None else write_output)(path, data)
     return {"name": name, "file": str(path), "size": len(data)}
 
 

@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stdout, suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from plctool.cli import documents, io_documents, output
 from plctool.cli.arguments import pairs, parser
 from plctool.cli.io_documents import Document
 from plctool.cli.links import all_serial_ports, find_link, link_of
 from plctool.errors import InternalError, PlcError, UsageError
-from plctool.files import path_error
+from plctool.files import STDOUT, path_error
 from plctool.link.transports import Link
 from plctool.version import plctool_version
 
@@ -102,12 +102,13 @@ def _run(args: argparse.Namespace) -> int:
 
     if args.output and not args.trace:
         raise UsageError("-o is the file of --trace; write for example --trace 'Main.*' -o trace.csv.", "usage")
+    _check_one_output(args)
     trace = documents.TraceFile(args.trace, args.output or Path("trace.csv")) if args.trace else None
     faults = [parse_fault(text) for text in args.fault]
     document, texts = documents.run(
         _program_to_run(args), args.cycles, args.time, pairs(args.set), args.get, args.plant, trace, faults
     )
-    return _show(args, document, lambda d: output.run_text(d, texts))
+    return _show(args, document, lambda d: output.run_text(d, texts), _beside_output(args))
 
 
 def _program_to_run(args: argparse.Namespace) -> Path | documents.Built:
@@ -380,11 +381,14 @@ def _files(args: argparse.Namespace) -> int:
     }
     texts: dict[str, Callable[[Document], str]] = {
         "list": file_documents.list_text,
-        "get": lambda d: f"{d['file']}: {d['size']} bytes",
+        "get": lambda d: f"{d['name'] if d['file'] == str(STDOUT) else d['file']}: {d['size']} bytes",
         "put": lambda d: f"{d['name']}: {d['size']} bytes",
         "delete": lambda d: f"{d['name']} is deleted.",
     }
-    return _with_progress(args, operations[args.what], texts[args.what])
+    if args.what != "get":
+        return _with_progress(args, operations[args.what], texts[args.what])
+    _check_one_output(args)
+    return _with_progress(args, operations["get"], texts["get"], _beside_output(args))
 
 
 def _source(args: argparse.Namespace) -> int:
@@ -404,11 +408,14 @@ def _source(args: argparse.Namespace) -> int:
 
 
 def _with_progress(
-    args: argparse.Namespace, operation: Callable[[Plc, ShowProgress], Document], text: Callable[[Document], str]
+    args: argparse.Namespace,
+    operation: Callable[[Plc, ShowProgress], Document],
+    text: Callable[[Document], str],
+    stream: TextIO | None = None,
 ) -> int:
     with _connect(args) as plc, _Progress(not args.json) as progress:
         document = operation(plc, progress.show)
-    return _show(args, document, text)
+    return _show(args, document, text, stream)
 
 
 def _port_check(args: argparse.Namespace) -> int:
@@ -551,12 +558,25 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
 # ---- the frame -------------------------------------------------------------------------------------------------------
 
 
-def _show(args: argparse.Namespace, document: Document, text: Callable[[Document], str]) -> int:
+def _show(
+    args: argparse.Namespace, document: Document, text: Callable[[Document], str], stream: TextIO | None = None
+) -> int:
     """Prints a result for machines or for users."""
     shown = output.as_json(document) if args.json else text(document)
     if shown:
-        print(shown)
+        print(shown, file=stream)
     return EXIT_OK
+
+
+def _check_one_output(args: argparse.Namespace) -> None:
+    """Raises UsageError if a file and the document would both go to the standard output."""
+    if args.json and args.output == STDOUT:
+        raise UsageError("-o - and --json both write to the standard output; name a file after -o.", "usage")
+
+
+def _beside_output(args: argparse.Namespace) -> TextIO:
+    """Where a result is printed that must not be among what goes to the standard output."""
+    return sys.stderr if args.output == STDOUT else sys.stdout
 
 
 def _command(arguments: Sequence[str]) -> int:
