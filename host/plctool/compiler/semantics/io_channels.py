@@ -214,6 +214,7 @@ class IoChannels:
         self._report_unmapped(diagnostics)
         if self.description is None or diagnostics.errors:
             return
+        self._report_devices(diagnostics)
         if tasks is not None:
             _check_tasks(self.description, [task.name for task in tasks], diagnostics)
             _check_events(self.description, [task.external for task in tasks if task.external], diagnostics)
@@ -245,6 +246,22 @@ class IoChannels:
         message = f"no channel leads to {address.text}{more}, and only a description of inputs and outputs can say"
         hint = f"name {address.text} in {where}, or number the bytes or words as in {address.numbered}"
         diagnostics.error(pos, "location", f"{message} where it is; {hint}")
+
+    def _report_devices(self, diagnostics: Diagnostics) -> None:
+        """What a device reports of itself is not what its channels lead to. An output may show it of another one."""
+        assert self.description is not None
+        names = {c.name.casefold() for c in self.description.connectors if c.variable}
+        roots = {id(c): root for root, parts in self._connected.items() for _, _, c in parts}
+        for connector, channel in self.description.channels:
+            root = roots.get(id(channel))
+            name = "" if root is None else root.name.rpartition(".")[2].casefold()
+            if root is None or root.type.name != DEVICE_TYPE or name not in names:
+                continue
+            own, whole = name == connector.name.casefold(), channel.variable.casefold() == root.name.casefold()
+            if own or whole or not channel.output:
+                what = ("the device itself" if own else "a device") if whole else "what a device reports"
+                message = f"{channel.target} is {what}; name a variable such as Main.x"
+                diagnostics.error(channel.pos, CODE, message)
 
     def _declare(self, channel: Channel, allocation: Allocation) -> None:
         """The input or output of a channel that names an address of modules at which there is no variable."""
