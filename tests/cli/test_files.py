@@ -192,7 +192,16 @@ def test_symbols_lists_the_variables_with_their_types(tool: Any, counter: Path) 
 def test_symbols_takes_patterns(tool: Any, counter: Path) -> None:
     lines = tool("symbols", str(counter), "main.?", "*t[2]").out.splitlines()
     assert [line.split()[0] for line in lines] == ["name", "Main.n", "Main.list[2]"]
-    assert tool("symbols", str(counter), "nothing", "--json").json == {"variables": []}
+
+
+@pytest.mark.parametrize(("pattern", "message"), [
+    ("Nope.*", "No variable matches Nope.*"), ("Main", "Main has no value of its own"), ("Mian.n", "Did you mean Main.n?"),
+])  # fmt: skip
+def test_symbols_of_a_pattern_that_matches_nothing_are_refused(
+    tool: Any, counter: Path, pattern: str, message: str
+) -> None:
+    done = tool("symbols", str(counter), "Main.*", pattern)
+    assert done.status == 2 and message in done.err
 
 
 def test_symbols_of_an_image_without_any_exits_2(tool: Any, image: Path) -> None:

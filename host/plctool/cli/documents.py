@@ -268,7 +268,7 @@ def info(path: Path) -> Document:
 
 def variables(path: Path, patterns: Sequence[str]) -> Document:
     """The variables of an image, and parts of them, whose names match one of the patterns; without patterns all
-    variables."""
+    variables. Raises UsageError for a pattern that matches nothing."""
     from plctool.debug.symbols import find_symbols
     from plctool.iec.areas import Area
     from plctool.image.file import describe_image, read_program
@@ -278,7 +278,7 @@ def variables(path: Path, patterns: Sequence[str]) -> Document:
     return {
         "variables": [
             {"name": s.name, "type": str(s.type), "area": areas[s.area], "offset": s.offset, "size": s.size}
-            for s in symbols.find(patterns)
+            for s in symbols.listed(patterns)
         ]
     }
 

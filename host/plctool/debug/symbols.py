@@ -153,6 +153,15 @@ class SymbolTable:
             if elements or not isinstance(symbol.type, ArrayType):
                 todo += list(symbol.parts())[::-1]
 
+    def listed(self, patterns: Sequence[str]) -> list[Symbol]:
+        """The same, with what names without * and ? stand for otherwise, such as channels. Raises UsageError for what
+        matches nothing."""
+        found = list(self.find(patterns))
+        for pattern in patterns:
+            if next(self.find([pattern]), None) is None:
+                found += self._matching(pattern).values() if is_pattern(pattern) else [self.resolve(pattern)]
+        return found
+
     def select(self, names: Sequence[str]) -> dict[str, Symbol]:
         """The variables of these names, as `resolve` finds them, and for a pattern with * or ? all values whose names
         match it: `Main.*` is all of Main, arrays as a whole. Raises UsageError for what is not in the program."""
