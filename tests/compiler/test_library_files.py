@@ -190,7 +190,7 @@ def test_path_that_is_no_library_is_refused(tmp_path: Path) -> None:
         tmp_path / "x"
     )
     assert "is not a library: it has no library.toml" in refusal(tmp_path)
-    assert "There is no source file" in refusal(library(tmp_path, "Empty", {}))
+    assert "has no source file" in refusal(library(tmp_path, "Empty", {}))
     assert "has no source file" in refusal(zipped(tmp_path / "empty.zip", {"library.toml": manifest("Empty")}))
     (tmp_path / "Bad").mkdir()
     (tmp_path / "Bad/library.toml").write_bytes(b"\xff")

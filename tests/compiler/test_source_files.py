@@ -278,7 +278,7 @@ def test_a_file_without_text_says_what_to_export(tmp_path: Path, name: str, mess
     assert {d.code for d in found} == {"unknown", "file"}
     assert message in next(d.message for d in found if d.code == "file")
     (tmp_path / "main.st").unlink()
-    with pytest.raises(UsageError, match=f"There is no source file .*{name} is not text: .*"):
+    with pytest.raises(UsageError, match=f"has no source file .*{name} is not text: .*"):
         load_sources([tmp_path])
 
 
@@ -474,3 +474,22 @@ def test_a_body_that_declares_something_is_another_unit(tmp_path: Path) -> None:
 def errors(folder: Path) -> list[tuple[str, int, int, str]]:
     found = check_sources(load_sources([folder])).diagnostics
     return [(Path(d.file).name, d.line, d.column, d.message) for d in found if d.severity == "error"]
+
+
+@pytest.mark.parametrize(("name", "better"), [("main.txt", "main.st"), ("main.st.txt", "main.st"), ("A.TXT", "A.st")])
+def test_text_with_another_name_is_named_in_a_folder_without_sources(tmp_path: Path, name: str, better: str) -> None:
+    (tmp_path / name).write_text("(* blink *)\nPROGRAM Main\nEND_PROGRAM\n")
+    with pytest.raises(UsageError, match=f"{name} seems to be one: rename it to {better}"):
+        load_sources([tmp_path])
+
+
+def test_text_that_is_no_program_is_not_named(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("A program for the pump.\n")
+    with pytest.raises(UsageError, match=r"has no source file \(.st, .exp, .TcPOU ...\)\.$"):
+        load_sources([tmp_path])
+
+
+def test_current_folder_without_sources_is_named_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UsageError, match="^The current folder has no source file"):
+        load_sources([Path(".")])

@@ -6,6 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import codecs
+import re
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -23,6 +24,9 @@ from plctool.compiler.garbage import no_collection
 from plctool.compiler.source import Finding, Piece, Source
 from plctool.errors import UsageError
 from plctool.project import LIBRARY_FILE
+
+_UNIT = re.compile(r"^\s*(?:PROGRAM|FUNCTION|FUNCTION_BLOCK|TYPE|VAR_GLOBAL|INTERFACE)\b", re.IGNORECASE | re.MULTILINE)
+"""The beginning of a unit of Structured Text."""
 
 Reader = Callable[[str, str], list[Source]]
 """Makes sources from the path and the text of a file."""
@@ -158,15 +162,25 @@ def find_sources(folder: Path) -> list[Path]:
         found = sorted({*_files(projects[0]), *others})
     if not found:
         raise UsageError(
-            f"There is no source file (.st, .exp, .TcPOU ...) in {folder}{_other_files(folder)}.", "no-source"
+            f"{_named(folder)} has no source file (.st, .exp, .TcPOU ...){_other_files(folder)}.", "no-source"
         )
     return found
 
 
+def _named(folder: Path) -> str:
+    return "The current folder" if folder == Path() else f"The folder {folder}"
+
+
 def _other_files(folder: Path) -> str:
-    """What to do with the files that hold programs but no text."""
-    others = (path for path in sorted(folder.rglob("*")) if path.suffix.lower() in unreadable.WHAT_TO_DO)
-    return next((f"; {path.name} is not text: {unreadable.WHAT_TO_DO[path.suffix.lower()]}" for path in others), "")
+    """What to do with the files that hold programs but no text, or have the name of another text."""
+    files = sorted(folder.rglob("*"))
+    for path in files:
+        if advice := unreadable.WHAT_TO_DO.get(path.suffix.lower()):
+            return f"; {path.name} is not text: {advice}"
+    for path in files:
+        if path.suffix.lower() == ".txt" and path.is_file() and _UNIT.search(decode(path.read_bytes())):
+            return f"; {path.name} seems to be one: rename it to {path.stem.removesuffix('.st')}.st"
+    return ""
 
 
 def _is_source(path: Path) -> bool:
