@@ -143,7 +143,7 @@ class Controller(ABC):
         wait meanwhile. Raises LinkError when one of them is downloading, UsageError for what is not an image,
         DeviceError when the controller refuses it.
         """
-        data = image if isinstance(image, bytes) else read_program(Path(image))
+        data = image if isinstance(image, bytes) else read_program(Path(image), unchecked)
         if not unchecked:
             parse_image(data)
         what = "a program" if isinstance(image, bytes) else Path(image).name

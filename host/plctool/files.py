@@ -66,6 +66,10 @@ def write_atomically(path: Path, data: bytes) -> None:
         except BaseException:
             os.unlink(file.name)
             raise
+    except FileNotFoundError:
+        raise UsageError(
+            f"{path} cannot be written: the folder {path.parent} does not exist; make it first.", "cannot-write"
+        ) from None
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror}.", "cannot-write") from None
 

@@ -13,7 +13,8 @@ from plctool.errors import UsageError
 
 PROJECT_FILE = "plc.toml"
 LIBRARY_FILE = "library.toml"
-DEFAULT_IMAGE = "app.cdl"
+IMAGE_SUFFIX, SYMBOL_SUFFIX = ".cdl", ".sym"  # the symbols of an image are beside it
+DEFAULT_IMAGE = f"app{IMAGE_SUFFIX}"
 
 
 def find_project(folder: Path | None = None) -> Path | None:

@@ -259,7 +259,11 @@ def test_the_program_of_a_memory_of_its_own_is_checked(tool: Any, scratch: Path,
 @pytest.mark.parametrize(
     ("content", "word"),
     [
-        (b"nothing", "not an ELF file"),
+        (b"nothing", "fw.elf is not an ELF file"),
+        (b"", "fw.elf is empty"),
+        (elf(facts("mps2-an385/full"))[:-1], "fw.elf is an ELF file that is cut off"),
+        (elf(facts("mps2-an385/full"))[:100], "fw.elf is an ELF file that is cut off"),
+        (elf(facts("mps2-an385/full"))[:20], "fw.elf is an ELF file that is cut off"),
         (elf(b"", section="other"), "does not say what its board is"),
         (elf(facts("mps2-an385/full")[:-4]), "another version"),
         (elf(facts("mps2-an385/full", size=4)), "another version"),
@@ -273,7 +277,11 @@ def test_what_is_no_firmware_is_refused(tool: Any, scratch: Path, for_m3: Path, 
 def test_output_that_cannot_be_is_refused(tool: Any, scratch: Path, for_m3: Path) -> None:
     (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard")))
     refused(tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.bin"), "write x.hex")
-    refused(tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.elf"), "neither .bin nor .hex")
+    refused(tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.elf"), "neither .bin nor .hex", "-o x.hex")
+    for name in (".hex", ".bin", "hex"):
+        refused(tool("image", "app.cdl", "--board", "plcrt", "-o", name), "neither .bin nor .hex", "-o product.hex")
+    done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "none/x.hex")
+    refused(done, "none/x.hex cannot be written: the folder none does not exist; make it first")
     refused(tool("image", "none.cdl", "--board", "plcrt", "-o", "x.hex"), "none.cdl")
 
 
@@ -341,3 +349,29 @@ def test_a_hex_that_is_cut_off_at_the_end_of_a_line_is_refused(
     whole = (scratch / "flash.hex").read_text().splitlines(keepends=True)
     (scratch / "flash.hex").write_text("".join(whole[:lines]))
     refused(tool("info", "flash.hex"), "flash.hex is cut off: its end record is missing")
+
+
+@pytest.mark.parametrize("command", ["image FILE --board mps2-an385/standard -o x.hex", "info FILE", "symbols FILE"])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("app.st", ("it is text, such as a source", "plctool build app.st -o app.cdl")),
+        ("app.sym", ("it has the symbols of one", "name app.cdl")),
+        ("fw.elf", ("it is an ELF file", "--firmware")),
+        ("damaged.cdl", ("its checksum does not match", "build it again")),
+    ],
+)
+def test_what_is_no_image_is_named_with_what_to_write(
+    tool: Any, for_m3: Path, scratch: Path, command: str, name: str, words: tuple[str, ...]
+) -> None:
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard")))
+    (scratch / "damaged.cdl").write_bytes(for_m3.read_bytes()[:-1] + b"?")
+    done = tool(*command.replace("FILE", name).split())
+    refused(done, f"{name} is not a valid application image", *words)
+
+
+def test_info_of_a_renamed_file_says_its_name(tool: Any, for_m3: Path, scratch: Path) -> None:
+    for name, other in (("a.bin", "b.hex"), ("b.hex", "a.bin")):
+        tool("image", str(for_m3), "--board", "mps2-an385/standard", "-o", name)
+        (scratch / name).rename(scratch / other)
+        refused(tool("info", other), f"name it {Path(other).with_suffix(Path(name).suffix)}")

@@ -244,9 +244,9 @@ def diagnostic_document(diagnostic: Diagnostic) -> Document:
 def info(path: Path) -> Document:
     """Header, tables and POUs of an image; with its symbols also the bytes of code that each POU made."""
     from plctool.debug.symbols import find_symbols
-    from plctool.image.file import describe_image
+    from plctool.image.file import describe_image, read_program
 
-    data = read_image(path)
+    data = read_program(path)
     document = describe_image(data)
     if board := io_documents.board_in(data):
         document["board"] = board

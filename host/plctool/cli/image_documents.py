@@ -17,7 +17,7 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
     from plctool.image.production import is_production, production_pieces, write_production
 
     if not is_production(output):
-        raise UsageError(f"{output} is neither .bin nor .hex; write for example -o {output.stem}.hex.", "bad-output")
+        raise UsageError(f"{output} is neither .bin nor .hex; write for example -o {_as_hex(output)}.", "bad-output")
     of_firmware = None if firmware is None else read_firmware(firmware)
     wanted = board_of(board, of_firmware)
     data = read_program(image)
@@ -41,6 +41,12 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
         "burn_at": None if start is None else f"{start:08X}",
         "burn_apart": apart,
     }
+
+
+def _as_hex(output: Path) -> Path:
+    """A name for a file that has none for its kind."""
+    name = output.stem.lstrip(".")
+    return output.parent / f"{'product' if name.lower() in ('', 'bin', 'hex') else name}.hex"
 
 
 def production_info(path: Path) -> Document:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from plctool.errors import UsageError
+from plctool.project import SYMBOL_SUFFIX
 
 _PROJECTS = (".plcproj", ".tsproj")
 
@@ -35,7 +36,7 @@ def _kind(output: Path) -> str:
     suffix = output.suffix.lower()
     if suffix in SUFFIXES:
         return "source"
-    kinds = {".sym": "symbol file", ".toml": "settings file", **dict.fromkeys(_PROJECTS, "project")}
+    kinds = {SYMBOL_SUFFIX: "symbol file", ".toml": "settings file", **dict.fromkeys(_PROJECTS, "project")}
     return kinds.get(suffix, "")
 
 

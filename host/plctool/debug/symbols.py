@@ -26,6 +26,7 @@ from plctool.files import write_atomically
 from plctool.iec.addresses import parse_address
 from plctool.iec.type_descriptions import DescribedTypes, describe
 from plctool.iec.types import ELEMENTARY, ArrayType, OpenArrayType, StructType
+from plctool.project import SYMBOL_SUFFIX
 
 if TYPE_CHECKING:
     from plctool.debug.call_frames import DebugInfo
@@ -362,13 +363,13 @@ def load_symbols(path: Path) -> SymbolTable:
 
 def symbol_path(image: Path) -> Path:
     """Where `build` writes the symbols of an image: app.cdl -> app.sym."""
-    return image.with_suffix(".sym")
+    return image.with_suffix(SYMBOL_SUFFIX)
 
 
 def cache_path(image_crc: int) -> Path:
     """Where the symbols of an image are kept for later: $XDG_CACHE_HOME/plctool/<crc>.sym."""
     root = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(root) / "plctool" / f"{image_crc:08x}.sym"
+    return Path(root) / "plctool" / f"{image_crc:08x}{SYMBOL_SUFFIX}"
 
 
 def find_symbols(image_crc: int, beside: Path | None = None) -> SymbolTable:

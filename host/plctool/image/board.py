@@ -19,7 +19,7 @@ from elftools.elf.elffile import ELFFile
 from plctool.core import ffi, lib
 from plctool.errors import UsageError, did_you_mean
 from plctool.iec.areas import Area
-from plctool.image.file import target_name
+from plctool.image.file import ELF_TAG, target_name
 from plctool.image.limits import of_area
 from plctool.image.targets import TARGETS
 
@@ -160,6 +160,7 @@ def read_firmware(path: Path) -> Firmware:
     """Raises UsageError when it is not a firmware that says what its board is."""
     try:
         with path.open("rb") as file:
+            head = file.read(len(ELF_TAG))
             elf = ELFFile(file)
             section = elf.get_section_by_name(_SECTION)
             data = b"" if section is None else section.data()
@@ -171,9 +172,7 @@ def read_firmware(path: Path) -> Firmware:
     except OSError as error:
         raise UsageError(f"The firmware {path} cannot be read: {error.strerror}.", "no-firmware") from None
     except ELFError:
-        raise UsageError(
-            f"{path} is not an ELF file; name what the linker wrote, not a .bin or .hex.", "bad-firmware"
-        ) from None
+        raise UsageError(f"{path} {_not_elf(head)}", "bad-firmware") from None
     facts = ffi.new("BOARD_FACTS *")
     if not data:
         raise UsageError(
@@ -187,6 +186,14 @@ def read_firmware(path: Path) -> Firmware:
             f"{path} is a firmware of another version of plctool; build it again with this one.", "bad-firmware"
         )
     return Firmware(path, _board(facts), segments)
+
+
+def _not_elf(head: bytes) -> str:
+    if head == ELF_TAG:
+        return "is an ELF file that is cut off or damaged; copy or link it again."
+    if not head:
+        return "is empty; copy or link it again."
+    return "is not an ELF file; name what the linker wrote, not a .bin or .hex."
 
 
 def board_of(name: str | None, firmware: Firmware | None) -> Board:

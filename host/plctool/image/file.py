@@ -5,6 +5,7 @@ All layouts are the structs of firmware/include/CompactDownload.h, reached throu
 
 from __future__ import annotations
 
+import re
 import time
 import zlib
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError
 from plctool.files import read_image
 from plctool.iec.areas import Area
+from plctool.project import IMAGE_SUFFIX, SYMBOL_SUFFIX
 
 NO_AREA = int(lib.APP_AREA_NONE)
 DEVICE_VERSION = 0x01000000
@@ -33,6 +35,9 @@ _SEGMENTS = (
     "application_info", "area_table", "function_table", "external_function_table", "iec_function_table", "blob", "code",
 )  # fmt: skip
 _MAX_NAME = 255
+_HEAD = 4096  # bytes that show whether a file is text
+_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
+ELF_TAG = b"\x7fELF"
 TAG = int(lib.CDL_HEADER_TAG).to_bytes(4, "little")
 _BLOB_IO = int(lib.CDL_BLOB_IO)
 
@@ -279,8 +284,16 @@ def _kept_entry(kept: KeptVariable) -> bytes:
 # ---- taking apart --------------------------------------------------------------------------------------------------
 
 
-def _refuse(reason: str) -> UsageError:
-    return UsageError(f"This is not a valid application image: {reason}; build it again.", "bad-image")
+class BadImage(UsageError):
+    """Bytes that are not an image. `what`: their file, if known."""
+
+    def __init__(self, reason: str, advice: str = "build it again", what: str = "This") -> None:
+        super().__init__(f"{what} is not a valid application image: {reason}; {advice}.", "bad-image")
+        self.reason = reason
+
+
+def _refuse(reason: str) -> BadImage:
+    return BadImage(reason)
 
 
 def parse_image(data: bytes) -> Image:
@@ -315,16 +328,44 @@ def parse_image(data: bytes) -> Image:
     )
 
 
-def read_program(path: Path) -> bytes:
-    """The bytes of an image that is to run. Raises UsageError for what a programmer burns, which has one in it."""
-    data, size = read_image(path), int(lib.CDL_HEADER_SIZE)
-    is_flash = path.suffix.lower() == ".bin" and data.startswith(TAG) and len(data) >= size
-    if is_flash:
-        is_flash = ffi.from_buffer("CDL_HEADER *", data[:size]).total_size < len(data)
-    if is_flash or path.suffix.lower() == ".hex":
+def read_program(path: Path, unchecked: bool = False) -> bytes:
+    """The bytes of an image that is to run. Raises UsageError for what a programmer burns, which has one in it, and
+    unless `unchecked` for what is not a valid image."""
+    data = read_image(path)
+    if path.suffix.lower() == ".hex" or _is_flash(path, data):
         message = f"{path} is a production image, for a programmer; name the .cdl that it was made of."
         raise UsageError(message, "production-image")
+    if not unchecked:
+        check_image(path, data)
     return data
+
+
+def _is_flash(path: Path, data: bytes) -> bool:
+    size = int(lib.CDL_HEADER_SIZE)
+    if path.suffix.lower() != ".bin" or not data.startswith(TAG) or len(data) < size:
+        return False
+    return int(ffi.from_buffer("CDL_HEADER *", data[:size]).total_size) < len(data)
+
+
+def check_image(path: Path, data: bytes) -> None:
+    """Raises UsageError that names the file, and what to name in its place, if it is not a valid image."""
+    try:
+        parse_image(data)
+    except BadImage as bad:
+        raise _other_file(path, data) or BadImage(bad.reason, what=str(path)) from None
+
+
+def _other_file(path: Path, data: bytes) -> BadImage | None:
+    """What to say of the files that are near an image and mistaken for it."""
+    if data.startswith(ELF_TAG):
+        advice = "name what 'plctool build' wrote; 'plctool image' takes firmware with --firmware"
+        return BadImage("it is an ELF file", advice, str(path))
+    if path.suffix.lower() == SYMBOL_SUFFIX:
+        return BadImage("it has the symbols of one", f"name {path.with_suffix(IMAGE_SUFFIX)}", str(path))
+    if data and not _NO_TEXT.search(data[:_HEAD]):
+        advice = f"make an image of it first: plctool build {path} -o {path.stem}{IMAGE_SUFFIX}"
+        return BadImage("it is text, such as a source", advice, str(path))
+    return None
 
 
 def image_crc(data: bytes) -> int:

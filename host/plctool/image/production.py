@@ -160,13 +160,13 @@ def _range(segments: list[Segment], board: Board, path: Path) -> tuple[int, int]
     else:
         raise UsageError(
             f"A .bin has no gaps: it would erase 0x{used[0][1]:08X} to 0x{used[1][0] - 1:08X}, which is not for "
-            f"programs: firmware may be there. Give its ELF file with --firmware, or write {path.stem}.hex.",
+            f"programs: firmware may be there. Give its ELF file with --firmware, or write {path.with_suffix(HEX)}.",
             "bad-output",
         )
     if end - start > _MOST_BIN:
         raise UsageError(
-            f"From 0x{start:08X} to 0x{end - 1:08X} is too much for a .bin, which has no gaps; write {path.stem}.hex, "
-            "or leave --firmware out.",
+            f"From 0x{start:08X} to 0x{end - 1:08X} is too much for a .bin, which has no gaps; write "
+            f"{path.with_suffix(HEX)}, or leave --firmware out.",
             "bad-output",
         )
     return start, end
@@ -194,6 +194,8 @@ def describe_production(path: Path, data: bytes) -> dict[str, Any]:
     in it."""
     segments = list(_segments(path, data))
     programs = [program for segment in segments for program in _programs(segment)]
+    if not programs and data.startswith(b":") and path.suffix.lower() == BIN:
+        raise UsageError(f"{path} looks like an Intel HEX file; name it {path.with_suffix(HEX)}.", "bad-image")
     if not programs:
         raise UsageError(
             f"{path} has no program of plctool in it, or not all of one; make it with 'plctool image'.", "bad-image"
@@ -215,7 +217,11 @@ def _segments(path: Path, data: bytes) -> Iterator[Segment]:
         line = f" in line {error.line}" if hasattr(error, "line") else ""
         raise UsageError(f"{path} is not an Intel HEX file, or damaged{line}; write it again.", "bad-image") from None
     except UnicodeDecodeError:
-        raise UsageError(f"{path} is not an Intel HEX file, or damaged; write it again.", "bad-image") from None
+        raise UsageError(
+            f"{path} is not an Intel HEX file, or damaged; write it again, or name it {path.with_suffix(BIN)} if it is "
+            "the bytes of a memory.",
+            "bad-image",
+        ) from None
     if not any(line[_HEX_TYPE] == _HEX_END for line in text.splitlines()):
         raise UsageError(f"{path} is cut off: its end record is missing; write or copy it again.", "bad-image")
     for start, end in content.segments():
