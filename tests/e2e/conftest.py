@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,9 +17,8 @@ sys.path.append(str(Path(__file__).parents[1]))
 
 from plctool_commands import run_plctool
 
+from plctool.testing import waiting
 from plctool.testing.plcrt import Plcrt, find_plcrt
-
-PATIENCE = 30.0  # of `eventually`, seconds; machines under load are slow
 
 
 @dataclass
@@ -86,18 +84,7 @@ def ordinary_plcrt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[
 
 @pytest.fixture
 def eventually() -> Callable[[Callable[[], Any]], Any]:
-    """Asks until the answer is true, and returns it; fails after PATIENCE."""
-
-    def ask(question: Callable[[], Any]) -> Any:
-        end = time.monotonic() + PATIENCE
-        while True:
-            answer = question()
-            if answer:
-                return answer
-            assert time.monotonic() < end, "did not happen in time"
-            time.sleep(0.05)
-
-    return ask
+    return waiting.eventually
 
 
 COUNTER = """

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import pytest
-from modbus_support import eventually
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.pdu import ModbusPDU
+
+from plctool.testing.waiting import eventually
 
 PATIENCE_S = 10
 _EXCEPTIONS = 112345678  # errno of libmodbus: this and the code of an exception

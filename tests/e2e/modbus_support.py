@@ -6,25 +6,14 @@ import asyncio
 import os
 import select
 import threading
-import time
 import tty
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from typing import Any
 
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 REGISTERS = 64
-PATIENCE = 60.0  # of `eventually`, seconds
-
-
-def eventually(question: Callable[[], Any]) -> Any:
-    """Asks until the answer is true, and returns it; fails after PATIENCE."""
-    end = time.monotonic() + PATIENCE
-    while not (answer := question()):
-        assert time.monotonic() < end, "did not happen in time"
-        time.sleep(0.01)
-    return answer
 
 
 class Wire:

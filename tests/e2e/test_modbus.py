@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from free_ports import free_port
-from modbus_support import Devices, Wire, eventually
+from modbus_support import Devices, Wire
 from pymodbus.client import ModbusTcpClient
 
 import plctool
@@ -22,6 +22,7 @@ from plctool.core import lib
 from plctool.device import Plc
 from plctool.errors import DeviceError, PlcError, UsageError
 from plctool.testing.plcrt import Plcrt
+from plctool.testing.waiting import eventually
 
 CONNECTIONS = 32  # MODBUS_MAX_CONNECTIONS of plcrt
 FIRST_COUNTER = int(lib.MODBUS_PARAM_REQUESTS)

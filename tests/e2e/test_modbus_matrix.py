@@ -14,13 +14,14 @@ import pytest
 from free_ports import free_port
 from modbus_clients import CLIENTS, Client, Place, Refused
 from modbus_servers import SERVERS, TABLE_OF, TRAP, WORDS, PymodbusServer, Server, first_words
-from modbus_support import Wire, eventually
+from modbus_support import Wire
 
 import plctool
 from plctool.compiler import compile_sources
 from plctool.device import Plc
 from plctool.iec.types import UDINT
 from plctool.testing.plcrt import Plcrt
+from plctool.testing.waiting import eventually
 
 # ---- the matrix ------------------------------------------------------------------------------------------------------
 

@@ -7,12 +7,13 @@ from collections.abc import Iterator
 
 import pytest
 from free_ports import free_port
-from modbus_support import Devices, Wire, eventually
+from modbus_support import Devices, Wire
 
 import plctool
 from plctool.compiler import compile_sources
 from plctool.device import Plc
 from plctool.testing.plcrt import Plcrt
+from plctool.testing.waiting import eventually
 
 PROGRAM = """
 PROGRAM Main

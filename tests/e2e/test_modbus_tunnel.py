@@ -15,7 +15,6 @@ from pathlib import Path
 
 import pytest
 from free_ports import free_port
-from modbus_support import eventually
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
@@ -25,6 +24,7 @@ from plctool.device import Plc
 from plctool.errors import LinkError, PlcError
 from plctool.link.modbus import modbus_crc
 from plctool.testing.plcrt import Plcrt
+from plctool.testing.waiting import eventually
 
 OWN_UNIT = 247  # of plcrt while no program has a server
 BAUD = 38400

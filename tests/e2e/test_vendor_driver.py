@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from modbus_support import eventually
 
 import plctool
 from plctool.compiler import compile_sources
 from plctool.testing.plcrt import Plcrt
+from plctool.testing.waiting import eventually
 
 ROOT = Path(__file__).resolve().parents[2]
 BLANK = ROOT / "firmware" / "port" / "baremetal" / "blank"

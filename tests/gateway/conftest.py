@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "link"))
 
-from served import PATIENCE, Gate, Served
+from served import Gate, Served
+
+from plctool.testing import waiting
 
 
 @pytest.fixture(autouse=True)
@@ -29,16 +30,7 @@ def runtime(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture
 def eventually() -> Callable[[Callable[[], Any]], Any]:
-    """Asks until the answer is true, and returns it; fails after PATIENCE."""
-
-    def ask(question: Callable[[], Any]) -> Any:
-        end = time.monotonic() + PATIENCE
-        while not (answer := question()):
-            assert time.monotonic() < end, "did not happen in time"
-            time.sleep(0.002)
-        return answer
-
-    return ask
+    return waiting.eventually
 
 
 @pytest.fixture

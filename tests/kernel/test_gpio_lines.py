@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from waiting import eventually
 
 from plctool.device import Plc
 from plctool.errors import DeviceError
+from plctool.testing.waiting import eventually
 
 CONFIG = Path("/sys/kernel/config/gpio-sim")
 LINES = ("START", "DOOR", "MOTOR", "LAMP")

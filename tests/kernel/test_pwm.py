@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from waiting import eventually
 
 from plctool.device import Plc
 from plctool.errors import DeviceError
+from plctool.testing.waiting import eventually
 
 ADDRESS = 0x40
 OFF_L, STEPS = 0x08, 4096  # the first of the two registers in which a pulse of channel 0 ends; steps of a period

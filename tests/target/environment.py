@@ -4,10 +4,7 @@ FIRMWARE_CONFIG (the configuration of tests that do not ask for one)."""
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = Path(os.environ["FIRMWARE_DIR"]) if "FIRMWARE_DIR" in os.environ else None
@@ -25,19 +22,9 @@ IS_RISCV = TARGET == "rv32imac"
 HAS_FPU = TARGET in ("cortex-m4f", "cortex-m7")
 CONFIG = os.environ.get("FIRMWARE_CONFIG", "standard")
 IEC_STACK_SIZE = {"standard": 1024, "full": 2048, "can": 1024}[CONFIG]  # of a task [bytes]
-PATIENCE = 60.0  # [s]; machines under load are slow
 
 
 def firmware(config: str) -> Path:
     """The runtime in one of its configurations."""
     assert FIRMWARE
     return FIRMWARE / f"firmware-{config}.elf"
-
-
-def eventually(question: Callable[[], Any]) -> Any:
-    """Asks until the answer is true, and returns it; fails after PATIENCE."""
-    end = time.monotonic() + PATIENCE
-    while not (answer := question()):
-        assert time.monotonic() < end, "did not happen in time"
-        time.sleep(0.01)
-    return answer

@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from environment import CONFIG, IS_RISCV, MACHINE, eventually, firmware
+from environment import CONFIG, IS_RISCV, MACHINE, firmware
 from programs import program
 from qemu import FACTORY_OFFSET
 
@@ -20,6 +20,7 @@ from plctool.device import Plc
 from plctool.errors import LinkError
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
+from plctool.testing.waiting import eventually
 
 MAIN_WATCHDOG_MS = 20_000  # see main.c
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}  # of processes that find what this one does

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from environment import TARGET, eventually
+from environment import TARGET
 from programs import compile_text
 
 from plctool.compiler import Level
 from plctool.device import Plc
+from plctool.testing.waiting import eventually
 
 TEXT = """FUNCTION Fail : REAL
 VAR_INPUT

@@ -6,14 +6,13 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from environment import PATIENCE, eventually
-
 import plctool
 from plctool.device import Plc
 from plctool.errors import LinkError
 from plctool.link.connection import Connection
 from plctool.link.names import Node
 from plctool.link.transports import parse_link
+from plctool.testing.waiting import PATIENCE, eventually
 
 PROGRAM = """
 PROGRAM Main

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from environment import eventually
+from plctool.testing.waiting import eventually
 
 EDGES = 400
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
-from environment import HAS_FPU, IEC_STACK_SIZE, IS_RISCV, TARGET, eventually
+from environment import HAS_FPU, IEC_STACK_SIZE, IS_RISCV, TARGET
 from programs import FAST_AND_SLOW, Built, compile_text
 
 from plctool.core import lib
@@ -22,6 +22,7 @@ from plctool.errors import LinkError
 from plctool.image.file import parse_image
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
+from plctool.testing.waiting import eventually
 
 FUNCTION = """
 FUNCTION Large : DINT

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from environment import MACHINE, TARGET, eventually, firmware
+from environment import MACHINE, TARGET, firmware
 from programs import program
 from qemu import Board
 from test_headroom import HEADROOM
@@ -21,6 +21,7 @@ from plctool.port_check import parse_wire
 from plctool.port_check.bench import Bench
 from plctool.port_check.report import judge
 from plctool.port_check.wires import Wires
+from plctool.testing.waiting import eventually
 
 LEDS = 0x40028000  # a register of the FPGA that QEMU has
 PROGRAM = program(

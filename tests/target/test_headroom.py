@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from environment import eventually
 from programs import COUNTER, TWO_TASKS
+
+from plctool.testing.waiting import eventually
 
 HEADROOM = 256  # bytes; nested interrupts at the worst moment need more than a test provokes
 

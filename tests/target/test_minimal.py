@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from environment import eventually
 from programs import COUNTER, TWO_TASKS, program
 
 from plctool.core import lib
 from plctool.device import Plc
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
+from plctool.testing.waiting import eventually
 
 TWO_COUNTERS = TWO_TASKS.replace("100000", "100")
 FAULTY = program("VAR n, zero : DINT; END_VAR", "n := n + 1; IF n > 50 THEN n := n / zero; END_IF")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from environment import TARGET, eventually
+from environment import TARGET
 from programs import compile_text, program
 from pymodbus.client import ModbusTcpClient
 from pymodbus.framer import FramerType
@@ -20,6 +20,7 @@ from plctool.device import Plc
 from plctool.errors import DeviceError
 from plctool.link.connection import Connection
 from plctool.link.transports import open_transport, parse_link
+from plctool.testing.waiting import eventually
 
 UNIT = 17
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 import pytest
-from environment import MACHINE, TARGET, eventually, firmware
+from environment import MACHINE, TARGET, firmware
 from plugins import compile_plugin, compiler
 from programs import COUNTER, TWO_TASKS, Built, compile_text
 from qemu import Board
@@ -30,6 +30,7 @@ from plctool.errors import PlcError
 from plctool.image.board import read_firmware
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
+from plctool.testing.waiting import eventually
 
 HERE = Path(__file__).parent
 STORE = struct.Struct("<I8s")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from environment import CONFIG, eventually, firmware
+from environment import CONFIG, firmware
 from programs import COUNTER
 
 from plctool.cli.image_documents import production
@@ -10,6 +10,7 @@ from plctool.device import Plc
 from plctool.image.board import read_firmware
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
+from plctool.testing.waiting import eventually
 
 
 def check(board, built):

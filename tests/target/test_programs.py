@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from environment import eventually
 from programs import COUNTER, TWO_TASKS, program
 from qemu import FLASH_SIZE
 
@@ -12,6 +11,7 @@ from plctool.device import Plc
 from plctool.errors import DeviceError
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
+from plctool.testing.waiting import eventually
 
 
 def test_program_is_flashed_and_counts(plc, build):

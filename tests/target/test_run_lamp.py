@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from environment import MACHINE, eventually
+from environment import MACHINE
 from programs import program
 
 from plctool.device import Plc
 from plctool.link.connection import Connection
+from plctool.testing.waiting import eventually
 
 LAMP = 0x40025004 if MACHINE == "lm3s6965evb" else 0x4002F004  # its register, in which it is the lowest bit
 COUNTER = program("VAR count : DINT; divisor : DINT := 1; END_VAR", "count := count + 1 / divisor;")

@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from environment import ROOT, TARGET, eventually
+from environment import ROOT, TARGET
+
+from plctool.testing.waiting import eventually
 
 sys.path.append(str(Path(__file__).parents[1]))
 

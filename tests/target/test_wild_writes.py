@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from environment import IS_RISCV, MACHINE, eventually
+from environment import IS_RISCV, MACHINE
 from programs import FAST_AND_SLOW, Built, program
 from qemu import Board
 
@@ -15,6 +15,7 @@ from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
+from plctool.testing.waiting import eventually
 
 STATEMENT = "p^ := 16#5A5A_A5A5;"
 TEXT = FAST_AND_SLOW.format(

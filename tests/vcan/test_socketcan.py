@@ -6,9 +6,7 @@ import os
 import subprocess
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import can
 import pytest
@@ -19,18 +17,9 @@ from plctool.device import connect_several
 from plctool.errors import PlcError
 from plctool.link.transports import parse_link
 from plctool.testing.plcrt import Plcrt
-
-PATIENCE = 60.0  # [s]
+from plctool.testing.waiting import PATIENCE, eventually
 
 pytestmark = pytest.mark.skipif(not Path("/sys/class/net/vcan0").exists(), reason="there is no vcan0: make test-vcan")
-
-
-def eventually(question: Callable[[], Any]) -> Any:
-    end = time.monotonic() + PATIENCE
-    while not (answer := question()):
-        assert time.monotonic() < end
-        time.sleep(0.05)
-    return answer
 
 
 def test_all_are_found(bus: str) -> None:
