@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -85,6 +86,31 @@ def ordinary_plcrt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[
 @pytest.fixture
 def eventually() -> Callable[[Callable[[], Any]], Any]:
     return waiting.eventually
+
+
+@pytest.fixture
+def kill_worker(plcrt: Plcrt) -> Callable[[signal.Signals], None]:
+    """Kills the worker with a signal, and waits for the next one."""
+
+    def kill(number: signal.Signals) -> None:
+        worker = waiting.eventually(lambda: plcrt.worker)
+        assert worker
+        os.kill(worker, number)
+        waiting.eventually(lambda: plcrt.worker not in (None, worker))
+
+    return kill
+
+
+@pytest.fixture(params=["serial", "gateway", "tcp"])
+def link(request: pytest.FixtureRequest, plcrt: Plcrt, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The arguments of a link to plcrt, each kind in turn."""
+    if request.param == "tcp":
+        plcrt.stop()
+        plcrt.options = ("--tcp", "0")
+        plcrt.start()
+        return ["--tcp", plcrt.tcp]
+    monkeypatch.setenv("PLCTOOL_GATEWAY", "on" if request.param == "gateway" else "off")
+    return ["--port", plcrt.port]
 
 
 COUNTER = """

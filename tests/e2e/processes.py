@@ -6,6 +6,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 PROCESS_CLOCK = 2  # CPUCLOCK_SCHED: what clock_getcpuclockid(3) makes of a process id
@@ -15,6 +16,14 @@ def processor_ns(pid: int) -> int:
     """Processor time of all threads so far, of those that have ended too: exactly, where /proc/PID/stat counts clock
     ticks."""
     return time.clock_gettime_ns(~pid << 3 | PROCESS_CLOCK)
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process runs; one that is a zombie does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] not in "ZX"
+    except OSError:
+        return False
 
 
 @contextmanager

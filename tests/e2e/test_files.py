@@ -21,18 +21,6 @@ BLOCKS = {
 }
 
 
-@pytest.fixture(params=["serial", "gateway", "tcp"])
-def link(request, plcrt, monkeypatch):
-    """The arguments of a link to plcrt, each kind in turn."""
-    if request.param == "tcp":
-        plcrt.stop()
-        plcrt.options = ("--tcp", "0")
-        plcrt.start()
-        return ["--tcp", plcrt.tcp]
-    monkeypatch.setenv("PLCTOOL_GATEWAY", "on" if request.param == "gateway" else "off")
-    return ["--port", plcrt.port]
-
-
 def names(document):
     return [file["name"] for file in document["files"]]
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from processes import is_alive
 
 import plctool
 from plctool.errors import LinkError
@@ -119,13 +120,6 @@ def large(tool: Any) -> Path:
 def only_gateway() -> dict[str, Any]:
     (found,) = gateways()
     return found
-
-
-def is_alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] not in "ZX"
-    except OSError:
-        return False
 
 
 # ---- side by side ----------------------------------------------------------------------------------------------------

@@ -25,18 +25,6 @@ def environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("PLC_NEW_PASSWORD", raising=False)
 
 
-@pytest.fixture(params=["serial", "gateway", "tcp"])
-def link(request, plcrt, monkeypatch):
-    """The arguments of a link to plcrt, each kind in turn."""
-    if request.param == "tcp":
-        plcrt.stop()
-        plcrt.options = ("--tcp", "0")
-        plcrt.start()
-        return ["--tcp", plcrt.tcp]
-    monkeypatch.setenv("PLCTOOL_GATEWAY", "on" if request.param == "gateway" else "off")
-    return ["--port", plcrt.port]
-
-
 def set_password(tool, link, monkeypatch, new, present=None):
     monkeypatch.setenv("PLC_NEW_PASSWORD", new)
     with_password(monkeypatch, present)

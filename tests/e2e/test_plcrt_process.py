@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from elftools.elf.elffile import ELFFile
 from elftools.elf.enums import ENUM_DT_FLAGS
-from processes import processor_ns, started
+from processes import is_alive, processor_ns, started
 
 from plctool import connect
 from plctool.core import lib
@@ -299,14 +299,6 @@ def test_it_needs_next_to_no_processor_time_when_idle(plcrt, questions):
     time.sleep(2)
     share = (sum(map(processor_ns, pids)) - before) / (time.monotonic_ns() - begun)
     assert share < IDLE_SHARE
-
-
-def is_alive(pid: int) -> bool:
-    """Whether a process runs; one that is a zombie does not."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] not in "ZX"
-    except OSError:
-        return False
 
 
 def test_it_ends_with_a_test_that_is_killed(tmp_path, eventually):

@@ -6,20 +6,13 @@ import random
 import signal
 
 import pytest
+from questions import read, status
 
 from plctool.gateway.control import dismiss_idle
 from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
 from plctool.link.services import download
 from plctool.link.session import Session
-
-
-def status(tool, plcrt):
-    return tool.ok("status", "--port", plcrt.port)
-
-
-def read(tool, plcrt, name):
-    return tool.ok("read", "--port", plcrt.port, name)["values"][name]
 
 
 def program(variables: str, body: str) -> str:

@@ -11,6 +11,7 @@ import time
 
 import pytest
 from processes import processor_ns
+from questions import log, read, status
 
 from plctool.errors import PlcError
 from plctool.gateway.control import dismiss_idle
@@ -48,33 +49,11 @@ WHERE = {
 }
 
 
-def status(tool, plcrt):
-    return tool.ok("status", "--port", plcrt.port)
-
-
-def read(tool, plcrt, name):
-    return tool.ok("read", "--port", plcrt.port, name)["values"][name]
-
-
-def log_texts(tool, plcrt) -> str:
-    return "\n".join(entry["text"] for entry in tool.ok("log", "--port", plcrt.port)["entries"])
-
-
 def prove(tool, plcrt, image, eventually) -> None:
     """Flashes a program and lets it run until the device trusts it."""
     tool.ok("flash", "--port", plcrt.port, str(image))
     begin = read(tool, plcrt, "Main.count")
     eventually(lambda: read(tool, plcrt, "Main.count") > begin + 100 * (PROVEN_AFTER + 0.5))
-
-
-@pytest.fixture
-def kill_worker(plcrt, eventually):
-    def kill(number: signal.Signals) -> None:
-        worker = eventually(lambda: plcrt.worker)
-        os.kill(worker, number)
-        eventually(lambda: plcrt.worker not in (None, worker))
-
-    return kill
 
 
 # ---- what a program does to itself ----
@@ -118,7 +97,7 @@ def test_a_program_stays_stopped_when_the_controller_died_and_runs_again_when_it
     kill_worker(number)
     now = status(tool, plcrt)
     assert now["state"] in ("stop", "exception") and now["image_crc"] == crc
-    assert f"signal {number.name}" in log_texts(tool, plcrt)
+    assert f"signal {number.name}" in log(tool, plcrt)
     tool.ok("start", "--port", plcrt.port)
     assert status(tool, plcrt)["state"] == "run"
 
@@ -170,7 +149,7 @@ def test_a_death_in_initialisation_leaves_the_device_reachable(tool, plcrt, coun
         download(session, image, restart=True)
     killer.join()
     assert status(tool, plcrt)["state"] != "run"
-    assert f"signal {number.name}" in log_texts(tool, plcrt)
+    assert f"signal {number.name}" in log(tool, plcrt)
     assert plcrt.stop() == 0
     plcrt.start()
     if number is not signal.SIGKILL:  # which counts as a power cut, so that it is tried again

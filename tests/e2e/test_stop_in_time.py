@@ -6,6 +6,7 @@ import signal
 import time
 
 import pytest
+from questions import log
 
 
 @pytest.fixture
@@ -70,10 +71,6 @@ def start_loop(tool, plcrt, eventually, kind: str) -> None:
     eventually(lambda: tool.ok("read", "--port", plcrt.port, "begun")["values"]["begun"] > 0)
 
 
-def texts(tool, plcrt) -> str:
-    return "\n".join(entry["text"] for entry in tool.ok("log", "--port", plcrt.port)["entries"])
-
-
 @pytest.mark.parametrize("kind", TASKS)
 def test_stop_ends_an_endless_task_and_says_where_it_was(tool, plcrt, eventually, kind):
     start_loop(tool, plcrt, eventually, kind)
@@ -81,7 +78,7 @@ def test_stop_ends_an_endless_task_and_says_where_it_was(tool, plcrt, eventually
     status = tool.ok("status", "--port", plcrt.port)
     assert (status["exception"]["name"], status["exception"]["task"]) == ("STOP_TIMEOUT", "Endless")
     assert status["exception"]["line"] in LOOP
-    assert "Endless: did not end in time for a stop" in texts(tool, plcrt)
+    assert "Endless: did not end in time for a stop" in log(tool, plcrt)
 
 
 def test_reset_ends_an_endless_task_and_the_program_starts_again(tool, plcrt, eventually):

@@ -11,7 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from processes import started
+from processes import is_alive, started
+from questions import log
 
 from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
@@ -32,14 +33,6 @@ def files(pid: int) -> int:
     return len(list(Path(f"/proc/{pid}/fd").iterdir()))
 
 
-def runs(pid: int) -> bool:
-    """Whether a process runs; one that is a zombie does not."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] not in "ZX"
-    except OSError:
-        return False
-
-
 def exists(pid: int) -> bool:
     return Path(f"/proc/{pid}").exists()
 
@@ -58,28 +51,12 @@ def answer(port: str) -> str:
         return read_status(session).state.value
 
 
-@pytest.fixture
-def kill_worker(plcrt, eventually):
-    """Kills the worker with a signal, and waits for the next one."""
-
-    def kill(number: signal.Signals) -> None:
-        worker = eventually(lambda: plcrt.worker)
-        os.kill(worker, number)
-        eventually(lambda: plcrt.worker not in (None, worker))
-
-    return kill
-
-
-def log_texts(tool, plcrt) -> list[str]:
-    return [entry["text"] for entry in tool.ok("log", "--port", plcrt.port)["entries"]]
-
-
 @pytest.mark.parametrize("number", [*DEADLY, OUTSIDE])
 def test_it_answers_on_the_same_line_after_a_death_and_says_what_it_died_of(tool, plcrt, kill_worker, number):
     kill_worker(number)
     assert answer(plcrt.port) == "none"
     said = f"signal {number.name}" if number is not signal.SIGSYS else f"signal {number.value}"
-    assert any("was started again" in text and said in text for text in log_texts(tool, plcrt))
+    assert any("was started again" in text and said in text for text in log(tool, plcrt).splitlines())
 
 
 def test_it_is_there_again_within_a_second(plcrt, kill_worker, eventually):
@@ -138,13 +115,13 @@ def test_a_second_signal_ends_both_at_once(plcrt, eventually):
     eventually(lambda: not is_pending(plcrt.process.pid, signal.SIGTERM))  # two that wait are one
     plcrt.process.terminate()
     assert plcrt.process.wait(PATIENCE) == -signal.SIGTERM
-    assert not runs(worker)
+    assert not is_alive(worker)
 
 
 def test_the_worker_ends_with_a_supervisor_that_is_killed(plcrt, eventually):
     worker = plcrt.worker
     plcrt.stop(signal.SIGKILL)
-    eventually(lambda: not runs(worker))
+    eventually(lambda: not is_alive(worker))
     plcrt.start()  # at once: neither the flash file nor the line is held
     assert answer(plcrt.port) == "none"
 
