@@ -195,7 +195,8 @@ def test_symbols_takes_patterns(tool: Any, counter: Path) -> None:
 
 
 @pytest.mark.parametrize(("pattern", "message"), [
-    ("Nope.*", "No variable matches Nope.*"), ("Main", "Main has no value of its own"), ("Mian.n", "Did you mean Main.n?"),
+    ("Nope.*", "No variable matches Nope.*"), ("Main", "Main has no value of its own"),
+    ("Mian.n", "Did you mean Main.n?"),
 ])  # fmt: skip
 def test_symbols_of_a_pattern_that_matches_nothing_are_refused(
     tool: Any, counter: Path, pattern: str, message: str

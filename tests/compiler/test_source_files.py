@@ -491,5 +491,5 @@ def test_text_that_is_no_program_is_not_named(tmp_path: Path) -> None:
 
 def test_current_folder_without_sources_is_named_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(UsageError, match="^The current folder has no source file"):
+    with pytest.raises(UsageError, match=r"^The current folder has no source file"):
         load_sources([Path(".")])
