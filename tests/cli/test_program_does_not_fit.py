@@ -99,6 +99,18 @@ def test_stack_is_that_of_the_deepest_calls(refused: Any, tool: Any) -> None:
     assert tool("build", "app.st", "-o", "app.cdl").status == 0  # plcrt has more
 
 
+def test_stack_of_a_program_whose_calls_may_lead_back_is_null(tool: Any, scratch: Path) -> None:
+    text = """FUNCTION_BLOCK Node
+VAR_INPUT next : POINTER TO Node; END_VAR
+IF next <> 0 THEN next^(); END_IF
+END_FUNCTION_BLOCK
+PROGRAM Main VAR one, other : Node; END_VAR one(next := ADR(other)); END_PROGRAM
+"""
+    (scratch / "app.st").write_text(text)
+    needs = tool("build", "app.st", "-o", "app.cdl", "--json").json["needs"]
+    assert needs["stack"] is None and needs["tasks"] == 1
+
+
 def test_all_limits_are_named_at_once(refused: Any) -> None:
     message = refused(BIG_DATA.replace("VAR small", "VAR_TEMP t : ARRAY[0..999] OF DINT; i : INT; END_VAR VAR small")
                       .replace("big[small] :=", "FOR i := 0 TO 999 DO t[i] := i; END_FOR big[small] := t[small] +"),

@@ -9,6 +9,7 @@ import pytest
 from plctool.compiler import compile_sources
 from plctool.compiler.codegen.calls import branches
 from plctool.compiler.codegen.stack import deepest_calls
+from plctool.errors import UsageError
 from plctool.image.targets import TARGETS, Machine
 
 LEVELS = (0, 2, "s")
@@ -84,6 +85,27 @@ END_FUNCTION_BLOCK"""
     )
     need = compile_sources([tmp_path], target=target, level=0).needs["stack"]
     assert 1200 <= need.amount < 1500
+
+
+RECURSIVE = """FUNCTION_BLOCK Node
+VAR_INPUT next : POINTER TO Node; n : DINT; END_VAR
+VAR_TEMP t : ARRAY[0..299] OF DINT; i : DINT; END_VAR
+FOR i := 0 TO 299 DO t[i] := n + i; END_FOR
+IF next <> 0 THEN next^(n := t[n]); n := t[n + 1]; END_IF
+END_FUNCTION_BLOCK
+PROGRAM Main VAR one, other : Node; END_VAR one(next := ADR(other)); END_PROGRAM
+"""
+
+
+def test_stack_of_calls_that_may_lead_back_is_not_known(tmp_path: Path) -> None:
+    (tmp_path / "app.st").write_text(RECURSIVE)
+    assert compile_sources([tmp_path]).needs["stack"].known is None
+
+
+def test_calls_that_may_lead_back_are_refused_where_not_even_one_of_them_fits(tmp_path: Path) -> None:
+    (tmp_path / "app.st").write_text(RECURSIVE)
+    with pytest.raises(UsageError, match=r"It needs at least 12\d\d bytes of stack, the device has"):
+        compile_sources([tmp_path], board="mps2-an385/standard")
 
 
 def test_a_distance_that_looks_like_a_call_leads_to_a_function_or_is_none() -> None:

@@ -70,7 +70,7 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
         "crc": f"{result.crc:08X}",
         "size": len(result.image),
         "target": result.symbols.target,
-        "needs": {name: need.amount for name, need in result.needs.items()},
+        "needs": {name: need.known for name, need in result.needs.items()},
         "warnings": [diagnostic_document(w) for w in result.warnings],
     }
     if channels:

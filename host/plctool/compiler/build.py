@@ -126,7 +126,7 @@ def _needs(
     frames: Counter[str] = Counter()
     for offset, frame in chain:
         frames[names[offset]] += frame
-    needs["stack"] = Need(frames.total(), largest((+frames).items()), deepest=True)
+    needs["stack"] = Need(frames.total(), largest((+frames).items()), deepest=True, at_least=program.may_recurse)
     return needs
 
 

@@ -73,11 +73,11 @@ class Diagnostics:
     def warning(self, pos: Pos, code: str, message: str) -> None:
         """Records a warning, unless it is not wanted; `code` is one of WARNINGS. A dialect may make it an error, which
         cannot be turned off."""
-        if code in self.dialect.errors and pos.file not in self._quiet:
+        if code in self.dialect.errors and not self.is_quiet(pos.file):
             self.error(pos, code, f"{message} (an error in the dialect {self.dialect.name})")
             return
         muted = self._muted.get((pos.file, code), ())
-        if pos.file in self._quiet or code in self.options.disabled or any(a <= pos.line < b for a, b in muted):
+        if self.is_quiet(pos.file) or code in self.options.disabled or any(a <= pos.line < b for a, b in muted):
             return
         if self.options.as_errors:
             self._add(pos, "error", code, f"{message} (an error because of --werror)")
@@ -87,6 +87,10 @@ class Diagnostics:
     def quiet(self, paths: Iterable[str]) -> None:
         """There are no warnings about these files."""
         self._quiet |= frozenset(paths)
+
+    def is_quiet(self, path: str) -> bool:
+        """Whether there are no warnings about a file."""
+        return path in self._quiet
 
     def mute(self, source: Source) -> None:
         """Heeds the pragmas of a text that turn warnings off."""

@@ -189,6 +189,7 @@ def _check_parsed(
         constants=world.constants,
         externals=program.external_functions(),
         io=world.io.description,
+        may_recurse=program.may_recurse,
     )
     if not world.diagnostics.errors:
         plan_images(typed, world.diagnostics)

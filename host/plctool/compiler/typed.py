@@ -650,3 +650,4 @@ class TypedProgram:
     shutdown: Pou | None = None  # what is called when the application ends, or its variables are initialised
     externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not
     io: Description | None = None  # the inputs and outputs, each with its address
+    may_recurse: bool = False  # a call may lead back to its caller, so that the depth of calls is not known

@@ -31,11 +31,17 @@ _LARGEST = 3
 @dataclass(frozen=True)
 class Need:
     """How much a program needs of something, and what needs most of it: (name, amount), largest first. `deepest`: they
-    are the frames of a chain of calls."""
+    are the frames of a chain of calls. `at_least`: it is not known how much more."""
 
     amount: int
     parts: tuple[tuple[str, int], ...] = ()
     deepest: bool = False
+    at_least: bool = False
+
+    @property
+    def known(self) -> int | None:
+        """The amount, if that is all."""
+        return None if self.at_least else self.amount
 
 
 def of_area(area: Area) -> str:
@@ -71,7 +77,7 @@ def check_fit(needs: Mapping[str, Need], limits: Mapping[str, int], device: str,
 
 
 def _sentence(name: str, need: Need, limit: int) -> str:
-    text = f"It needs {need.amount} {LIMITS[name]}, the device has {limit}"
+    text = f"It needs {'at least ' if need.at_least else ''}{need.amount} {LIMITS[name]}, the device has {limit}"
     if not need.parts:
         return f"{text}."
     parts = need.parts[:_LARGEST]

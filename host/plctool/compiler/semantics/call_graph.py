@@ -7,8 +7,9 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
 
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.semantics.generics import bounds_of
@@ -46,11 +47,16 @@ class CallGraph:
     def __init__(self, diagnostics: Diagnostics) -> None:
         self._diagnostics = diagnostics
         self._calls: dict[Pou, dict[Pou, Pos]] = {}
+        self._possible: list[tuple[Pou, list[Pou], Pos]] = []
 
     def add(self, caller: Pou | None, callee: Pou, pos: Pos) -> None:
         """Notes who calls whom."""
         if caller is not None:
             self._calls.setdefault(caller, {}).setdefault(callee, pos)
+
+    def add_possible(self, caller: Pou, targets: Iterable[Pou], pos: Pos) -> None:
+        """Notes a call through a pointer or an interface: one of `targets` runs."""
+        self._possible.append((caller, list(targets), pos))
 
     def report_shared(self, tasks: Iterable[Task]) -> None:
         """Warns of programs that run more than once in a cycle, or in tasks that may interrupt each other."""
@@ -100,13 +106,59 @@ class CallGraph:
                     stack.append((following, iter(self._calls.get(following, {}))))
 
     def _recursion(self, cycle: list[Pou], pou: Pou, pos: Pos) -> None:
-        if len(cycle) == 1:
-            message = f"{pou.name} calls itself"
-        else:
-            message = f"{pou.name} calls itself through {' and '.join(p.name for p in cycle[1:])}"
-        self._diagnostics.error(
-            pos, "recursion", f"{message}, which the stack of a controller does not allow; use a loop"
-        )
+        message = f"{pou.name} calls itself{_through(cycle[1:])}, which the stack of a controller does not allow"
+        self._diagnostics.error(pos, "recursion", f"{message}; use a loop")
+
+    def report_possible_recursion(self) -> bool:
+        """Warns of calls through a pointer or an interface that may lead back to their caller, once for each circle.
+        Returns whether there are any."""
+        if not self._may_be_circular():
+            return False
+        calls = {caller: list(called) for caller, called in self._calls.items()}
+        circles: dict[frozenset[Pou], tuple[Pos, str]] = {}
+        for caller, targets, pos in sorted(self._possible, key=self._as_place_to_warn, reverse=True):
+            ways = {target: _way(calls, target, caller) for target in targets}
+            calls.setdefault(caller, []).extend(target for target, way in ways.items() if not way)
+            way = min(filter(None, ways.values()), key=len, default=[])
+            if way:
+                circles[frozenset(way)] = pos, f"{caller.name} may call itself here{_through(way[:-1])}"
+        for pos, message in circles.values():
+            message += ": how much stack that needs is not known, and a controller has little"
+            self._diagnostics.warning(pos, "recursion", message)
+        return True
+
+    def _as_place_to_warn(self, call: tuple[Pou, list[Pou], Pos]) -> tuple[bool, str, int, int]:
+        """The order of calls: the first of a circle is where it is reported, which is not in a library."""
+        pos = call[2]
+        return self._diagnostics.is_quiet(pos.file), pos.file, pos.line, pos.column
+
+    def _may_be_circular(self) -> bool:
+        graph = TopologicalSorter[Pou](self._calls)
+        for caller, targets, _ in self._possible:
+            graph.add(caller, *targets)
+        try:
+            graph.prepare()
+        except CycleError:
+            return True
+        return False
+
+
+def _through(pous: Sequence[Pou]) -> str:
+    return f" through {' and '.join(pou.name for pou in pous)}" if pous else ""
+
+
+def _way(calls: Mapping[Pou, Iterable[Pou]], start: Pou, end: Pou) -> list[Pou]:
+    """A shortest chain of calls, both ends included; empty if there is none."""
+    chains = {start: [start]}
+    todo = [start]
+    for pou in todo:
+        if pou is end:
+            return chains[pou]
+        for callee in calls.get(pou, ()):
+            if callee not in chains:
+                chains[callee] = [*chains[pou], callee]
+                todo.append(callee)
+    return []
 
 
 # ---- variables that several tasks write: one may undo what the other wrote ----

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.semantics.call_graph import CallGraph
 from plctool.compiler.semantics.symbols import ClassInfo, FunctionInfo, Member
 from plctool.compiler.typed import (
@@ -168,13 +167,10 @@ class Dispatches:
                 elif member is not None and not member.abstract:
                     dispatch.targets[other.number] = signature(member).pou
 
-    def report_calls(self, calls: CallGraph, diagnostics: Diagnostics) -> None:
-        """Notes who calls whom, now that the targets are known, and warns of what may be recursion."""
+    def note_calls(self, calls: CallGraph) -> None:
+        """Notes who calls whom, now that the targets are known."""
         for caller, dispatch, pos in self._own_calls:
             for target in dispatch.targets.values():
                 calls.add(caller, target, pos)
         for caller, function, dispatch_of, pos in self._other_calls:
-            targets = [function] if dispatch_of is None else list(dispatch_of.targets.values())
-            if caller in targets:
-                message = f"{caller.name} may call itself here: the calls have to fit the stack of the controller"
-                diagnostics.warning(pos, "recursion", message)
+            calls.add_possible(caller, [function] if dispatch_of is None else dispatch_of.targets.values(), pos)

@@ -47,6 +47,7 @@ class Program:
         self.libraries: Sequence[ImportedLibrary] = ()
         self.startup: Pou | None = None  # calls FB_Init
         self.shutdown: Pou | None = None  # calls FB_Exit
+        self.may_recurse = False
         world.names.declared_instance = self.programs.instance
         world.declared = Declared(
             type_of=self.types.type_of_symbol,
@@ -92,8 +93,9 @@ class Program:
         self._classes.find_targets(
             v for vs in (world.allocation.variables, *(p.locals for p in world.pous)) for v in vs
         )
-        world.dispatches.report_calls(world.calls, world.diagnostics)
+        world.dispatches.note_calls(world.calls)
         world.calls.report_recursion()
+        self.may_recurse = world.calls.report_possible_recursion()
         if not world.diagnostics.errors:
             report_endless(world.loops, world.diagnostics)
 

@@ -143,10 +143,12 @@ def block_call(c: Checker, call: ast.Call, instance: Expr) -> list[Statement]:
     handed = _block_arguments(c, block, bound, call, place)
     if handed is None:
         return []
-    if not isinstance(place, DerefPlace):
-        c.world.calls.add(c.scope.pou, block.pou, pos)
     statement = FbCall(block.pou, place, handed.inputs, handed.in_outs, handed.outputs, pos)
     statement.dispatch = body_dispatch(c, block, place)
+    if not isinstance(place, DerefPlace):
+        c.world.calls.add(c.scope.pou, block.pou, pos)
+    if isinstance(place, DerefPlace) or statement.dispatch is not None:
+        c.world.dispatches.note_other_call(c.scope.pou, block.pou, statement.dispatch, pos)
     return [statement, *handed.after]
 
 
