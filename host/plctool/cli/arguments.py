@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from plctool.errors import UsageError
+from plctool.errors import UsageError, did_you_mean
 from plctool.files import file_path, usable_path
 from plctool.iec.dialect import DIALECTS
 from plctool.image.targets import DEFAULT_TARGET, TARGETS
@@ -20,13 +21,31 @@ if TYPE_CHECKING:
 
 DEFAULT_INTERVAL = 0.5  # seconds between two readings
 BENCH_CYCLES = 10000
+_ONE_DOCUMENT = "print one JSON document and nothing else"
 
 
 class _Parser(argparse.ArgumentParser):
     """Reports wrong arguments as UsageError, like all other wrong use."""
 
     def error(self, message: str) -> NoReturn:
+        message = self._without_value(message) or message + self._meant(message)
         raise UsageError(f"{message[:1].upper()}{message[1:]}; see '{self.prog} --help'.", "usage")
+
+    def _without_value(self, message: str) -> str:
+        """What to say of an option without its value, "" for other mistakes."""
+        found = re.match(r"argument (\S+): expected (?:at least )?one argument", message)
+        option = "" if found is None else found[1].rpartition("/")[2]
+        action = self._option_string_actions.get(option)
+        if action is None:
+            return ""
+        value = action.metavar or "|".join(map(str, action.choices or ())) or action.dest.upper()
+        return f"{option} is followed by {value}"
+
+    def _meant(self, message: str) -> str:
+        """`(did you mean --version?)` for an option that is not known, if there is one like it."""
+        found = re.match(r"unrecognized arguments: (-\S+)", message)
+        hint = "" if found is None else did_you_mean(found[1], self._option_string_actions)
+        return f" ({hint.removeprefix('; ')})" if hint else ""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -36,9 +55,9 @@ def parser() -> argparse.ArgumentParser:
     root.set_defaults(command="")
     commands = root.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
 
-    def command(name: str, text: str) -> argparse.ArgumentParser:
+    def command(name: str, text: str, json: str = _ONE_DOCUMENT) -> argparse.ArgumentParser:
         sub = commands.add_parser(name, help=text, description=text[:1].upper() + text[1:] + ".")
-        sub.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
+        sub.add_argument("--json", action="store_true", help=json)
         sub.set_defaults(command=name)
         return sub
 
@@ -47,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
     _add_io_commands(command)
     command("demo", "run a demonstration of all of it on this machine")
     completion = command("completion", "print the script that makes a shell complete this command")
-    completion.add_argument("shell", choices=["bash", "zsh", "fish"], help="your shell")
+    completion.add_argument("shell", choices=["bash", "zsh", "fish"], metavar="bash|zsh|fish", help="your shell")
     command("man", "print the manual page, for 'man -l -'")
     return root
 
@@ -208,7 +227,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(command("cycle", "run one cycle of each task of a stopped program"))
     reset = command("reset", "reset the program; it is stopped afterwards")
     reset.add_argument(
-        "option", choices=["warm", "cold", "origin"],
+        "option", choices=["warm", "cold", "origin"], metavar="warm|cold|origin",
         help="warm keeps RETAIN variables, cold only PERSISTENT ones, origin deletes the program",
     )  # fmt: skip
     _add_link(reset)
@@ -248,7 +267,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     write = command("write", "set variables")
     write.add_argument("values", nargs="+", metavar="NAME=VALUE", help="value as 'read' shows it: Main.pause=T#2s")
     _add_link(write, symbols=True)
-    watch = command("watch", "print values of variables periodically")
+    watch = command(
+        "watch", "print values of variables periodically", json="print a JSON document a line for each reading"
+    )
     _add_names(watch)
     watch.add_argument("--interval", type=_seconds, default=DEFAULT_INTERVAL, metavar="S", help="seconds; default: 0.5")
     watch.add_argument("--count", type=_count, metavar="N", help="readings; default: until Ctrl-C")
@@ -256,8 +277,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
 
     gateway = command("gateway", "show or end the processes that share a serial line among tools")
     gateway.add_argument(
-        "what", choices=["status", "stop"], help="status: tools of each line; stop: end it, its tools get an error"
-    )
+        "what", choices=["status", "stop"], metavar="status|stop",
+        help="status: tools of each line; stop: end it, its tools get an error",
+    )  # fmt: skip
     gateway.add_argument("--port", metavar="PORT", help="only the gateway of this port; default: all of this user")
 
 
@@ -297,7 +319,7 @@ def _actions(command: argparse.ArgumentParser) -> Callable[[str, str], argparse.
 
     def action(name: str, text: str) -> argparse.ArgumentParser:
         sub = actions.add_parser(name, help=text, description=text[:1].upper() + text[1:] + ".")
-        sub.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
+        sub.add_argument("--json", action="store_true", help=_ONE_DOCUMENT)
         return sub
 
     return action
@@ -319,7 +341,7 @@ def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     identify.add_argument("io_device", metavar="DEVICE", help="its name in 'plctool io status'")
     _add_link(identify)
     param = action("param", "read or set a parameter of a device, until the program is loaded again")
-    param.add_argument("verb", choices=["get", "set"])
+    param.add_argument("verb", choices=["get", "set"], metavar="get|set")
     param.add_argument("io_device", metavar="DEVICE", help="its name in 'plctool io status'")
     param.add_argument("parameter", metavar="NAME|ID[=VALUE]", help="set: with its value")
     param.add_argument("--type", metavar="TYPE", help="of one that the description does not have; default: UDINT")
