@@ -28,7 +28,7 @@ typedef struct {
     FILE_AREA file[FILE_COUNT];   /* where each FILE_* is in the flash */
     RTS_UI32 area[APP_AREA_CODE]; /* RAM of the areas data, retain, input, output, memory */
     RTS_UI32 code;                /* largest code segment; 0: what fits a slot */
-    RTS_UI32 stack;               /* of the IEC code of a task; 0: not known */
+    RTS_UI32 stack;               /* of a task, for its calls (without RTS_IEC_STACK_LOST); 0: not known */
     RTS_UI32 tasks;               /* most of an application */
     RTS_UI32 imports;             /* most external functions of an application */
     RTS_UI32 record;              /* data of a commit record (AppRecord.h) */

@@ -226,6 +226,12 @@
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) (entry)(context, init_retains)
 #endif
 
+/* What of RTS_IEC_STACK_SIZE is not there for the calls of a program [bytes]: what is pushed before its code is entered
+ * and when it is interrupted, and a guard. The compiler counts with the remaining (BoardFacts.h). */
+#ifndef RTS_IEC_STACK_LOST
+#define RTS_IEC_STACK_LOST 0
+#endif
+
 /* 1: the runtime has one core, where interrupts and main see each other's writes in order, so only the compiler has to
  * keep it. 0: several, or threads. */
 #ifndef RTS_ONE_CORE

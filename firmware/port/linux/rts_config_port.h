@@ -71,6 +71,10 @@
 /* Stack of the IEC code of a thread [bytes]. */
 #define RTS_IEC_STACK_SIZE (1024 * 1024)
 
+/* Of it this is not the program's [bytes]: the way there, and what a function without calls has below its stack pointer
+ * (128 on x86-64). */
+#define RTS_IEC_STACK_LOST 1024
+
 /* Stack of a task's thread [bytes], on which the runtime runs and IEC code does not (IecStack.c); the thread sanitizer
  * needs 1 MiB. The zone below it has no memory. */
 #ifndef PORT_STACK_SIZE

@@ -36,7 +36,7 @@ __attribute__((used, section("board_facts"), aligned(4))) static const BOARD_FAC
     .file = {FILE_MAP},
     .area = {APP_DATA_SIZE, APP_RETAIN_SIZE, APP_INPUT_SIZE, APP_OUTPUT_SIZE, APP_MEMORY_SIZE},
     .code = APP_MAX_CODE_SIZE,
-    .stack = RTS_IEC_STACK_SIZE,
+    .stack = RTS_IEC_STACK_SIZE - RTS_IEC_STACK_LOST,
     .tasks = APP_MAX_TASKS,
     .imports = APP_MAX_IMPORTS,
     .record = COMMIT_RECORD_SIZE,

@@ -1,5 +1,5 @@
 /*
- * IecCall.c - enters compiled code, with the import table in r9.
+ * IecCall.c - enters compiled code, with the import table in r9. What it saves counts (RTS_IEC_STACK_LOST).
  *
  * SPDX-License-Identifier: Apache-2.0
  */

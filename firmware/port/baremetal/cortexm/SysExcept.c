@@ -73,10 +73,12 @@ RTS_STATIC_ASSERT(RTS_IEC_STACK_SIZE % 32 == 0 && RTS_IEC_STACK_SIZE >= 256, iec
 
 #if RTS_IEC_UNPRIVILEGED
 RTS_STATIC_ASSERT((RTS_IEC_STACK_SIZE & (RTS_IEC_STACK_SIZE - 1)) == 0, iec_stack_is_a_region);
-enum { IEC_STACK_ALIGN = RTS_IEC_STACK_SIZE, IEC_STACK_GUARD = 0 };
+enum { IEC_STACK_ALIGN = RTS_IEC_STACK_SIZE };
 #else
-enum { IEC_STACK_ALIGN = STACK_GUARD, IEC_STACK_GUARD = STACK_GUARD };
+RTS_STATIC_ASSERT(RTS_IEC_STACK_GUARD == STACK_GUARD, what_is_lost_to_the_guard_is_known);
+enum { IEC_STACK_ALIGN = STACK_GUARD };
 #endif
+enum { IEC_STACK_GUARD = RTS_IEC_STACK_GUARD };
 
 /* At the bottom of RAM, the deepest first: what gets past its slot hits one that is idle now, or no memory at all. */
 __attribute__((section(".bss.iec_stack"), aligned(IEC_STACK_ALIGN))) static IEC_STACK stacks[APP_MAX_TASKS];

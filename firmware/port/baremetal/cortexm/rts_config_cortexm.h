@@ -10,6 +10,12 @@
 
 #define APP_ENTRY_MODE_BIT 1
 
+/* Of RTS_IEC_STACK_SIZE these are not the program's [bytes]: what IecCall saves at most, the frame that the processor
+ * pushes when the program is interrupted, larger with an FPU (BOARD_TARGET_ID), and the guard. */
+#define RTS_IEC_STACK_GUARD (RTS_IEC_UNPRIVILEGED ? 0 : 32)
+#define RTS_IEC_STACK_LOST (16 + (CPU_HAS_FPU ? 104 : 32) + RTS_IEC_STACK_GUARD)
+#define CPU_HAS_FPU (BOARD_TARGET_ID == TARGET_ID_CORTEX_M4F || BOARD_TARGET_ID == TARGET_ID_CORTEX_M7)
+
 #if RTS_IEC_UNPRIVILEGED
 /* The areas are rounded up to a multiple of an eighth of the power of 2 that holds them: make APP_DATA_SIZE so large that
  * nothing is lost. */

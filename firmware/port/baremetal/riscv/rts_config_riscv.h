@@ -12,6 +12,9 @@
 #undef RTS_IEC_UNPRIVILEGED
 #define RTS_IEC_UNPRIVILEGED 1
 
+/* Of RTS_IEC_STACK_SIZE this is not the program's [bytes]: what IecCall saves. Traps are on the main stack. */
+#define RTS_IEC_STACK_LOST 16
+
 /* An entry of the PMP may begin and end at each of these; most chips are as fine. */
 #define APP_AREAS_ALIGNED(size) __attribute__((aligned(32)))
 #define APP_AREAS_SECTION __attribute__((section(".bss.areas")))
