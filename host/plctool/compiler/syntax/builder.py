@@ -560,6 +560,8 @@ class Builder:
             kind, value, name = literals.typed(token.text)
             return ast.Literal(token.pos, kind, value, name)
         except literals.LiteralError as error:
+            if slips.CUT_DURATION.match(self.source.text, token.end):  # said of what follows
+                return ast.Literal(token.pos, ast.LiteralKind.BAD, 0)
             return self._bad(token, error)
 
     def string(self, token: Token) -> ast.Literal:

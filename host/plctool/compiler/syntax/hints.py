@@ -18,7 +18,7 @@ _TYPE = (
     r"W?CHAR|" + "|".join(slips.TYPES) + r")(?![\w#])"
 )
 _TYPE_FIRST = rf"(?:^|;|\bVAR)[ \t]*(?P<here>{_TYPE}[ \t]+(?P<name>[A-Za-z_]\w*)[ \t]*)(?=[;:\[,=])"
-_UNIT = r"\s*(?P<unit>ms|us|ns|s|m|h|d)\b"
+_UNIT = rf"[ \t]*(?P<unit>{slips.UNITS})\b"
 _IN_VARIABLES = "a variable is declared with its name first: {name} : {type};"
 _IN_BODY = slips.DECLARED
 _CHOICE = "a choice is written CASE a OF 1: ...; ELSE ...; END_CASE"
@@ -140,13 +140,16 @@ _HINTS = (
     _Hint(rf"(?:^|;)[ \t]*(?P<here>TASK\s+{_NAME}\s*\()",
           "a task is declared in CONFIGURATION ... END_CONFIGURATION, outside of the PROGRAM", "here", "body"),
     _Hint(r"\bAT\s+(?P<here>(?P<address>[IQM][XBWDL]?\d+(?:\.\d+)*))", "an address begins with %: %{address}", "here"),
-    _Hint(r"\w#\s*(?P<number>[\d.]+)(?P<here>\s+(?P<unit>ms|us|ns|s|m|h|d)\b\s*)",
+    _Hint(rf"\w#[ \t]*(?P<number>[\d.]+)(?P<here>[ \t]+(?P<unit>{slips.UNITS})\b\s*)",
           "a duration has no blank: T#{number}{unit}", "here"),
+    _Hint(rf"\w#(?P<number>\d+)(?P<here>,(?P<part>\d+(?:{slips.UNITS}))\b)", slips.COMMA, "here"),
     _Hint(r"\bT(?:IME)?#\d+(?P<here>:\d+(?::\d+)*)", "a duration is written with its units: T#1h30m5s", "here"),
     _Hint(r"(?:^|;)[ \t]*(?P<here>REM[ \t][^\n]*\n?\s*)", "a comment is written // or (* *)", "here"),
     _Hint(r"(?P<name>[\w.]+)\s*(?:<>|[<>]=?|=)\s*[\w.]+\s+(?P<word>AND|OR|XOR)\s+(?P<here>(?P<sign><>|[<>]=?|=)\s*"
           r"(?P<value>[\w.]+))", "{word} joins two comparisons: ... {word} {name} {sign} {value}", "here", "body"),
     _Hint(rf"{_NAME}\(\s*\w+\s*:=[^();]+(?P<here>;\s*)\w+\s*:=[^();]*\)", "inputs are separated by commas", "here"),
+    _Hint(rf"{_NAME}\s*\([^();]*:=[^();,]*?(?P<here>\s+){_NAME}\s*(?::=|=>)", "inputs are separated by commas", "here",
+          "body"),
     _Hint(rf"{_NAME}\([^();:\n]+(?P<here>;\s*)[^();:\n]+\)", "arguments are separated by commas", "here", "body",
           ends=True),
     _Hint(rf"(?P<here>\bCALL\s+(?P<name>{_NAME}))", "there is no CALL; write {name}(...)", "here", "body"),

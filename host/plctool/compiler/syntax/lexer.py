@@ -103,7 +103,8 @@ OPENING = frozenset((
 """Terminals that are names where no name (after AT, no address) follows."""
 
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
-_DURATION = re.compile(r"\d+(?:ms|us|ns|s|m|h|d)", re.IGNORECASE)
+_DURATION = re.compile(rf"\d+(?:{slips.UNITS})", re.IGNORECASE)
+_WITH_COMMA = re.compile(r"\w#(?P<number>\d+),$")
 _MODIFIED = re.compile(r"\s+(METHOD|PROPERTY|FUNCTION_BLOCK|FUNCTION|CLASS|PROGRAM|INTERFACE)\s+(\w+)", re.IGNORECASE)
 _STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quotes
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
@@ -261,10 +262,8 @@ class Lexer:
             kind, meant = "STRING", f"'{text[1:-1]}'"
             message = f"a string is written with straight quotes: {meant}"
         elif _DURATION.fullmatch(text):
-            before = self.text[max(0, pos - 20) : pos]
-            whole = before[len(before.rstrip("0123456789.")) :]
-            kind, meant, pos = "NUMBER", "", pos - len(whole)
-            message = f"a duration is written T#{whole}{text}, not {whole}{text}"
+            kind, meant = "NUMBER", ""
+            pos, message = self._duration(text, pos)
         else:
             kind, meant = "NUMBER", text.lower().replace("0x", "16#", 1).replace("0b", "2#", 1)
             message = f"a number is written {meant}, not {text}" if "#" in meant else f"{text} is not a number"
@@ -272,6 +271,15 @@ class Lexer:
                 message += "; a name begins with a letter"
         self._report(pos, "syntax", message)
         return Token(kind, meant if "#" in meant or kind != "NUMBER" else "0", pos)
+
+    def _duration(self, text: str, pos: int) -> tuple[int, str]:
+        """Where a duration without T# begins, and what to say of it."""
+        before = self.text[max(0, pos - 20) : pos]
+        comma = _WITH_COMMA.search(before)
+        if comma is not None:
+            return pos - 1, slips.COMMA.format(number=comma["number"], part=text)
+        whole = before[len(before.rstrip("0123456789.")) :]
+        return pos - len(whole), f"a duration is written T#{whole}{text}, not {whole}{text}"
 
     def _bad(self, character: str, pos: int) -> bool:
         """Reports a character that starts no token; False when the rest of the line is to be skipped."""

@@ -35,6 +35,13 @@ SIGNS = {
 }
 """Operators of other languages, and these, alike."""
 
+UNITS = "ms|us|ns|s|m|h|d"
+"""The pattern of a unit of a duration."""
+
+CUT_DURATION = re.compile(rf"[ \t]+(?:{UNITS})\b|,\d+(?:{UNITS})\b|:\d", re.IGNORECASE)
+"""The pattern of what follows a duration that ends too early. No such text is a program, so one error is enough."""
+
+COMMA = "a duration is written with a point: T#{number}.{part}"
 QUOTE = "a quote within a string is written $'"
 CHOICE = "a choice between two values is written SEL(condition, value_if_false, value_if_true)"
 CHARACTERS = {"#": "a comment is written // or (* *)", "?": CHOICE}

@@ -242,7 +242,7 @@ class Recovery:
     def _close(self, token: Token) -> bool:
         """Closes the innermost open IF, FOR, VAR ... when `token` can only stand further out."""
         opener = self._open()
-        if opener is None or token.type not in _SYNC:
+        if opener is None or not (token.type in _SYNC or self._ends_repeat(opener, token)):
             return False
         if token.type in _PARTS and not any(t.type in _PARTS[token.type] for t in self._openers()[:-1]):
             return False
@@ -255,6 +255,11 @@ class Recovery:
         self._report_open(token, opener)
         self._parser.feed(Token(KEYWORDS[end], end, token.pos))
         return True
+
+    def _ends_repeat(self, opener: Token, token: Token) -> bool:
+        """Whether a statement follows UNTIL and its condition."""
+        ended = self._previous is not None and self._previous.type == "_SEMI" and opener.type == "REPEAT"
+        return ended and self._shift(self._parser.states, "_END_REPEAT", token.type) is not None
 
     def _parted_end(self, token: Token) -> bool:
         """`END IF` for END_IF."""
