@@ -30,6 +30,7 @@ def said(variables: str, body: str, code: str, before: str = "") -> list[str]:
 # ---- integer-division ----------------------------------------------------------------------------------------------
 
 NUMBERS = "i, j : INT; d : DINT; u : UINT; r : REAL; l : LREAL; w : WORD; t : TIME; x : BOOL;"
+NUMBERS += " END_VAR VAR CONSTANT seven : INT := 7;"
 INT_TO_REAL = (
     "this division of INT drops its fraction and only then becomes REAL; convert an operand: INT_TO_REAL(...) / ..."
 )
@@ -48,6 +49,12 @@ INT_TO_REAL = (
         ("r := TO_REAL(i / j);", INT_TO_REAL),
         ("l := d / 3;", INT_TO_REAL.replace("INT", "DINT").replace("REAL", "LREAL")),
         ("r := SQRT(INT_TO_REAL(i / j));", INT_TO_REAL),
+        ("r := 1 / 3;", "this division of integers drops its fraction and gives 0; write 1.0 / 3"),
+        ("r := i + 10 / 4;", "this division of integers drops its fraction and gives 2; write 10.0 / 4"),
+        (
+            "r := seven / 2;",
+            "this division of integers drops its fraction and gives 3; convert an operand: INT_TO_REAL(...) / ...",
+        ),
     ],
 )
 def test_an_integer_division_that_goes_into_a_real(body: str, expected: str) -> None:
@@ -60,7 +67,9 @@ def test_an_integer_division_that_goes_into_a_real(body: str, expected: str) -> 
         "r := INT_TO_REAL(i) / j;",
         "r := i / 2.0;",
         "r := i / INT_TO_REAL(j);",
-        "r := 7 / 2;",  # constants are calculated without a type
+        "r := 8 / 2;",
+        "r := 7.0 / 2;",
+        "r := INT_TO_REAL(7 / 2);",
         "r := i * j;",
         "r := i MOD 10;",
         "i := i / j;",
@@ -72,6 +81,20 @@ def test_an_integer_division_that_goes_into_a_real(body: str, expected: str) -> 
 )
 def test_a_division_that_is_meant(body: str) -> None:
     assert not said(NUMBERS, body, "integer-division")
+
+
+# ---- NOT of a number ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("condition", ["NOT i = 5", "x AND NOT i = 5"])
+def test_not_of_a_number_that_is_compared(condition: str) -> None:
+    expected = ["NOT comes before = and inverts the bits of i; write NOT (i = ...)"]
+    assert said(NUMBERS, f"x := {condition};", "not") == expected
+
+
+@pytest.mark.parametrize("condition", ["NOT (i = 5)", "(NOT i) = 5", "NOT x = (i = 5)", "5 = NOT i", "NOT w = 5"])
+def test_not_that_is_meant(condition: str) -> None:
+    assert not said(NUMBERS, f"x := {condition};", "not")
 
 
 # ---- always --------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from front_support import check, main
 
-from plctool.compiler import warnings
+from plctool.compiler import check_with_tests, warnings
 from plctool.compiler.front import Source, check_sources
 from plctool.compiler.warnings import WARNINGS, warning_options
 from plctool.errors import UsageError
@@ -173,12 +173,32 @@ def test_instances_of_one_program_and_bare_addresses_do_not_overlap() -> None:
     assert check(text).diagnostics == []
 
 
+@pytest.mark.parametrize(
+    ("loop", "said"),
+    [
+        ("FOR i := 10 TO 1 DO", ["1: this loop never runs: to count down from 10 to 1, write BY -1"]),
+        ("FOR i := 1 TO 10 BY -2 DO", ["1: this loop never runs: to count up from 1 to 10, write BY 2"]),
+        ("FOR i := 10 TO 1 BY -1 DO", []),
+        ("FOR i := 1 TO 1 DO", []),
+    ],
+)
+def test_a_for_that_never_runs(loop: str, said: list[str]) -> None:
+    assert in_main(f"{loop} j := j + i; END_FOR;", "unreachable") == said
+
+
 # ---- result ----------------------------------------------------------------------------------------------------------
 
 
 def test_function_that_never_assigns_its_result_is_a_warning() -> None:
     text = "FUNCTION F : INT VAR_INPUT a : INT; END_VAR\nEND_FUNCTION\n" + main("i : INT;", "i := F(1);")
     assert warned(text, "result") == ["1:10: F never assigns its result; write F := ..."]
+
+
+def test_a_function_in_c_has_its_result_in_tests_too() -> None:
+    function = "{attribute 'external' := 'board_adc'}\nFUNCTION F : REAL\nEND_FUNCTION\n"
+    text = main("r : REAL;", "r := F();", function) + "TEST 'a'\nASSERT_TRUE(TRUE);\nEND_TEST\n"
+    found = check_with_tests([Source("f.st", text)]).diagnostics
+    assert not [d for d in found if d.code == "result"]
 
 
 @pytest.mark.parametrize(

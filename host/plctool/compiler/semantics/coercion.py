@@ -25,7 +25,7 @@ from plctool.compiler.semantics.conversions import (
 )
 from plctool.compiler.semantics.pitfalls import lost_fraction, overlays
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
-from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Call, Const, Convert, Expr, Load, Pos
+from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Call, Const, Convert, Expr, Load, Place, Pos, VarPlace
 from plctool.iec.literals import BitPattern
 from plctool.iec.types import (
     BOOL,
@@ -106,6 +106,9 @@ class Coercion:
             return self._error(e.pos, "type", message)
         counted = isinstance(e.type, ArrayType) and isinstance(target, StringType)
         hint = "; the last index of an array is UPPER_BOUND(..., 1)" if counted else ""
+        block = e.type if isinstance(e.type, StructType) else None
+        if block is not None and target is BOOL and (output := block.member("Q")) is not None and output.type is BOOL:
+            hint = f"; write {_written(e.place if isinstance(e, Load) else None)}.Q"
         return self._error(e.pos, "type", f"{e.type} does not fit {target}{hint}")
 
     def _no_scalars(self, e: Expr, target: Type) -> Expr:
@@ -256,7 +259,8 @@ class Coercion:
         if number is None or number.kind not in NUMBERS:
             return self._mismatch(e, target)
         if number.bits < 64:
-            self._warn(e.pos, "narrowing", f"a pointer has 64 bits, {number} {number.bits}; use LWORD")
+            right = _instead_of_number(e, target) or "use LWORD"
+            self._warn(e.pos, "narrowing", f"a pointer has 64 bits, {number} {number.bits}; {right}")
         return convert(e, target)
 
     def _address(self, e: AddressOf, target: PointerType) -> None:
@@ -338,6 +342,23 @@ class Coercion:
         elif source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
             self._warn(e.pos, "precision", f"{e.type} becomes {target}: large values are rounded")
         return convert(e, target)
+
+
+def _instead_of_number(e: Expr, target: Type) -> str:
+    """What to write when a pointer and what it may point to are assigned to each other; "" when they do not match."""
+    if isinstance(e, AddressOf):
+        return f"a reference is given REF= {_written(e.place)}, an address is kept in an LWORD" * (
+            e.place.type == target
+        )
+    place = e.place if isinstance(e, Load) else None
+    if isinstance(e.type, PointerType):
+        return f"what it points to is written {_written(place)}^" if e.type.target == target else ""
+    to = target.target if isinstance(target, PointerType) else None
+    return f"the address is written ADR({_written(place)})" if e.type == to else ""
+
+
+def _written(place: Place | None) -> str:
+    return place.var.name.rpartition(".")[2] if isinstance(place, VarPlace) else "..."
 
 
 def _example(t: Elementary) -> str:

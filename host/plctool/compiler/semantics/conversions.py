@@ -86,6 +86,11 @@ def elementary(t: Type) -> Elementary | None:
     return base if isinstance(base, Elementary) else None
 
 
+def is_referred(e: Expr) -> bool:
+    """Whether this is what a REFERENCE TO refers to."""
+    return isinstance(e, Load) and isinstance(e.place, DerefPlace) and isinstance(e.place.pointer.type, ReferenceType)
+
+
 def error_value(pos: Pos) -> Const:
     """Stands for what is wrong and was reported."""
     return Const(0, ERROR, pos)

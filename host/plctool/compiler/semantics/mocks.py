@@ -115,6 +115,8 @@ class Mocks:
             code = ast.Literal(pos, ast.LiteralKind.INT, lib.RTSEXCPT_UNRESOLVED_EXTREFS)
             attributes = {name: text for name, text in attributes.items() if name != "external"}
             body = [ast.ExprStmt(pos, ast.Call(pos, ast.Name(pos, _RAISE), [ast.Argument(pos, None, code)]))]
+            if decl.result is not None:  # which is assigned in C
+                body.append(_assign(pos, decl.name, ast.Name(pos, decl.name)))
         if not mocked or decl.result is None:
             return [replace(decl, body=body, attributes=attributes)]
         value = ast.VarDecl(pos, [(pos, value_of(decl.name))], None, decl.result, None)

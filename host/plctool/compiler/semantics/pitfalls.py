@@ -17,8 +17,9 @@ from plctool.compiler.analysis import Effects
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.ranges import Range, type_range
 from plctool.compiler.semantics import constants
-from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary
+from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary, is_untyped
 from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     AddressOf,
     Assign,
@@ -224,6 +225,20 @@ def lost_fraction(e: Expr, target: Elementary, *, explicit: bool = False) -> str
     return f"{drops}; convert an operand: {source}_TO_{target}(...) / ..."
 
 
+def lost_in_constants(left: Expr, right: Expr, result: Expr, target: Type | None) -> str:
+    """What to say when `left / right`, both constant, is an integer with a rest and becomes the REAL `target`."""
+    to, source = elementary(target) if target is not None else None, elementary(result.type)
+    if to is None or to.kind is not Kind.REAL or source is None or source.kind is not Kind.INT:
+        return ""
+    if not isinstance(left, Const) or not isinstance(right, Const) or not isinstance(result, Const):
+        return ""
+    a, b = left.value, right.value
+    if not isinstance(a, int) or not isinstance(b, int) or b == 0 or a % b == 0:
+        return ""
+    written = f"write {a}.0 / {b}" if is_untyped(result) else f"convert an operand: {source}_TO_{to}(...) / ..."
+    return f"this division of integers drops its fraction and gives {result.value}; {written}"
+
+
 def _division(e: Expr) -> Binary | None:
     """The integer division that an expression is, or that is added to something in it."""
     if isinstance(e, Unary):
@@ -236,6 +251,23 @@ def _division(e: Expr) -> Binary | None:
     if e.op in (BinaryOp.ADD, BinaryOp.SUB):
         return _division(e.left) or _division(e.right)
     return e if e.op is BinaryOp.DIV else None
+
+
+# ---- NOT of a number that is then compared, as in `NOT s = 5` ----
+
+
+def negated_number(node: ast.Binary, left: Expr, text: str) -> str:
+    """What to say of `NOT a = b` about integers, where NOT inverts the bits of a; "" when it is something else or
+    `(NOT a) = b`. That of a BYTE is meant. `text`: of the source."""
+    base = elementary(left.type)
+    negated = isinstance(node.left, ast.Unary) and node.left.op is ast.Operator.NOT
+    if not negated or node.op not in ast.COMPARISONS or base is None or base.kind is not Kind.INT:
+        return ""
+    negation = text[node.left.pos : node.pos]
+    if negation.count(")") > negation.count("("):
+        return ""
+    operand = " ".join(negation[len("NOT") :].split())
+    return f"NOT comes before {node.op} and inverts the bits of {operand}; write NOT ({operand} {node.op} ...)"
 
 
 # ---- constants that are converted to a type that has no such value ----

@@ -106,12 +106,13 @@ class Program:
         self._classes.declare_members()
         while bodies:
             scope, decl = bodies.next()
+            before = world.diagnostics.errors
             try:
                 write_body(Checker(world, scope), statements_of(world, decl, scope))
             except Exception as error:
                 note_position(error, scope.pos(decl.pos))
                 raise
-            if not scope.library:
+            if not scope.library and world.diagnostics.errors == before:  # else it may be used where the errors are
                 checked.append(scope)
             if bodies.only_library:
                 self._classes.declare_members()

@@ -87,8 +87,9 @@ class TestBody:
         """Checks the statements into the unit of the scope."""
         if decl.faults:
             self._c.scope.prologue += self._devices.begin_faults(self._c, decl.pos)
+        found, before = self._c.world.diagnostics, self._c.world.diagnostics.errors
         write_body(self._c, decl.body)
-        if decl.keyword is not ast.TestUnit.SETUP:
+        if decl.keyword is not ast.TestUnit.SETUP and found.errors == before:
             report_unused(self._c.scope)
 
     def _nodes(self, call: ast.Call, count: int, *, message: bool = True) -> list[ast.Expr] | None:

@@ -156,6 +156,12 @@ class InitialValues:
         properties[key] = input_value(Checker(self._world, scope), node, symbol.type, name)
         return True
 
+    def _without_name(self, t: StructType) -> str:
+        if t in self._world.blocks:
+            return f"{t} has no FB_Init that takes this value; give the value a name"
+        members = ", ".join(f"{field.name} := ..." for field in t.fields[:2])
+        return f"the members of {t} are given by name: ({members})"
+
     def _named(self, node: ast.StructInit, t: StructType, scope: Scope) -> list[tuple[int, str, ast.Init, bool]]:
         """The members with names: values without one are for the inputs of FB_Init, in their order. With each, whether
         such an input comes before a member of that name."""
@@ -166,8 +172,8 @@ class InitialValues:
         found: list[tuple[int, str, ast.Init, bool]] = []
         for offset, name, value in node.members:
             if not name and not names:
-                scope.error(offset, "arguments", f"{t} has no FB_Init that takes this value; give the value a name")
-                continue
+                scope.error(offset, "arguments", self._without_name(t))
+                break
             found.append((offset, name or names.pop(0), value, node.arguments or not name))
         return found
 

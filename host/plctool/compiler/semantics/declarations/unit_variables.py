@@ -176,6 +176,7 @@ class UnitVariables:
                 found = next((symbol for symbol in named if isinstance(symbol, GlobalSymbol)), None)
                 if found is None:
                     scope.error(offset, "unknown", f"there is no VAR_GLOBAL {name}")
+                    scope.names[name.casefold()] = VarSymbol(name, scope.pos(offset), ERROR, Role.IN_OUT)
                     continue
                 if self._world.names.same_named(name):
                     listed = " or ".join(s.full_name for s in self._world.names.same_named(name))

@@ -97,6 +97,10 @@ def _assign_reference(c: Checker, node: ast.Assign) -> list[Statement]:
         return []
     if isinstance(node.value, ast.Literal) and node.value.value == 0 and node.value.kind in _NOTHING:
         return [Assign(pointer.place, Const(0, pointer.type, pos), pos)]
+    called = node.value.callee if isinstance(node.value, ast.Call) else None
+    if isinstance(called, ast.Name) and called.name.upper() == "ADR":
+        c.error(node.value.pos, "type", "REF= takes the variable itself, without ADR")
+        return []
     value = input_value(c, node.value, pointer.type, "reference")
     return [] if value.type is ERROR else [Assign(pointer.place, value, pos)]
 

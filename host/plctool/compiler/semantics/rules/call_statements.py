@@ -20,7 +20,7 @@ from plctool.compiler.semantics.rules.arguments import (
     referenced_place,
     split_enable,
 )
-from plctool.compiler.semantics.rules.calls import body_dispatch, call
+from plctool.compiler.semantics.rules.calls import body_dispatch, call, called_variable
 from plctool.compiler.semantics.rules.members import bound_member, called_program, is_called_by_name, variable_value
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.rules.pools import DELETE, delete
@@ -259,6 +259,8 @@ def call_statement(c: Checker, statement: ast.ExprStmt) -> list[Statement]:
 
 def _called(c: Checker, node: ast.Call) -> list[Statement]:
     """A call of a program, of an instance or of a function."""
+    if called_variable(c, node) is not None:
+        return []
     program = called_program(c, node.callee)
     if program is not None:
         names = {symbol.name.casefold() for symbol, _ in program.parameters}

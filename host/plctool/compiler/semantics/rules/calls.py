@@ -271,7 +271,29 @@ def _not_callable(c: Checker, symbol: object, name: str) -> str:
     return f"{name} is not a function"
 
 
+def called_variable(c: Checker, node: ast.Call) -> Expr | None:
+    """`timer.start()`: an error for a variable that a block of the library has for its own use; None for all else."""
+    callee = node.callee
+    if not isinstance(callee, ast.Member) or not isinstance(callee.base, ast.Name):
+        return None
+    symbol = c.scope.lookup(callee.base.name)
+    t = symbol.type if isinstance(symbol, VarSymbol) else None
+    block = c.world.blocks.get(t) if isinstance(t, StructType) else None
+    member = None if block is None else block.members.get(callee.name.casefold())
+    if block is None or t is None or member is None or member.role is not Role.LOCAL:
+        return None
+    unit = c.scope.unit(t.name)
+    if not isinstance(unit, PouSymbol) or not unit.library:
+        return None
+    inputs = ", ".join(f"{s.name} := ..." for s in block.members.values() if s.role is Role.INPUT)
+    message = f"{t} has no method {callee.name}; write {callee.base.name}({inputs})"
+    return c.error(callee.name_pos, "call", message)
+
+
 def _call_of_place(c: Checker, node: ast.Call) -> Expr:
+    started = called_variable(c, node)
+    if started is not None:
+        return started
     e = c.expr(node.callee)
     if e.type is ERROR:
         return e

@@ -37,7 +37,7 @@ from plctool.compiler.typed import (
     While,
 )
 from plctool.compiler.typed_nodes import root_of, walk, written_places
-from plctool.iec.types import BOOL, EnumType, Type, is_scalar
+from plctool.iec.types import BOOL, EnumType, StringType, Type, is_scalar
 
 # ---- statements in sequence ----
 
@@ -181,7 +181,7 @@ def case_statement(c: Checker, node: ast.Case) -> list[Statement]:
     selector = c.settled(node.selector)
     base = elementary(selector.type)
     if selector.type is not ERROR and (base is None or base.kind not in NUMBERS):
-        hint = "; write IF" if base is BOOL else ""
+        hint = "; write IF" if base is BOOL or isinstance(selector.type, StringType) else ""
         message = f"CASE needs an integer or an enumeration, not {selector.type}{hint}"
         selector = c.error(node.selector.pos, "type", message)
     seen = _Labels()
@@ -225,6 +225,8 @@ def _label_value(c: Checker, node: ast.Expr, t: Type) -> int | None:
     e = c.constant(node, t)
     if isinstance(node, ast.Binary) and node.op is ast.Operator.OR and isinstance(node.right, ast.Literal) and e:
         c.warning(node.pos, "case", f"this is the one value {e.value}; several values are separated by commas")
+    if e is not None:
+        _report_difference(c, node, e)
     if e is None:
         return None
     if not is_untyped(e) and isinstance(t, EnumType) and e.type is not t and isinstance(e.type, EnumType):
@@ -237,6 +239,16 @@ def _label_value(c: Checker, node: ast.Expr, t: Type) -> int | None:
     return (
         value.value if value.type is not ERROR and isinstance(value, Const) and isinstance(value.value, int) else None
     )
+
+
+def _report_difference(c: Checker, node: ast.Expr, e: Const) -> None:
+    """Warns of `6-9` as a label."""
+    if not isinstance(node, ast.Binary) or node.op is not ast.Operator.SUB or _names_something(node):
+        return
+    low, high = c.expr(node.left), c.expr(node.right)
+    if isinstance(low, Const) and isinstance(high, Const) and isinstance(e.value, int) and e.value < 0:
+        message = f"this is the one value {e.value}; a range is written {low.value}..{high.value}"
+        c.warning(node.pos, "case", message)
 
 
 @checks_statement(ast.For)
@@ -256,12 +268,27 @@ def for_statement(c: Checker, node: ast.For) -> list[Statement]:
     if isinstance(step, Const) and step.value == 0 and step.type is not ERROR:
         c.error(node.pos if node.step is None else node.step.pos, "range", "a FOR loop with a step of zero never ends")
         place = None
+    _report_never_run(c, node, start, stop, step)
     body = _loop_body(c, node.body)
     if place is None or ERROR in (start.type, stop.type, step.type):
         return []
     if not c.dialect.limits_each_turn:
         _report_changes(c, node, stop if node.step is None else [stop, step], body)
     return [_noted(c, For(place, start, stop, step, body, pos, c.dialect.limits_each_turn))]
+
+
+def _report_never_run(c: Checker, node: ast.For, start: Expr, stop: Expr, step: Expr) -> None:
+    """Warns of FOR i := 10 TO 1. A constant with a name may be changed later."""
+    ends = (start, stop, step)
+    if _names_something(node.start) or _names_something(node.stop) or any(e.type is ERROR for e in ends):
+        return
+    first, last, by = (e.value if isinstance(e, Const) and isinstance(e.value, int) else 0 for e in ends)
+    if by > 0 and first > last:
+        c.warning(
+            node.pos, "unreachable", f"this loop never runs: to count down from {first} to {last}, write BY -{by}"
+        )
+    elif by < 0 and first < last:
+        c.warning(node.pos, "unreachable", f"this loop never runs: to count up from {first} to {last}, write BY {-by}")
 
 
 def _report_changes(c: Checker, node: ast.For, limits: Expr | list[Expr], body: list[Statement]) -> None:

@@ -115,7 +115,9 @@ def dotted_name(c: Checker, node: ast.Expr) -> str | None:
 
 
 def instance_hint(symbol: object) -> str:
-    """What to do with a name that stands for a type with instances."""
+    """What to do with a name that stands for a type with instances, or for a function."""
+    if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION:
+        return f"; a call of it is written {symbol.decl.name}()"
     is_block = isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK
     return "; declare an instance of it" if is_block else ""
 

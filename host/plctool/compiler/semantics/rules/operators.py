@@ -17,13 +17,14 @@ from plctool.compiler.semantics.conversions import (
     convert,
     elementary,
     error_value,
+    is_referred,
     is_untyped,
     scaled,
 )
-from plctool.compiler.semantics.pitfalls import always
+from plctool.compiler.semantics.pitfalls import always, lost_in_constants, negated_number
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.rules.literals import match_literals, untyped_bits
-from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
+from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Unary, UnaryOp
 from plctool.iec.types import (
@@ -107,7 +108,14 @@ def binary_operator(c: Checker, node: ast.Binary, expected: Type | None) -> Expr
     right = c.expr(node.right, wanted)
     if node.op is ast.Operator.POWER:
         return _power(c, left, right, node.pos, expected)
-    return operate(c, _OPERATORS[node.op], left, right, node.pos, expected)
+    warning = negated_number(node, left, c.scope.source.text)
+    if warning:
+        c.warning(node.pos, "not", warning)
+    result = operate(c, _OPERATORS[node.op], left, right, node.pos, expected)
+    lost = lost_in_constants(left, right, result, expected) if node.op is ast.Operator.DIV else ""
+    if lost:
+        c.warning(node.pos, "integer-division", lost)
+    return result
 
 
 def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expected: Type | None = None) -> Expr:
@@ -136,7 +144,7 @@ def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expe
         if t is not None and op is BinaryOp.MOD and t.kind is Kind.REAL:
             t = None
     texts = isinstance(left.type, StringType) + isinstance(right.type, StringType)
-    if t is None and ((texts == 2 and op is BinaryOp.AND) or (texts and op is BinaryOp.ADD)):
+    if t is None and ((texts and op is BinaryOp.AND) or (texts and op is BinaryOp.ADD)):
         sign = "&" if op is BinaryOp.AND else "+"
         return c.error(offset, "type", f"strings are joined by CONCAT(a, b), not by {sign}")
     if t is None:
@@ -271,6 +279,8 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
         hint = ""
         if isinstance(left, Binary) and left.op in _COMPARISONS:
             hint = f"; to compare a value twice, write a {left.op.value} b AND b {op.value} c"
+        elif NULL_TYPE in (left.type, right.type) and (is_referred(left) or is_referred(right)):
+            hint = "; whether a reference refers to something is __ISVALIDREF(reference)"
         else:
             hint = _duration_hint(left, right)
         return c.error(offset, "type", f"{op.value} cannot compare {left.type} with {right.type}{hint}")

@@ -13,6 +13,7 @@ from plctool.compiler.semantics.conversions import (
     convert,
     elementary,
     error_value,
+    is_referred,
     is_untyped,
     literal_type,
     load,
@@ -246,5 +247,6 @@ def dereferenced(c: Checker, node: ast.Deref, expected: Type | None) -> Expr:
         or isinstance(pointer.type, InterfaceType)
         or pointer.type is NULL_TYPE
     ):
-        return c.error(node.pos, "type", f"{pointer.type} is not a pointer")
+        hint = "; a reference is used without ^" if is_referred(pointer) else ""
+        return c.error(node.pos, "type", f"{pointer.type} is not a pointer{hint}")
     return load(DerefPlace(pointer, pointer.type.target, c.pos(node.pos)))

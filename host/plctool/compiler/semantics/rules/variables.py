@@ -181,6 +181,8 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
     if duration is not None:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; a duration is written T#{duration[1].lower()}")
     inside = c.world.names.program_variables(node.name)
+    if c.scope.pou is not None and f"{c.scope.pou.name}.{node.name}".casefold() in (s.casefold() for s in inside):
+        return c.error(node.pos, "unknown", f"{node.name} is declared below; move that line up")
     if inside:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(inside)}")
     if c.world.io.is_device_without_name(node.name):
