@@ -6,13 +6,15 @@ All were written down before their messages were looked at.
 from __future__ import annotations
 
 import pytest
-from front_support import messages
+from front_support import check, main, messages
 
 VARIABLES = (
     "a, b : INT; on : BOOL; r : REAL; s : STRING; t : TON; tm : TIME; arr : ARRAY[1..9] OF INT; "
     "m : ARRAY[1..3, 1..3] OF INT;"
 )
 TASK = "PROGRAM Main\nEND_PROGRAM\nCONFIGURATION C\nTASK T1(INTERVAL := T#10ms);\n"
+BLOCK = "FUNCTION_BLOCK B\nEND_FUNCTION_BLOCK\n"
+STRUCTURE = "a structure is declared TYPE P : STRUCT ... END_STRUCT; END_TYPE"
 BODY = 5  # the line where a case stands
 
 
@@ -107,6 +109,19 @@ BODY = 5  # the line where a case stands
         ("LOOP\na := 1;", ["1: a task runs its program again and again; a loop within one cycle is FOR or WHILE"]),
         ("r := POWER(r, 2.0);", ["1: unknown function POWER; write a ** b"]),
         ("s := str(a);", ["1: unknown function str; write TO_STRING"]),
+        ("r := SQR(r);", ["1: unknown function SQR; a square is written a * a; SQRT is the root"]),
+        ("RESET(on);", ["1: unknown function RESET; a BOOL is reset by name := FALSE;"]),
+        ("SET(on);", ["1: unknown function SET; a BOOL is set by name := TRUE;"]),
+        ("t.start();", ["1: TON has no method start; write t(IN := ..., PT := ...)"]),
+        ("t.Start(T#5s);", ["1: TON has no method Start; write t(IN := ..., PT := ...)"]),
+        ("s := 'n=' & a;", ["1: strings are joined by CONCAT(a, b), not by &"]),
+        ("IF t THEN a := 1; END_IF;", ["1: TON does not fit BOOL; write t.Q"]),
+        (
+            "CASE s OF 'a': a := 1; END_CASE;",
+            ["1: CASE needs an integer or an enumeration, not STRING[80]; write IF"],
+        ),
+        ("CASE a OF\n1: b := 1;\nWHEN 2: b := 2;\nEND_CASE;", ["3: a branch of a CASE begins with its value: 2: ..."]),
+        ("a := Color::Red;", ["1: a value of an enumeration is written Color.Red, as is a member"]),
         ("s := 5;", ["1: an integer does not fit STRING[80]; write '5'"]),
         ("a := arr[1, 2];", ["1: there is 1 index too many"]),
         ("a := arr.length;", ["1: ARRAY[1..9] OF INT has no members; its last index is UPPER_BOUND(..., 1)"]),
@@ -146,6 +161,12 @@ def test_a_slip_in_a_body(body: str, said: list[str]) -> None:
             "@ has no place in a program; a variable at an address is written name AT %IX0.0 : BOOL;",
         ),
         ("c AT %ID0 : INT;", "INT has 16 bits, %ID0 32; write %IW and a number"),
+        ("INT c[10];", "an array is declared c : ARRAY[0..9] OF INT;"),
+        ("c : ARRAY[1..3][1..3] OF INT;", "an array of two dimensions is declared ARRAY[1..3, 1..3]"),
+        ("c : INT RETAIN;", "variables of this kind are declared in VAR RETAIN ... END_VAR"),
+        ("c : REF INT;", "a pointer is declared POINTER TO INT, a reference REFERENCE TO INT"),
+        ("c : PTR TO INT;", "a pointer is declared POINTER TO INT, a reference REFERENCE TO INT"),
+        ("c : INT := d; d : INT;", "d is declared below; move that line up"),
         ("c : STRING 20;", "the length of a STRING is written STRING[20]"),
     ],
 )
@@ -161,6 +182,46 @@ def test_a_slip_in_a_declaration(line: str, said: str) -> None:
         ("FUNTION F : INT\nF := 1;\nEND_FUNCTION\n", ["1:1: FUNTION is written FUNCTION"]),
         ("FUNCTION BLOCK F\nEND_FUNCTION_BLOCK\n", ["1:10: FUNCTION BLOCK is written FUNCTION_BLOCK"]),
         ("FUNCTION F INT\nF := 1;\nEND_FUNCTION\n", ["1:1: the type of the result follows a colon: FUNCTION F : INT"]),
+        ("TYPE STRUCT P\nx : INT;\nEND_STRUCT\nEND_TYPE\n", [f"1:6: {STRUCTURE}"]),
+        ("TYPE P :\nx : INT;\nEND_TYPE\n", [f"2:3: {STRUCTURE}"]),
+        ("ENUM E (A, B);\n", ["1:1: an enumeration is declared TYPE E : (A, B); END_TYPE"]),
+        ("TYPE E : (A; B); END_TYPE\n", ["1:12: the values of an enumeration are separated by commas"]),
+        (
+            "TYPE P : STRUCT x, y : REAL; END_STRUCT END_TYPE\nVAR_GLOBAL p : P := (1.0, 2.0); END_VAR\n",
+            ["2:22: the members of P are given by name: (x := ..., y := ...)"],
+        ),
+        (
+            f"{BLOCK}FUNCTION_BLOCK C : B\nVAR x : INT; END_VAR\nEND_FUNCTION_BLOCK\n",
+            ["3:18: what is derived from another one is written EXTENDS, not with a colon"],
+        ),
+        (
+            f"{BLOCK}FUNCTION_BLOCK C EXTEND B\nVAR x : INT; END_VAR\nEND_FUNCTION_BLOCK\n",
+            ["3:18: EXTEND is written EXTENDS"],
+        ),
+        (
+            f"{BLOCK}FUNCTION_BLOCK C(B)\nEND_FUNCTION_BLOCK\n",
+            ["3:17: a block that is derived is written FUNCTION_BLOCK C EXTENDS B"],
+        ),
+        (
+            "FUNCTION_BLOCK B\nMETHOD INT M()\nEND_METHOD\nEND_FUNCTION_BLOCK\n",
+            ["2:8: the type of the result follows the name: METHOD M : INT"],
+        ),
+        (
+            "FUNCTION_BLOCK B\nVIRTUAL METHOD M\nEND_METHOD\nEND_FUNCTION_BLOCK\n",
+            ["2:1: every method can be overridden; leave VIRTUAL out"],
+        ),
+        (
+            "PROGRAM Main\nFUNCTION F : INT\nF := 1;\nEND_FUNCTION\nEND_PROGRAM\n",
+            ["2:1: FUNCTION stands outside of the PROGRAM"],
+        ),
+        (
+            "FUNCTION F : INT\nF := 1;\nEND_FUNCTION\nPROGRAM Main\nVAR x : INT; END_VAR\nx := F;\nEND_PROGRAM\n",
+            ["6:6: F is a function, not a value; a call of it is written F()"],
+        ),
+        (
+            "PROGRAM Main\nVAR_EXTERNAL g : INT; END_VAR\ng := g + 1;\nEND_PROGRAM\n",
+            ["2:14: there is no VAR_GLOBAL g"],
+        ),
         ("STRUCT P\nx : INT;\nEND_STRUCT\n", ["1:1: a structure is declared TYPE P : STRUCT ... END_STRUCT; END_TYPE"]),
         ("PROGRAM Main\nENDPROGRAM\n", ["2:1: ENDPROGRAM is written END_PROGRAM"]),
         (
@@ -213,6 +274,49 @@ def test_a_name_that_is_declared_is_no_misspelt_keyword() -> None:
         "4:12: expected ; after the statement",
         "6:1: END_IF missing for the IF in line 3",
     ]
+
+
+def test_a_label_that_is_a_difference_is_one_value() -> None:
+    text = "PROGRAM Main\nVAR a : INT; END_VAR\nCASE a OF\n6-9: a := 1;\n9-6: a := 2;\nEND_CASE;\nEND_PROGRAM\n"
+    assert messages(text, "warning") == ["4:2: this is the one value -3; a range is written 6..9"]
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (
+            "r := ADR(x);",
+            ["a pointer has 64 bits, INT 16; a reference is given REF= x, an address is kept in an LWORD"],
+        ),
+        ("p := x;", ["a pointer has 64 bits, INT 16; the address is written ADR(x)"]),
+        ("x := p;", ["a pointer has 64 bits, INT 16; what it points to is written p^"]),
+        ("w := p;", ["a pointer has 64 bits, DWORD 32; use LWORD"]),
+    ],
+)
+def test_a_pointer_and_what_it_points_to(body: str, said: list[str]) -> None:
+    variables = "x : INT; w : DWORD; p : POINTER TO INT; r : REFERENCE TO INT;"
+    found = check(main(variables, body)).diagnostics
+    assert [d.message for d in found if d.code == "narrowing"] == said
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("r REF= ADR(x);", "REF= takes the variable itself, without ADR"),
+        ("r^ := 5;", "INT is not a pointer; a reference is used without ^"),
+        (
+            "IF r <> NULL THEN x := 1; END_IF;",
+            "<> cannot compare INT with REF_TO ?; whether a reference refers to something is __ISVALIDREF(reference)",
+        ),
+    ],
+)
+def test_a_slip_about_a_reference(body: str, said: str) -> None:
+    assert [m.split(": ", 1)[1] for m in messages(main("x : INT; r : REFERENCE TO INT;", body))] == [said]
+
+
+@pytest.mark.parametrize("statement", ["t(IN = a);", "TON(IN := a);", "a := t(IN := a);"])
+def test_what_stands_in_a_faulty_statement_is_used(statement: str) -> None:
+    assert not messages(main("a : BOOL; t : TON;", statement), "warning")
 
 
 def test_labels_joined_by_or_are_one_value() -> None:

@@ -430,7 +430,7 @@ class Builder:
         kept: list[ast.Stmt] = []
         for statement in found:
             previous = kept[-1] if kept else None
-            if isinstance(previous, ast.Label) and (declared := _type_in(statement)):
+            if isinstance(previous, ast.Label) and previous.name and (declared := _type_in(statement)):
                 self.report(previous.pos, "syntax", slips.DECLARED.format(name=previous.name, type=declared))
                 kept.pop()
             else:

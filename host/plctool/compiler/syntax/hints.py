@@ -31,6 +31,7 @@ _LABEL = "a branch has values or a range: 6..100: ...; for comparisons write IF 
 _RANGE = "a range of values is written {low}..{high}"
 _LOOP = "a loop is written FOR i := 0 TO 9 DO ... END_FOR"
 _VALUE = r"[A-Za-z_][\w.^]*(?:\[[^\]]*\])?"
+_STRUCT = "a structure is declared TYPE {name} : STRUCT ... END_STRUCT; END_TYPE"
 _INSTANCE = "an instance of a program is declared PROGRAM {instance} WITH {task} : {type};"
 _ENDS = {"FI": "END_IF", "WEND": "END_WHILE", "ESAC": "END_CASE", "NEXT": "END_FOR"}
 _NO_IMPORT = "all sources and libraries of a program are compiled together; nothing is imported"
@@ -61,8 +62,9 @@ def _count(match: re.Match[str]) -> str:
     return f"an array has its first and its last index in brackets: ARRAY[0..{int(match['count']) - 1}] OF ..."
 
 
-def _array(match: re.Match[str]) -> str:
-    return f"an array is declared {match['name']} : ARRAY[0..{int(match['count']) - 1}] OF {match['type']};"
+def _array(match: re.Match[str], element: str = "") -> str:
+    of = element or match["type"]
+    return f"an array is declared {match['name']} : ARRAY[0..{int(match['count']) - 1}] OF {of};"
 
 
 def _list(match: re.Match[str]) -> str:
@@ -110,6 +112,16 @@ _HINTS = (
           lambda m: f"{m['word']} is written {_ENDS[m['word'][:4].upper()]}", "here", "body"),
     _Hint(rf"^\s*(?P<here>LOOP\b\s*(?:{_NAME}\s*)?)",
           "a task runs its program again and again; a loop within one cycle is FOR or WHILE", "here", "body"),
+    _Hint(rf":\s*(?P<here>(?:REF|PTR)\s+(?:TO\s+)?(?P<name>{_NAME}))",
+          "a pointer is declared POINTER TO {name}, a reference REFERENCE TO {name}", "here", "declaration"),
+    _Hint(rf":\s*{_NAME}\s+(?P<here>(?P<word>RETAIN|PERSISTENT|CONSTANT)\s*)[;:]",
+          "variables of this kind are declared in VAR {word} ... END_VAR", "here", "declaration"),
+    _Hint(rf"(?:^|;|\bVAR)[ \t]*(?P<here>{_TYPE}[ \t]+(?P<name>{_NAME})[ \t]*\[(?P<count>\d+)\])",
+          lambda m: _array(m, slips.TYPES.get(m["type"].upper(), m["type"])), "here"),
+    _Hint(r"\bARRAY\s*\[(?P<first>[^\[\]]*)\](?P<here>\s*\[(?P<second>[^\[\]]*)\])",
+          "an array of two dimensions is declared ARRAY[{first}, {second}]", "here"),
+    _Hint(r"^\s*(?P<here>WHEN\s+(?P<value>[^:;\n]+))\s*:", "a branch of a CASE begins with its value: {value}: ...",
+          "here", "body"),
     _Hint(r":\s*(?P<here>STRING\s+(?P<count>\d+))", "the length of a STRING is written STRING[{count}]", "here",
           "declaration"),
     _Hint(r":\s*(?P<here>\{(?P<values>[^{};:]*)\}\s*);", "an enumeration is written ({values})", "here"),
@@ -123,11 +135,24 @@ _HINTS = (
           "inputs are declared after the first line: VAR_INPUT {name} : ... END_VAR", "here"),
     _Hint(r"\w\[\s*[-\w]+\s*(?P<here>\.\.)\s*[-\w]+\s*\]",
           "an index is one number; for several elements write a loop", "here", "body"),
+    _Hint(rf"\bFUNCTION_BLOCK\s+(?P<name>{_NAME})\s*"
+          rf"(?P<here>\(\s*(?P<base>{_NAME})[ \t]*\)?\s*)",
+          "a block that is derived is written FUNCTION_BLOCK {name} EXTENDS {base}", "here"),
+    _Hint(rf"\bMETHOD\s+(?P<here>{_TYPE}\s+(?P<name>{_NAME})\s*(?:\([^)\n]*\))?\s*)",
+          _typed("the type of the result follows the name: METHOD {name} : {type}"), "here"),
     _Hint(rf"\bFUNCTION\s+(?P<here>BLOCK\s+{_NAME}\s*)", "FUNCTION BLOCK is written FUNCTION_BLOCK", "here"),
     _Hint(rf"(?P<here>\bFUNCTION\s+(?P<name>{_NAME})\s+{_TYPE}\s*(?:{_NAME}\s*)?)",
           _typed("the type of the result follows a colon: FUNCTION {name} : {type}"), "here"),
+    _Hint(rf"\bTYPE\s+(?P<here>STRUCT\s+(?P<name>{_NAME}))", _STRUCT, "here"),
+    _Hint(rf"\bTYPE\s+(?P<name>{_NAME})\s*:\s*\n\s*{_NAME}\s*(?P<here>:)", _STRUCT, "here"),
+    _Hint(rf"^\s*(?P<here>ENUM\s+(?P<name>{_NAME}))",
+          "an enumeration is declared TYPE {name} : (A, B); END_TYPE", "here"),
+    _Hint(r"^\s*(?P<here>typedef\s+struct\b)", _STRUCT.format(name="Name"), "here"),
+    _Hint(rf":\s*\(\s*{_NAME}(?P<here>\s*;\s*){_NAME}", "the values of an enumeration are separated by commas", "here"),
+    _Hint(rf"(?P<name>{_NAME})(?P<here>::(?P<member>{_NAME}))",
+          "a value of an enumeration is written {name}.{member}, as is a member", "here", "body"),
     _Hint(rf"^\s*(?P<here>STRUCT\s+(?P<name>{_NAME}))",
-          "a structure is declared TYPE {name} : STRUCT ... END_STRUCT; END_TYPE", "here"),
+          _STRUCT, "here"),
     _Hint(r"(?P<here>\b(?P<word>CONSTANT|RETAIN|PERSISTENT)\s+(?P<var>VAR\w*))",
           "{word} comes after {var}: {var} {word}", "here"),
     _Hint(rf"(?P<here>(?:DIM\s+)?(?P<name>{_NAME})\s+AS\s+(?P<type>{_NAME}))", _typed(_IN_VARIABLES), "here"),

@@ -94,7 +94,7 @@ _AMBIGUOUS = SOFT | {"OP", "NOT"}
 def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None:
     """Gives a word that the language may have a use for the type it has where it stands."""
     kind = token.type
-    if kind == "MODIFIER" and (unit := modified(token, text)) is not None:
+    if kind in ("MODIFIER", "REFUSED") and (unit := modified(token, text)) is not None:
         recovery.report_in_front(token, *unit)
         return
     if kind == "MISSPELT":

@@ -69,6 +69,7 @@ WORDS = {
     **dict.fromkeys(("VAROUTPUT", "VAR_OUT", "VAR_OUTPUTS"), "VAR_OUTPUT"),
     **dict.fromkeys(("VARGLOBAL", "GLOBAL_VAR", "VAR_GLOBALS"), "VAR_GLOBAL"),
     **dict.fromkeys(("VAR_CONSTANT", "VAR_CONST"), "VAR CONSTANT"),
+    **dict.fromkeys(("EXTEND", "INHERITS"), "EXTENDS"),
     "VARTEMP": "VAR_TEMP",
     "VAR_STATIC": "VAR_STAT",
     "VAR_RETAIN": "VAR RETAIN",
@@ -117,6 +118,8 @@ FUNCTIONS = {
     **dict.fromkeys(("STRCMP", "EQUALS"), "strings are compared with ="),
     "ASSERT": "in a TEST write ASSERT_TRUE",
     "STRLEN": "write LEN", "STRCAT": "write CONCAT", "STRCPY": "strings are assigned with :=", "STRSTR": "write FIND",
+    "SQR": "a square is written a * a; SQRT is the root",
+    **dict.fromkeys(("RESET", "CLEAR"), "a BOOL is reset by name := FALSE;"), "SET": "a BOOL is set by name := TRUE;",
     "POWER": "write a ** b", **dict.fromkeys(("STR", "TOSTRING"), "write TO_STRING"),
     "SUBSTR": "write MID", "ATOI": "write STRING_TO_INT", "ATOF": "write STRING_TO_REAL", "POW": "write a ** b",
     "ROUND": "write REAL_TO_INT, which rounds", "MALLOC": "nothing is allocated while a program runs",
@@ -143,6 +146,7 @@ GENERIC = (
 )
 
 REFUSED = {
+    "VIRTUAL": Refusal("every method can be overridden; leave VIRTUAL out"),
     "VAR_GENERIC": Refusal(GENERIC, "END_VAR"),
     "_LD_BODY": Refusal(_GRAPHIC),
     "_FBD_BODY": Refusal(_GRAPHIC),

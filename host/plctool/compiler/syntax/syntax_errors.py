@@ -130,7 +130,9 @@ class Recovery:
     def report_in_front(self, token: Token, keyword: str, name: str) -> None:
         """Reports a modifier that stands before the keyword of a unit, and leaves it out."""
         word = token.text.upper()
-        self._report(token.pos, "syntax", f"{word} comes after {keyword}: {keyword} {word} {name}")
+        refusal = slips.REFUSED.get(word)
+        message = refusal.message if refusal else f"{word} comes after {keyword}: {keyword} {word} {name}"
+        self._report(token.pos, "syntax", message)
         token.type = "LEFT_OUT"
 
     def refuse(self, token: Token) -> None:
@@ -174,6 +176,10 @@ class Recovery:
             what = "an assignment" if self._item(stack) == "stmt" else "an initial value"
             self._say(token.pos, f"{what} is written :=, not =")
             token.type = "_ASSIGN"
+            return True
+        if token.type == "_COLON" and self._shift(stack, "_EXTENDS", "IDENT") is not None:
+            self._say(token.pos, "what is derived from another one is written EXTENDS, not with a colon")
+            token.type = "_EXTENDS"
             return True
         if self._keyword_as_name(token):
             return True
@@ -295,17 +301,28 @@ class Recovery:
         self.skipping, self._skip_to = True, end
 
     def _late_variables(self, token: Token) -> bool:
-        """Variables declared between statements, global ones within a POU, others outside of one."""
+        """Variables declared between statements, global ones and POUs within a POU, others outside of one."""
         message, opener = "", self._open()
         if token.type == "VAR" and self._item(self._parser.states) == "stmt":
             message = f"{token.text} stands before the first statement"
         elif token.type == "VAR" and self._item_at(self._parser.states[-1]) == "unit":
             message = f"{token.text} stands in a PROGRAM, FUNCTION or FUNCTION_BLOCK; for all of them write VAR_GLOBAL"
+        elif opener is not None and self._is_within(opener, token):
+            self._leave_out(token, f"{token.text} stands outside of the {opener.text.upper()}", _CLOSERS[token.type])
+            return True
         elif token.type == "GLOBAL" and opener is not None and self._ends_later(opener, token):
             message = f"{token.text} stands outside of the {opener.text.upper()}"
         if message:
             self._leave_out(token, message, "END_VAR")
         return bool(message)
+
+    def _is_within(self, opener: Token, token: Token) -> bool:
+        """Whether a POU stands as a whole in one that is open."""
+        if token.type not in _POUS:
+            return False
+        end = re.compile(rf"\b{_CLOSERS[token.type]}\b", re.IGNORECASE).search(self._source.text, token.pos)
+        following = None if end is None else _NEXT_UNIT.search(self._source.text, end.end())
+        return opener.type in _POUS and following is not None and following[0].upper() == _CLOSERS[opener.type]
 
     def _ends_later(self, opener: Token, token: Token) -> bool:
         """Whether a POU that is open at `token` has its END_... before the next one begins."""
