@@ -444,7 +444,7 @@ def test_a_port_of_the_project_begins_at_its_folder(
         ("\nlink = 5", "plc.toml:2: link is not a text"),
         ("link = 5", 'write for example link = "serial:/dev/ttyS0"'),
         ("link = ", "is not TOML"),
-        ('link = "/dev/ttyS0"', "'/dev/ttyS0' is not a link; write for example serial:/dev/ttyS0"),
+        ('\nlink = "/dev/ttyS0"', "plc.toml:2: '/dev/ttyS0' is not a link; write for example serial:/dev/ttyS0"),
     ],
 )
 def test_a_wrong_link_of_the_project_exits_2_and_names_the_file(

@@ -211,3 +211,29 @@ def test_image_of_a_project_does_not_replace_a_source(tool: Any, project: Path) 
     write(project, 'sources = "src"\noutput = "src/main.st"')
     done = tool("build")
     assert done.status == 2 and "has the name of a source" in done.err
+
+
+@pytest.mark.parametrize("link", ["/dev/ttyS0", "COM3", "192.168.1.5"])
+@pytest.mark.parametrize("command", ["check", "build", "test", "status"])
+def test_link_that_is_none_is_reported_with_its_line(tool: Any, project: Path, command: str, link: str) -> None:
+    write(project, f'sources = ["src"]\nlink = "{link}"\n')
+    done = tool(command)
+    assert done.status == 2
+    assert f"plc.toml:2: '{link}' is not a link; write for example serial:" in done.err
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ('name = "pump"', "name cannot be here: it goes into [information]"),
+    ('[project]\nname = "pump"', "name, version, author and description go into [information]"),
+    ("werror = true", "werror cannot be here: it goes into [options]"),
+])  # fmt: skip
+def test_key_outside_its_table_is_refused_with_the_name_of_that(
+    tool: Any, project: Path, text: str, message: str
+) -> None:
+    write(project, f"{text}\n")
+    done = tool("check")
+    assert done.status == 2 and message in done.err + done.out and "plc.toml:1:" in done.err + done.out
+
+
+def test_command_without_a_link_names_the_project_file(tool: Any, project: Path) -> None:
+    assert 'link = "serial:/dev/ttyS0" in plc.toml' in tool("status").err

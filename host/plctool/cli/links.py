@@ -12,6 +12,7 @@ from plctool.errors import LinkError, UsageError
 from plctool.files import read_utf8
 from plctool.io.positions import BadToml, TomlText
 from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link
+from plctool.project import PROJECT_FILE, find_project
 
 VARIABLE = "PLC_LINK"
 
@@ -21,8 +22,8 @@ def link_of(args: argparse.Namespace) -> Link:
     link = find_link(args)
     if link is None:
         raise UsageError(
-            f"Say where the device is: --port /dev/ttyS0, for example, or once and for all in the environment: "
-            f"{VARIABLE}=serial:/dev/ttyS0.",
+            f"Say where the device is: --port /dev/ttyS0, for example, or once and for all by "
+            f'link = "serial:/dev/ttyS0" in {PROJECT_FILE}, or in the environment: {VARIABLE}=serial:/dev/ttyS0.',
             "no-link",
         )
     return link
@@ -67,14 +68,12 @@ def _options(args: argparse.Namespace) -> dict[str, Value]:
 
 def _default_link() -> Link | None:
     if text := os.environ.get(VARIABLE):
-        return _parse(text, f"the environment's {VARIABLE}")
-    from plctool.project import find_project
-
+        return _parse(text, f"In the environment's {VARIABLE}")
     file = find_project()
-    return None if file is None else _link_in(file)
+    return None if file is None else link_in(file)
 
 
-def _link_in(file: Path) -> Link | None:
+def link_in(file: Path) -> Link | None:
     """What a project says. Raises UsageError for a file that cannot be understood."""
     try:
         toml = TomlText(str(file), read_utf8(file, "bad-project"))
@@ -82,10 +81,12 @@ def _link_in(file: Path) -> Link | None:
     except BadToml as error:
         where = f"{file}:{error.pos.line}:{error.pos.column}"
         raise UsageError(f"{where}: {error.message}.", "bad-project") from None
-    if text is not None and not isinstance(text, str):
-        where = f"{file}:{toml.key_pos(('link',)).line}"
+    if text is None:
+        return None
+    where = f"{file}:{toml.key_pos(('link',)).line}"
+    if not isinstance(text, str):
         raise UsageError(f'{where}: link is not a text; write for example link = "serial:/dev/ttyS0".', "bad-project")
-    return _beside(file, _parse(text, str(file))) if text else None
+    return _beside(file, _parse(text, where)) if text else None
 
 
 def _beside(file: Path, link: Link) -> Link:
@@ -98,4 +99,4 @@ def _parse(text: str, where: str) -> Link:
     try:
         return parse_link(text)
     except UsageError as error:
-        raise UsageError(f"In {where}: {error.message}", error.code) from None
+        raise UsageError(f"{where}: {error.message}", error.code) from None

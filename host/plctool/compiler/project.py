@@ -18,7 +18,7 @@ from plctool.compiler.library_files import is_stand_in, libraries_at, no_library
 from plctool.compiler.source_files import READERS
 from plctool.compiler.toml_files import read_checked
 from plctool.compiler.warnings import WARNINGS
-from plctool.errors import UsageError, did_you_mean
+from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import read_utf8
 from plctool.iec.dialect import DIALECTS
 from plctool.image.file import ApplicationInfo
@@ -27,6 +27,8 @@ from plctool.io.tables import Entry, Table
 from plctool.project import DEFAULT_IMAGE, PROJECT_FILE
 
 _LEVELS: dict[object, Level] = {0: 0, 1: 1, 2: 2, 3: 3, "s": "s"}
+_INFORMATION = ("name", "version", "author", "description")
+_OPTIONS = ("optimisation", "checks", "debug", "dialect", "no-warn", "werror")
 _MAX_TEXT = 255  # characters of what the image says about the project
 _PATTERN = re.compile(r"[*?\[]")
 
@@ -60,7 +62,10 @@ def _project(file: Path, table: Table) -> Project:
     folder = file.parent
     options = table.table("options") or table.empty("options")
     information = table.table("information") or table.empty("information")
-    table.text("link")  # what it says is checked where it is used (cli/links.py)
+    table.text("link")  # cli/links.py checks what it says
+    table.belongs("it goes into [information]", *_INFORMATION)
+    table.belongs(f"{listed(_INFORMATION, 'and')} go into [information]", "project")
+    table.belongs("it goes into [options]", *_OPTIONS)
     project = Project(
         file,
         _sources(folder, table),
