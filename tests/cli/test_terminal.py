@@ -45,8 +45,9 @@ def test_diagnostics_have_colours_on_a_terminal_and_the_same_words(
     assert PLAIN.sub("", said) == plain.out + plain.err
 
 
-def test_warnings_have_a_colour_of_their_own(tool: Any, broken: str, terminal: None) -> None:
-    assert "\33[1;35mwarning:" in tool("check", broken).out
+def test_warnings_have_a_colour_of_their_own(tool: Any, scratch: Path, terminal: None) -> None:
+    (scratch / "unused.st").write_text("PROGRAM Main VAR n : INT; END_VAR END_PROGRAM")
+    assert "\33[1;35mwarning:" in tool("check", "unused.st").out
 
 
 class Terminal:

@@ -70,10 +70,10 @@ def _default_link() -> Link | None:
     if text := os.environ.get(VARIABLE):
         return _parse(text, f"In the environment's {VARIABLE}")
     file = find_project()
-    return None if file is None else link_in(file)
+    return None if file is None else _link_in(file)
 
 
-def link_in(file: Path) -> Link | None:
+def _link_in(file: Path) -> Link | None:
     """What a project says. Raises UsageError for a file that cannot be understood."""
     try:
         toml = TomlText(str(file), read_utf8(file, "bad-project"))
@@ -81,12 +81,19 @@ def link_in(file: Path) -> Link | None:
     except BadToml as error:
         where = f"{file}:{error.pos.line}:{error.pos.column}"
         raise UsageError(f"{where}: {error.message}.", "bad-project") from None
-    if text is None:
+    if not text:
         return None
-    where = f"{file}:{toml.key_pos(('link',)).line}"
+    line = toml.key_pos(("link",)).line
     if not isinstance(text, str):
-        raise UsageError(f'{where}: link is not a text; write for example link = "serial:/dev/ttyS0".', "bad-project")
-    return _beside(file, _parse(text, where)) if text else None
+        raise UsageError(
+            f'{file}:{line}: link is not a text; write for example link = "serial:/dev/ttyS0".', "bad-project"
+        )
+    return project_link(file, line, text)
+
+
+def project_link(file: Path, line: int, text: str) -> Link:
+    """The link that a line of a project names. Raises UsageError if it is none."""
+    return _beside(file, _parse(text, f"{file}:{line}"))
 
 
 def _beside(file: Path, link: Link) -> Link:

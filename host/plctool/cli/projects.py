@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from plctool.cli.links import link_in
+from plctool.cli.links import project_link
 from plctool.compiler import IoFiles, Level, ProgramFiles, program_files
 from plctool.compiler.project import Project
 from plctool.compiler.warnings import WarningOptions, warning_options
@@ -40,8 +40,8 @@ def settings_of(args: argparse.Namespace) -> Settings:
     sources and there is no project, CompileError for mistakes in the project file."""
     files = program_files(args.sources or [needed_project()], IoFiles(args.io, args.device), args.library)
     project = files.project
-    if project is not None:
-        link_in(project.file)  # a mistake in it is said before a device is wanted
+    if project is not None and project.link:  # a mistake in it is said before a device is wanted
+        project_link(project.file, project.link_line, project.link)
     return Settings(
         files,
         _warnings(args, project),

@@ -51,6 +51,8 @@ class Project:
     werror: bool = False
     info: ApplicationInfo = field(default_factory=ApplicationInfo)
     dialect: str | None = None
+    link: str | None = None  # cli/links.py checks what it says
+    link_line: int = 0
 
 
 def read_project(file: Path) -> Project:
@@ -62,7 +64,6 @@ def _project(file: Path, table: Table) -> Project:
     folder = file.parent
     options = table.table("options") or table.empty("options")
     information = table.table("information") or table.empty("information")
-    table.text("link")  # cli/links.py checks what it says
     table.belongs("it goes into [information]", *_INFORMATION)
     table.belongs(f"{listed(_INFORMATION, 'and')} go into [information]", "project")
     table.belongs("it goes into [options]", *_OPTIONS)
@@ -81,6 +82,8 @@ def _project(file: Path, table: Table) -> Project:
         options.flag("werror"),
         _information(folder, information),
         options.choice("dialect", {name: name for name in DIALECTS}),
+        table.text("link"),
+        table.value_pos("link").line,
     )
     options.close()
     information.close()
