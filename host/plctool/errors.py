@@ -62,6 +62,11 @@ def listed(words: Iterable[str], conjunction: str = "and") -> str:
     return f"{', '.join(most)} {conjunction} {last}" if most else last
 
 
+def counted(count: int, what: str) -> str:
+    """`1 test`, `2 tests`."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
 def did_you_mean(name: str, candidates: Iterable[str]) -> str:
     """`; did you mean X?` for the candidate most like `name`, else nothing."""
     from difflib import get_close_matches

@@ -290,7 +290,7 @@ def test_a_trace_replaces_neither_the_image_nor_its_symbols(tool: Any, counter: 
 
 
 def test_a_run_names_the_file_of_its_trace(tool: Any, counter: Path) -> None:
-    assert tool("run", str(counter), "--trace", "Main.n").out == "1 cycles, 0 ms; the values are in trace.csv\n"
+    assert tool("run", str(counter), "--trace", "Main.n").out == "1 cycle, 0 ms; the values are in trace.csv\n"
 
 
 def test_a_file_for_a_trace_without_names_is_refused(tool: Any, counter: Path, scratch: Path) -> None:

@@ -139,11 +139,11 @@ def test_inputs_and_outputs_are_those_that_the_project_names(tool: Any, project:
     (project / "io").mkdir()
     (project / "io/field.io.toml").write_text('[[sim]]\nname = "Field"\n[sim.in]\nn = "Main.i"\n')
     write(project, 'sources = "src"\nio = "io/field.io.toml"')
-    assert "1 channels" in tool("build").out
+    assert "1 channel of" in tool("build").out
     (project / "plc.toml").write_text('sources = "src"')
     assert "channels" not in tool("build").out
     (project / "main.io.toml").write_text('[[sim]]\nname = "Field"\n[sim.in]\nn = "Main.i"\n')
-    assert "1 channels" in tool("build").out  # beside plc.toml
+    assert "1 channel of" in tool("build").out  # beside plc.toml
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
 
+from plctool.errors import counted
+
 _LOG_COLUMN = 27  # where the text of a log entry begins
 _DIAGNOSTIC = re.compile(r"^(.+?:\d+:\d+:) (error|warning):(?= )|^(\s*\^)$", re.MULTILINE)
 _BOLD, _RED, _MAGENTA, _GREEN, _PLAIN = "\33[1m", "\33[1;31m", "\33[1;35m", "\33[1;32m", "\33[0m"
@@ -80,7 +82,9 @@ def variables_text(document: dict[str, Any]) -> str:
 def run_text(document: dict[str, Any], texts: dict[str, str]) -> str:
     """Values as ST writes them, how long it ran, and the file of a trace."""
     trace = f"; the values are in {document['trace']}" if "trace" in document else ""
-    return f"{values_text(texts)}\n{document['cycles']} cycles, {document['time_ms']:.10g} ms{trace}".lstrip()
+    return (
+        f"{values_text(texts)}\n{counted(document['cycles'], 'cycle')}, {document['time_ms']:.10g} ms{trace}".lstrip()
+    )
 
 
 def missing_text(document: dict[str, Any]) -> str:
@@ -117,7 +121,7 @@ def build_text(document: dict[str, Any]) -> str:
     """What was built, and how old inputs may be."""
     lines = [f"{document['image']}: {document['size']} bytes, CRC {document['crc']}"]
     if io := document.get("io"):
-        lines.append(f"{io['channels']} channels of inputs and outputs")
+        lines.append(f"{counted(io['channels'], 'channel')} of inputs and outputs")
         if oldest := io["oldest_input"]:
             lines[-1] += f"; oldest input: {oldest['channel']}, up to {age_text(oldest['age_us'])}"
         lines += [f"line {line['name']} is {line['load']:.0%} in use" for line in io["lines"]]

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 from plctool.compiler.front import Diagnostic, render
 from plctool.debug.symbols import SourceLine
+from plctool.errors import counted
 from plctool.st_tests.coverage import Coverage
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def report_text(report: Report, *, colour: bool = False) -> str:
             lines += [f"        {line}" for line in _failure_lines(outcome.failure, report.sources)]
     failed, total = report.failed, len(report.outcomes)
     lines.append("")
-    lines.append(f"{total} tests, {total - failed} passed, {failed} failed ({report.seconds:.2f} s)")
+    lines.append(f"{counted(total, 'test')}, {total - failed} passed, {failed} failed ({report.seconds:.2f} s)")
     if report.coverage is not None:
         lines += ["", report.coverage.text()]
     return "\n".join(lines)
