@@ -107,7 +107,7 @@ def encode(t: Type, value: Any) -> bytes:
     base = base_of(t)
     assert isinstance(base, Elementary)
     if base.kind is Kind.TIME and isinstance(value, timedelta):
-        value = _time_units(value, base)
+        value = _time_units(t, base, value)
     if not _is_number(value):
         raise bad_value(value, t, "give True or False" if base.kind is Kind.BOOL else "give a number")
     if base.kind is Kind.REAL:
@@ -122,9 +122,18 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, SupportsFloat | SupportsIndex)
 
 
-def _time_units(value: timedelta, base: Elementary) -> float:
+def _time_units(t: Type, base: Elementary, value: timedelta) -> int:
     """In the unit of the type: ns for LTIME, ms for TIME."""
-    return value // timedelta(microseconds=1) * 1000 if base.size == 8 else value / timedelta(milliseconds=1)
+    if base.size == 8:
+        units, rest = value // timedelta(microseconds=1) * 1000, timedelta()
+    else:
+        units, rest = divmod(value, timedelta(milliseconds=1))
+    if rest:
+        raise bad_value(value, t, "it takes a whole number of milliseconds, LTIME shorter ones")
+    low, high = _limits(t, base)
+    if not low <= units <= high:
+        raise bad_value(value, t, f"it takes {format_time(low, t)} to {format_time(high, t)}")
+    return units
 
 
 def _flat(t: ArrayType, value: Any) -> list[Any]:
@@ -167,11 +176,16 @@ def _encode_real(base: Elementary, value: Any) -> bytes:
         raise bad_value(value, base, "it is too large") from None
 
 
-def _encode_integer(t: Type, base: Elementary, value: int) -> bytes:
-    low = -(1 << (base.bits - 1)) if base.signed else 0
-    high = 1 if base.kind is Kind.BOOL else (1 << (base.bits - base.signed)) - 1
+def _limits(t: Type, base: Elementary) -> tuple[int, int]:
+    """The least and the largest value of a type."""
     if isinstance(t, SubrangeType):
-        low, high = t.low, t.high
+        return t.low, t.high
+    high = 1 if base.kind is Kind.BOOL else (1 << (base.bits - base.signed)) - 1
+    return -(1 << (base.bits - 1)) if base.signed else 0, high
+
+
+def _encode_integer(t: Type, base: Elementary, value: int) -> bytes:
+    low, high = _limits(t, base)
     if isinstance(t, EnumType) and value not in t.values.values():
         raise bad_value(value, t, f"choose one of {t.choices}")
     if not low <= value <= high:
