@@ -65,6 +65,11 @@ class Ref:
         """Whether code that expects a whole variable of the type cannot have this address."""
         return self.sure < self.type.align
 
+    def crosses(self, other: Ref) -> bool:
+        """Whether they share memory without being at one place: variables at addresses, and members of a UNION."""
+        between = other.offset - self.offset
+        return self.pointer == other.pointer and between != 0 and -other.type.size < between < self.type.size
+
     def member(self, offset: int, t: Type, tag: str = "") -> Ref:
         """A part of it, `offset` bytes further on."""
         sure = alignment_at(offset, self.align)
@@ -420,10 +425,11 @@ class Frame:
         return fn.value(f"or disjoint {text} {cleared}, {fn.value(f'shl {text} {wide}, {ref.bit}')}")
 
     def copy(self, target: Ref, source: Ref, size: int) -> None:
-        """Copies `size` bytes between places that are the same or do not overlap."""
+        """Copies `size` bytes."""
         if size:
             align = min(target.align, source.align)
-            name, size_type = "memcpy" if target.direct and source.direct else "memmove", self.pointer_int
+            apart = target.direct and source.direct and not target.crosses(source)
+            name, size_type = "memcpy" if apart else "memmove", self.pointer_int
             self.fn.do(
                 f"call void @llvm.{name}.p0.p0.{size_type}(ptr align {align} {self.address(target)}, "
                 f"ptr align {align} {self.address(source)}, {size_type} {size}, i1 false)"

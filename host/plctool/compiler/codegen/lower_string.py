@@ -23,6 +23,10 @@ _INLINE_COMPARE = 16
 def copy_string(frame: Frame, target: Ref, source: Ref) -> None:
     """target := source, cut to the target's capacity."""
     known, lengths = frame.length(source), frame.lengths()
+    if target.crosses(source):
+        whole = frame.temporary(source.type)
+        frame.copy(whole, source, source.type.size)
+        source = whole
     if target.capacity.constant is not None and source.capacity.constant is not None:
         length = min(target.capacity.constant, source.capacity.constant)
         target_machine = frame.unit.target
