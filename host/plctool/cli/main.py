@@ -18,9 +18,11 @@ from plctool.cli import documents, io_documents, output
 from plctool.cli.arguments import pairs, parser
 from plctool.cli.io_documents import Document
 from plctool.cli.links import all_serial_ports, find_link, link_of
-from plctool.errors import InternalError, PlcError, UsageError, did_you_mean
+from plctool.cli.unknown_commands import check_command
+from plctool.errors import InternalError, PlcError, UsageError
 from plctool.files import STDOUT, path_error
 from plctool.link.transports import Link
+from plctool.project import IMAGE_SUFFIX
 from plctool.version import plctool_version
 
 if TYPE_CHECKING:
@@ -33,15 +35,6 @@ if TYPE_CHECKING:
 ShowProgress = Callable[[int, int], None]
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 130, 141
-LATER_COMMANDS = {
-    "force": "use write, which a program may overwrite",
-    "unforce": "there is nothing to unforce",
-}
-OTHER_NAMES = {
-    "compile": "build", "make": "build", "simulate": "run", "download": "flash", "upload": "flash", "monitor": "watch",
-    "init": "new", "create": "new",
-}  # fmt: skip
-"""What commands are called elsewhere."""
 
 
 # ---- commands on files -----------------------------------------------------------------------------------------------
@@ -54,7 +47,7 @@ def _print_warnings(args: argparse.Namespace, warnings: Sequence[str]) -> None:
 
 
 def _build(args: argparse.Namespace) -> int:
-    image = next((path for path in args.sources if path.suffix.lower() == ".cdl"), None)
+    image = next((path for path in args.sources if path.suffix.lower() == IMAGE_SUFFIX), None)
     if image is not None:
         raise UsageError(f"{image} is not a source; to name the image that is built, write -o {image}.", "usage")
     document, warnings = documents.build(_settings(args))
@@ -587,36 +580,9 @@ def _beside_output(args: argparse.Namespace) -> TextIO:
     return sys.stderr if args.output == STDOUT else sys.stdout
 
 
-def _check_command(arguments: Sequence[str]) -> None:
-    """Raises UsageError for a first word that is no command, with what its user seems to mean."""
-    word = arguments[0] if arguments else ""
-    if not word or word.startswith("-") or word in ACTIONS:
-        return
-    if word == "help":
-        meant = "; write plctool --help"
-    elif word in OTHER_NAMES:
-        meant = f"; did you mean {OTHER_NAMES[word]}?"
-    elif Path(word).suffix.lower() == ".cdl":
-        meant = f"; did you mean plctool run {word}?"
-    elif _is_source(word):
-        meant = f"; did you mean plctool build {word}?"
-    else:
-        meant = did_you_mean(word, ACTIONS) or "; 'plctool --help' lists the commands"
-    raise UsageError(f"'{word}' is not a command{meant}{'' if meant.endswith('?') else '.'}", "usage")
-
-
-def _is_source(word: str) -> bool:
-    from plctool.compiler.source_files import READERS
-
-    return Path(word).suffix.lower() in READERS
-
-
 def _command(arguments: Sequence[str]) -> int:
-    if arguments and arguments[0] in LATER_COMMANDS:
-        raise UsageError(
-            f"'{arguments[0]}' is not in this version of plctool; {LATER_COMMANDS[arguments[0]]}.", "not-yet"
-        )
-    _check_command(arguments)
+    if arguments and arguments[0] and not arguments[0].startswith("-"):
+        check_command(arguments[0], ACTIONS)
     args = parser().parse_args(arguments)
     if args.version:
         print(f"plctool {plctool_version()}")
