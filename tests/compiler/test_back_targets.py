@@ -25,6 +25,7 @@ from plctool.compiler.typed import (
     Case,
     Convert,
     Expr,
+    External,
     For,
     IndexPlace,
     Pou,
@@ -182,7 +183,7 @@ def test_an_undefined_function_is_named(name: str) -> None:
     target = find_target(name)
     text = ir("declare void @mystery()\ndefine void @entry() {\n call void @mystery()\n ret void\n}", target)
     with pytest.raises(UsageError, match="mystery"):
-        link([emit_object(Part(text), Options(target))], target, ["entry"], 0)
+        link([emit_object(Part(text), Options(target))], target, ["entry"], [])
 
 
 @pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
@@ -190,7 +191,7 @@ def test_writable_data_are_refused(target: Target) -> None:
     entry = "define i32 @entry() {\n %o = atomicrmw add ptr @state, i32 1 monotonic\n ret i32 %o\n}"
     text = ir(f"@state = internal global i32 5\n{entry}", target)
     with pytest.raises(UsageError, match=r"\.data|__atomic|__sync"):
-        link([emit_object(Part(text), Options(target))], target, ["entry"], 0)
+        link([emit_object(Part(text), Options(target))], target, ["entry"], [])
 
 
 def test_absolute_addresses_are_refused() -> None:
@@ -203,7 +204,7 @@ def test_absolute_addresses_are_refused() -> None:
         target,
     )
     with pytest.raises(UsageError, match=r"position independent|writable"):
-        link([emit_object(Part(text), Options(target))], target, ["entry"], 0)
+        link([emit_object(Part(text), Options(target))], target, ["entry"], [])
 
 
 @pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
@@ -217,7 +218,7 @@ def test_frames_of_memory_functions_are_known(target: Target) -> None:
 def test_unreachable_sections_are_left_out() -> None:
     target = find_target("x86_64-linux")
     text = ir('define void @entry() {\n ret void\n}\ndefine void @far() section ".text.far" {\n ret void\n}\n', target)
-    linked = link([emit_object(Part(text), Options(target))], target, ["entry"], 0)
+    linked = link([emit_object(Part(text), Options(target))], target, ["entry"], [])
     assert "far" not in linked.symbols
 
 
@@ -244,8 +245,9 @@ def test_a_stub_out_of_reach_is_an_error(machine: Machine, slots: int) -> None:
 def test_a_program_with_too_many_imports_is_refused(name: str) -> None:
     target = find_target(name)
     text = ir("define double @entry(double %x) {\n %y = fadd double %x, %x\n ret double %y\n}", target)
+    imports = [External(f"f{i}", 0, 0) for i in range(1024)]
     with pytest.raises(UsageError, match=r"too large for .* imports"):
-        link([emit_object(Part(text), Options(target))], target, ["entry"], 1024)
+        link([emit_object(Part(text), Options(target))], target, ["entry"], imports)
 
 
 def test_constants_are_reached_at_any_distance_from_the_code() -> None:

@@ -81,6 +81,7 @@ class Module:
         self._globals: list[str] = []
         self.functions: dict[str, Definition] = {}
         self._helpers: list[str] = []
+        self._declarations: dict[str, str] = {}
         self._attributes: dict[str, int] = {}
         self._metadata: list[str] = []
         self._metadata_ids: dict[str, int] = {}
@@ -139,10 +140,15 @@ class Module:
         """A small internal function, or several, of which every part of the module has its own copy."""
         self._helpers.append(definition)
 
+    def declare(self, name: str, declaration: str) -> None:
+        """A function that is not in the module; the first declaration of a name holds."""
+        self._declarations.setdefault(name, declaration)
+
     def text(self, functions: Iterable[str]) -> str:
         """The module in LLVM's assembly language, with these functions in it."""
         parts = [f'target triple = "{self._triple}"']
         parts += self._globals
+        parts += self._declarations.values()
         parts += functions
         parts += self._helpers
         parts += [f"attributes #{number} = {{ {text} }}" for text, number in self._attributes.items()]

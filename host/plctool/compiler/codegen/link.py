@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.line_table import Line, in_order, read_line_table
+from plctool.compiler.codegen.lower_unit import import_symbol
 from plctool.compiler.codegen.memory_functions import MEMORY_FUNCTIONS, memory_object
 from plctool.compiler.codegen.relocations import (
     AARCH64_LOW12,
@@ -50,14 +51,15 @@ class LinkedSymbol:
 class Linked:
     """`code`: the block. `lines`: sorted by address, an address being an offset in the block. `debug`: the objects with
     nothing but their debugging information, in which addresses are such offsets too, or -1 outside of the block.
-    `imports`: the compiler calls that got a stub, in the order of their slots, starting with `first_slot`. `frames`: of
-    the functions."""
+    `imports`: the C functions of the program and the compiler calls, in the order of their slots. `stubs`: those that
+    are called by jumps in the block, by the offset of the jump. `frames`: of the functions."""
 
     code: bytes
     symbols: dict[str, LinkedSymbol]
     lines: list[Line]
     debug: list[bytes]
     imports: list[External]
+    stubs: dict[int, External]
     frames: Frames
 
 
@@ -86,19 +88,19 @@ class _Section:
         return self.name.startswith(".debug_")
 
 
-def link(objects: Sequence[bytes], target: Target, roots: Sequence[str], first_slot: int) -> Linked:
-    """Links the objects of one program. `roots`: symbols that have to be in the block. `first_slot`: the first free
-    import slot.
+def link(objects: Sequence[bytes], target: Target, roots: Sequence[str], imports: Sequence[External]) -> Linked:
+    """Links the objects of one program. `roots`: symbols that have to be in the block. `imports`: C functions that the
+    program names, in the order of their slots.
 
     Raises UsageError naming what cannot be linked.
     """
-    return _Linker(objects, target, first_slot).run(roots)
+    return _Linker(objects, target, imports).run(roots)
 
 
 class _Linker:
-    def __init__(self, objects: Sequence[bytes], target: Target, first_slot: int) -> None:
+    def __init__(self, objects: Sequence[bytes], target: Target, imports: Sequence[External]) -> None:
         self._target = target
-        self._first_slot = first_slot
+        self._imports = {import_symbol(external.name): external for external in imports}
         self._sections: list[_Section] = []
         self._symbols: list[_ElfSymbol] = []
         self._objects: list[tuple[list[_Section], bytes]] = []
@@ -107,7 +109,7 @@ class _Linker:
         if any(not s.section and s.name in MEMORY_FUNCTIONS for s in self._symbols):
             self._read(memory_object(target))
         self._defined = {s.name: s for s in self._symbols if s.section and s.is_global}
-        self._stubs: dict[str, int] = {}  # offset in the block, by name, in the order of slots
+        self._stubs: dict[str, int] = {}  # offset in the block, by symbol
 
     def _read(self, data: bytes) -> None:
         sections, symbols = _read_elf(data, self._target, len(self._sections))
@@ -126,10 +128,10 @@ class _Linker:
             for s in self._symbols
             if s.section in used and s.name and not s.name.startswith((".", "$"))
         }
-        imports = [COMPILER_CALLS[name] for name in self._stubs]
+        stubs = {offset: self._imports[name] for name, offset in self._stubs.items()}
         self._relocate_debug()
         debug = [_only_debug(sections, data) for sections, data in self._objects]
-        return Linked(bytes(code), symbols, self._lines(), debug, imports, self._frames())
+        return Linked(bytes(code), symbols, self._lines(), debug, [*self._imports.values()], stubs, self._frames())
 
     def _reach(self, start: set[int]) -> list[int]:
         """The sections that the given ones refer to, directly or not, code first."""
@@ -161,22 +163,28 @@ class _Linker:
         return code
 
     def _add_stubs(self, code: bytearray, used: list[int]) -> None:
-        """A jump through the import table for every compiler call."""
+        """A jump through the import table for every C function and compiler call that is called by its symbol."""
         wanted = (self._resolved(symbol) for i in used for _, _, symbol, _ in self._sections[i].relocations)
         names = sorted({symbol.name for symbol in wanted if not symbol.section})
-        unknown = [name for name in names if not self._target.stubs or name not in COMPILER_CALLS]
+        calls = [name for name in names if name not in self._imports]
+        unknown = [name for name in calls if not self._target.stubs or name not in COMPILER_CALLS]
         if unknown:
             raise UsageError(
                 f"The target {self._target.name} has no {', '.join(unknown)}, which the program needs.",
                 "undefined-symbol",
             )
-        for slot, name in enumerate(names, self._first_slot):
+        self._imports |= {name: COMPILER_CALLS[name] for name in calls}
+        for slot, (name, external) in enumerate(self._imports.items()):
+            if name not in names:
+                continue
             code += bytes(align_up(len(code), 4) - len(code))
             self._stubs[name] = len(code)
             try:
                 code += stub(self._target.machine, slot)
             except OutOfReach:
-                raise self._too_large(f"its imports and its functions of arithmetic ({name}) are too many") from None
+                raise self._too_large(
+                    f"its imports and its functions of arithmetic ({external.name}) are too many"
+                ) from None
 
     def _too_large(self, why: str) -> UsageError:
         return UsageError(f"The program is too large for {self._target.name}: {why}.", "too-large")

@@ -44,8 +44,7 @@ def fb_call(frame: Frame, s: FbCall) -> None:
         slot = Ref(base, variable.offset, _POINTER)
         frame.store(slot, frame.address(frame.ref(place)))
     if s.block.external:
-        target = frame.import_function(frame.unit.import_slot(s.block.external))
-        frame.fn.do(f"call void {target}(ptr {base}) {frame.unit.external_call}")
+        frame.call_import(s.block.external, "void", [f"ptr {base}"], frame.unit.external_call)
     else:
         form = frame.form_of(s.block, s.dispatch)
         handed_on = [f"ptr {frame.raised}"] if form is Form.RAISING else []

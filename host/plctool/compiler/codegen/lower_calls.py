@@ -152,14 +152,11 @@ def _call_instruction(
     unit, fn = frame.unit, frame.fn
     returned = returned_variable(pou, None)
     if pou.external:
-        target = frame.import_function(unit.import_slot(pou.external))
         convention = f"{unit.target.external_convention} " if unit.target.external_convention else ""
-        text = f"call {convention}{returned_type(returned)} {target}({', '.join(arguments)}) {unit.external_call}"
-        if returned is not None:
-            value = fn.value(text)
-            return to_bool(frame, value, BOOL) if is_bool(returned.type) else value  # TRUE is not 1 everywhere in C
-        fn.do(text)
-        return None
+        value = frame.call_import(pou.external, returned_type(returned), arguments, unit.external_call, convention)
+        if value is not None and returned is not None and is_bool(returned.type):
+            return to_bool(frame, value, BOOL)  # TRUE is not 1 everywhere in C
+        return value
     symbol = unit.target_of(pou, dispatch, form)
     if returned is not None:
         return fn.call_value(returned_type(returned), symbol, arguments)

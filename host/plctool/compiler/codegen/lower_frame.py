@@ -18,7 +18,7 @@ from plctool.compiler.codegen.lengths import KnownLengths, Lengths
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, REALS, Check, Form, Unit, value_type
 from plctool.compiler.codegen.memory import Memory
 from plctool.compiler.internal import note_position
-from plctool.compiler.typed import Dispatch, Expr, Label, Place, Pos, Pou, Statement, Variable
+from plctool.compiler.typed import Dispatch, Expr, External, Label, Place, Pos, Pou, Statement, Variable
 from plctool.core import ffi, lib
 from plctool.iec.areas import Area
 from plctool.iec.types import DINT, MAX_ALIGN, Elementary, StringType, Type, alignment_at, base_of, is_scalar
@@ -120,9 +120,7 @@ class _Stop(Handler):
 
     @staticmethod
     def _call(frame: Frame, code: Value) -> None:
-        unit = frame.unit
-        target = frame.import_function(unit.import_slot(RAISE))
-        frame.fn.do(f"call void {target}(i32 {code}) {unit.raising}")
+        frame.call_import(RAISE, "void", [f"i32 {code}"], frame.unit.raising)
         frame.fn.terminate("unreachable")
 
 
@@ -214,13 +212,24 @@ class Frame:
             self._bases[area] = base
         return base
 
-    def import_function(self, slot: int) -> Value:
-        """The address of import `slot`, loaded here."""
-        fn, size = self.fn, self.unit.target.pointer_size
+    def call_import(
+        self, external: External, result: str, arguments: list[str], attributes: str, convention: str = ""
+    ) -> Value | None:
+        """Calls a C function, whose result is of the LLVM type `result`. `arguments` with their types."""
+        target = self.unit.imported(external, result, arguments, convention) or self._loaded_import(external)
+        text = f"call {convention}{result} {target}({', '.join(arguments)}) {attributes}"
+        if result != "void":
+            return self.fn.value(text)
+        self.fn.do(text)
+        return None
+
+    def _loaded_import(self, external: External) -> Value:
+        """The address of a C function, loaded here."""
+        fn, offset = self.fn, self.unit.import_slot(external) * self.unit.target.pointer_size
         invariant = f"!invariant.load !{self.unit.empty}"
         table = fn.value(f"getelementptr inbounds i8, ptr %ctx, i64 {self.unit.imports_offset}")
         base = fn.value(f"load ptr, ptr {table}, {invariant}")
-        entry = fn.value(f"getelementptr inbounds i8, ptr {base}, i64 {slot * size}")
+        entry = fn.value(f"getelementptr inbounds i8, ptr {base}, i64 {offset}")
         return fn.value(f"load ptr, ptr {entry}, {invariant}")
 
     # ---- checks ----

@@ -89,6 +89,11 @@ def interface_signature(text: str) -> int:
     return zlib.crc32(text.encode("ascii"))
 
 
+def import_symbol(name: str) -> str:
+    """The symbol by which the linker knows a C function."""
+    return f"import.{name}"
+
+
 RAISE = External("iecraise", interface_signature("iecraise(UDINT)"), 0x00010000)
 
 
@@ -235,6 +240,16 @@ class Unit:
             self._import_slots[external.name] = slot
             self.imports.append(external)
         return slot
+
+    def imported(self, external: External, result: str, arguments: list[str], convention: str) -> str | None:
+        """The symbol of a C function, where the linker makes a stub for it; None where its address has to be loaded."""
+        if not self.target.stubs:
+            return None
+        self.import_slot(external)
+        symbol = import_symbol(external.name)
+        types = ", ".join(argument.split()[0] for argument in arguments)
+        self.module.declare(symbol, f"declare {convention}{result} @{symbol}({types})")
+        return f"@{symbol}"
 
     def helper(self, name: str) -> str:
         """The symbol of a function of `string_functions`, which is then put in the module."""
