@@ -13,7 +13,14 @@
  * SysFoo has the hook SysFoo_Hook and the number CMPID_SysFoo. What is not chosen takes no flash.
  */
 #include "CmpItf.h"
+#include "rts_config.h"
 
+/* plctool has the facts of all boards here. A program of an operating system has none: they would be memory of it. */
+#if defined(BOARD_FACTS_ONLY) || (defined(BOARD_FLASH_SECTOR_SIZE) && !defined(__linux__))
+#include "BoardFactsOwn.h"
+#endif
+
+#ifndef BOARD_FACTS_ONLY
 #define X(component) RTS_RESULT component##_Hook(CMP_HOOK hook);
 #include "CmpOrder.h"
 #undef X
@@ -51,3 +58,4 @@ const struct BLK_COUNTERS *const BlkCounters[] = {
 #endif
 
 const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_hooks);
+#endif

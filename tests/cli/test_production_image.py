@@ -303,8 +303,8 @@ def test_info_of_a_file_without_program_or_seal(tool: Any, scratch: Path, build:
 
 
 def test_program_of_another_board_is_not_burned(build: Callable[..., Path], tool: Any, scratch: Path) -> None:
-    (scratch / "app.io.toml").write_text("[[sim]]\nin = { a = '%IX0.0' }\n")
-    image = build(PROGRAM, "--board", "lm3s6965-board/standard")
+    (scratch / "app.io.toml").write_text("[[sim]]\noptional = true\nin = { a = '%IX0.0' }\n")
+    image = build(PROGRAM, "--board", "lm3s6965-board/full")
     refused = tool("image", str(image), "--board", "mps2-an385/full", "-o", "flash.bin")
     assert refused.status == 2
     assert f"The inputs and outputs of {image} are those of LM3S6965 board, this is MPS2 AN385 (full)" in refused.err

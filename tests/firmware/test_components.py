@@ -29,7 +29,7 @@ def _components(path: Path) -> list[str]:
     """The components of a list, as the compiler sees it."""
     compiler = shutil.which("cc")
     assert compiler, "this test needs a C compiler: install gcc or clang"
-    include = [FIRMWARE / "include", FIRMWARE / "port/baremetal/common"]
+    include = [FIRMWARE / folder for folder in ("include", "port/baremetal/common", "port/sim")]
     done = subprocess.run(
         [compiler, "-E", "-P", "-std=c99", *(f"-I{folder}" for folder in include), path],
         capture_output=True, text=True, check=True,

@@ -10,7 +10,7 @@ from io_support import configuration, messages
 from plctool.compiler import IoFiles, compile_sources
 
 PROGRAM = "PROGRAM Main\nVAR start : BOOL; END_VAR\nEND_PROGRAM\n"
-DESCRIPTION = "[[sim]]\nin = { button = 'Main.start' }\n"
+DESCRIPTION = "[[sim]]\noptional = true\nin = { button = 'Main.start' }\n"
 DEVICE = "name = 'IO-16'\ntarget = 'cortex-m3'\n"
 
 

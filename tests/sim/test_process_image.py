@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
-from plctool.errors import DeviceError
+from plctool.errors import DeviceError, UsageError
 from plctool.sim import Simulator
 
 Start = Callable[..., Simulator]
@@ -135,5 +135,9 @@ def test_a_program_that_needs_more_copies_than_the_device_has_is_refused_with_th
         "VAR_GLOBAL in AT %IL0 : ARRAY[1..512] OF LINT; out AT %QL0 : ARRAY[1..512] OF LINT; END_VAR "
         f"PROGRAM All {body} END_PROGRAM CONFIGURATION C RESOURCE R ON D {runs} END_RESOURCE END_CONFIGURATION"
     )
+    built = compile_sources([path])
+    assert built.needs["all_copies"].amount == 262144
     with pytest.raises(DeviceError, match="The process image area needs 262144 bytes, this device has 196608"):
-        Simulator(compile_sources([path]).image)
+        Simulator(built.image)
+    with pytest.raises(UsageError, match="needs 262144 bytes of copies of inputs and outputs, the device has 196608"):
+        compile_sources([path], board="plcrt")

@@ -1,11 +1,11 @@
 /*
- * SimBoards.c - the boards that plctool knows without their firmware: BoardFacts.c, compiled once for each.
+ * SimBoards.c - the boards that plctool knows without their firmware.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
 #include "SimBoards.h"
 
-/* Of the linker: the section in which each BoardFacts.c puts its facts. */
+/* Of the linker: the section of the facts (BoardFactsOwn.h). */
 extern const BOARD_FACTS __start_board_facts[];
 extern const BOARD_FACTS __stop_board_facts[];
 

@@ -13,8 +13,10 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
     """Writes what a programmer burns to `output`; "burn_at" is the address that a .bin belongs to, "burn_apart" the
     firmware that cannot be in it. Raises UsageError when the parts do not go together."""
     from plctool.image.board import board_of, read_firmware
-    from plctool.image.file import image_crc, read_program
+    from plctool.image.file import image_crc, parse_image, read_program
+    from plctool.image.limits import needs_of_image
     from plctool.image.production import is_production, production_pieces, write_production
+    from plctool.io.fit import check_board
 
     if not is_production(output):
         raise UsageError(f"{output} is neither .bin nor .hex; write for example -o {_as_hex(output)}.", "bad-output")
@@ -28,6 +30,9 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
             "other-board",
         )
     pieces = production_pieces(data, wanted, of_firmware)
+    advice = "Make the program smaller, or use a firmware with more room."
+    parsed = parse_image(data)
+    check_board(parsed, needs_of_image(parsed, len(data)), wanted, advice)
     start = write_production(output, pieces, wanted)
     apart = None if firmware is None or wanted.flash.address is not None else str(firmware)
     return {

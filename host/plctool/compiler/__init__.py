@@ -171,6 +171,6 @@ def compile_sources(
     with bugs_reported():
         built = build_program(checked.program, options, info)
     if limits:
-        check_program_fits(built.needs, options.target, known, None if description is None else description.device)
+        check_program_fits(built, options.target, known, None if description is None else description.device)
     found = checked.diagnostics
     return replace(built, warnings=found, rendered_warnings=render_all(found, shown))

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
+from plctool.compiler.build import BuildResult
 from plctool.core import lib
 from plctool.image.board import Board, known_boards
-from plctool.image.limits import LIMITS, Need, check_fit
+from plctool.image.file import parse_image
+from plctool.image.limits import LIMITS, check_fit
 from plctool.image.targets import TARGETS, Target
 from plctool.io.device_file import PROGRAM_LIMITS, DeviceFile
+from plctool.io.fit import check_board
 
 _OTHERWISE = "say so in a device file (docs/io.md) or build with --no-limits"
 
 
-def check_program_fits(
-    needs: Mapping[str, Need], target: Target, board: Board | None, device: DeviceFile | None
-) -> None:
+def check_program_fits(built: BuildResult, target: Target, board: Board | None, device: DeviceFile | None) -> None:
     """Compares with what `board` has, else with the limits of the device file, else with the most that any firmware of
     this repository has on this processor, or on its like. Raises UsageError saying what does not fit, and what needs
     most of it."""
-    own: dict[str, int] = {}
+    needs, own = built.needs, {}
     if device is not None and device.target in ("", target.name):  # not when it is built for a simulator
         own = {name: n for name, n in device.limits.items() if name in PROGRAM_LIMITS}
     if board is not None:
-        check_fit(needs, board.limits, board.title, "Make the program smaller.")
+        check_board(parse_image(built.image), needs, board, "Make the program smaller.")
     elif own and device is not None:
         check_fit(
             needs, own, device.title,

@@ -20,7 +20,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError, did_you_mean
 from plctool.iec.areas import Area
 from plctool.image.file import ELF_TAG, target_name
-from plctool.image.limits import of_area
+from plctool.image.limits import BOARD_LIMITS, of_area
 from plctool.image.targets import TARGETS
 
 SLOT_A, SLOT_B, COMMIT, RETAIN = (int(n) for n in (lib.FILE_SLOT_A, lib.FILE_SLOT_B, lib.FILE_COMMIT, lib.FILE_RETAIN))
@@ -49,7 +49,8 @@ class Flash:
 
 @dataclass(frozen=True)
 class Board:
-    """`limits`: what a program may need at most, by the names of `limits.py`. `record`: bytes of a commit record."""
+    """`limits`: what a program may need at most, by the names of `limits.py`. `record`: bytes of a commit record.
+    `components`: of the runtime that its firmware has."""
 
     name: str
     config: str
@@ -57,6 +58,7 @@ class Board:
     flash: Flash
     record: int
     limits: dict[str, int] = field(hash=False)
+    components: frozenset[str]
 
     @property
     def target(self) -> str:
@@ -128,10 +130,16 @@ def _board(facts: Any) -> Board:
         "code": int(facts.code) or slot,
         "image": slot,
     }
+    limits |= {name: int(getattr(facts, name)) for name in BOARD_LIMITS if hasattr(facts, name)}
+    copies = limits.pop("copies")
+    if copies:
+        limits["all_copies" if facts.copies_always else "copies"] = copies
     if facts.stack:
         limits["stack"] = int(facts.stack)
-    name, config = (ffi.string(text).decode("ascii", "replace") for text in (facts.name, facts.config))
-    return Board(name, config, int(facts.target_id), flash, int(facts.record), limits)
+    name, config, components = (
+        ffi.string(text).decode("ascii", "replace") for text in (facts.name, facts.config, facts.components)
+    )
+    return Board(name, config, int(facts.target_id), flash, int(facts.record), limits, frozenset(components.split()))
 
 
 def find_board(text: str) -> Board:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from plctool.core import lib
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
-from plctool.image.file import Image
+from plctool.image.file import Image, ImagePart
 
 LIMITS = {
     "tasks": "tasks",
@@ -22,6 +23,22 @@ LIMITS = {
     "stack": "bytes of stack",
 }
 """What a device may limit, and what messages call it."""
+
+BOARD_LIMITS = {
+    "copies": "bytes of copies of the inputs and outputs that tasks share",
+    "all_copies": "bytes of copies of inputs and outputs",
+    "connectors": "devices and buses",
+    "gpio_groups": "groups of lines",
+    "events": "events of lines",
+    "modbus_lines": "lines to Modbus devices",
+    "modbus_devices": "Modbus devices",
+    "modbus_jobs": "reads and writes of Modbus",
+    "modbus_servers": "Modbus servers",
+    "modbus_ranges": "ranges of Modbus servers",
+    "modbus_data": "bytes of Modbus data",
+    "modbus_tcp": "lines and servers of Modbus TCP",
+}
+"""The same, of which only a board that is named says how much it has."""
 
 _OF_AREA = {Area.INPUT: "inputs", Area.OUTPUT: "outputs"}
 
@@ -62,22 +79,33 @@ def needs_of_image(image: Image, size: int) -> dict[str, Need]:
         **{of_area(Area(index)): Need(amount) for index, amount in image.areas.items()},
         "code": Need(len(image.code)),
         "image": Need(size),
+        "copies": Need(sum(_copies(part) for task in image.tasks for part in task.parts if part.shared)),
+        "all_copies": Need(sum(_copies(part) for task in image.tasks for part in task.parts)),
     }
 
 
-def check_fit(needs: Mapping[str, Need], limits: Mapping[str, int], device: str, advice: str) -> None:
-    """Raises UsageError that says of each limit that is passed how far, and by what. `advice` is its last sentence."""
+def _copies(part: ImagePart) -> int:
+    """Bytes of a task's copies of its inputs or outputs, as AppImagePlace counts: also of what it began with."""
+    return (1 + part.written) * part.count * int(lib.CDL_IMAGE_UNIT)
+
+
+def check_fit(
+    needs: Mapping[str, Need], limits: Mapping[str, int], device: str, advice: str, lacking: Iterable[str] = ()
+) -> None:
+    """Raises UsageError that says of each limit that is passed how far, and by what. `advice`: what to do then, a
+    sentence; `lacking`: sentences about what else does not fit."""
     passed = [
-        _sentence(name, needs[name], limits[name])
-        for name in LIMITS
+        _sentence(title, needs[name], limits[name])
+        for name, title in (LIMITS | BOARD_LIMITS).items()
         if name in needs and name in limits and needs[name].amount > limits[name]
     ]
-    if passed:
-        raise UsageError(f"The program does not fit {device}. {' '.join(passed)} {advice}", "does-not-fit")
+    sentences = [*passed, *([advice] if passed else []), *lacking]
+    if sentences:
+        raise UsageError(f"The program does not fit {device}. {' '.join(sentences)}", "does-not-fit")
 
 
-def _sentence(name: str, need: Need, limit: int) -> str:
-    text = f"It needs {'at least ' if need.at_least else ''}{need.amount} {LIMITS[name]}, the device has {limit}"
+def _sentence(title: str, need: Need, limit: int) -> str:
+    text = f"It needs {'at least ' if need.at_least else ''}{need.amount} {title}, the device has {limit}"
     if not need.parts:
         return f"{text}."
     parts = need.parts[:_LARGEST]

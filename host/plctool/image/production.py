@@ -25,7 +25,6 @@ from plctool.files import write_atomically
 from plctool.iec.types import align_up
 from plctool.image.board import COMMIT, RETAIN, SLOT_A, SLOT_B, Board, Firmware, Flash, Segment
 from plctool.image.file import TAG, describe_image, image_crc, parse_image, target_name
-from plctool.image.limits import check_fit, needs_of_image
 
 BIN, HEX = ".bin", ".hex"
 _HEX_TYPE, _HEX_END = slice(7, 9), "01"  # where a line of a .hex says what it is, and that it is the last one
@@ -44,7 +43,8 @@ class Piece:
 
 def production_pieces(image: bytes, board: Board, firmware: Firmware | None) -> list[Piece]:
     """All that is burned, by address: the firmware too, unless programs have a memory of their own. Raises UsageError
-    when the image is not for this board or does not fit it, and when the firmware is where the programs are."""
+    when the image is for another processor, and when the firmware is where the programs are. Whether the image fits
+    the board is for `io.fit`."""
     parsed = parse_image(image)
     if parsed.device_id != board.device_id:
         raise UsageError(
@@ -52,12 +52,6 @@ def production_pieces(image: bytes, board: Board, firmware: Firmware | None) -> 
             f"--target {board.target}.",
             "other-target",
         )
-    check_fit(
-        needs_of_image(parsed, len(image)),
-        board.limits,
-        board.title,
-        "Make the program smaller, or use a firmware with more room.",
-    )
     pieces = list(_flash_pieces(image, board))
     if firmware is not None and board.flash.address is not None:
         _check_apart(firmware, board.flash, board.flash.address)

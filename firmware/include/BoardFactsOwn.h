@@ -1,14 +1,11 @@
 /*
- * BoardFacts.c - what plctool has to know of a firmware and its board.
+ * BoardFactsOwn.h - the facts of this firmware and its board; included by CmpList.h, which knows its components.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "BoardFacts.h"
-
 #include "AppRecord.h"
+#include "BoardFacts.h"
 #include "rts_config.h"
-
-#ifdef BOARD_FLASH_SECTOR_SIZE
 
 #ifdef BOARD_FLASH_ADDRESS
 enum { HAS_ADDRESS = 1, ADDRESS = BOARD_FLASH_ADDRESS };
@@ -40,8 +37,22 @@ __attribute__((used, section("board_facts"), aligned(4))) static const BOARD_FAC
     .tasks = APP_MAX_TASKS,
     .imports = APP_MAX_IMPORTS,
     .record = COMMIT_RECORD_SIZE,
+    .copies = APP_IMAGE_SIZE,
+    .copies_always = APP_IMAGE_ALWAYS,
+    .connectors = IO_MAX_CONNECTORS,
+    .gpio_groups = IO_GPIO_GROUPS,
+    .events = SCHED_MAX_EXTERNAL_EVENTS,
+    .modbus_lines = MODBUS_MAX_CLIENTS,
+    .modbus_devices = MODBUS_MAX_DEVICES,
+    .modbus_jobs = MODBUS_MAX_JOBS,
+    .modbus_servers = MODBUS_MAX_SERVERS,
+    .modbus_ranges = MODBUS_MAX_RANGES,
+    .modbus_data = MODBUS_DATA_SIZE,
+    .modbus_tcp = MODBUS_MAX_CONNECTIONS > 0 ? MODBUS_MAX_CLIENTS + MODBUS_MAX_SERVERS : 0,
     .name = BOARD_DEVICE_NAME,
     .config = RTS_CONFIG_NAME,
+#define X(component) #component " "
+    .components =
+#include "CmpOrder.h"
+#undef X
 };
-
-#endif
