@@ -10,6 +10,7 @@ from plctool.compiler import compile_sources
 from plctool.compiler.codegen.calls import branches
 from plctool.compiler.codegen.stack import deepest_calls
 from plctool.errors import UsageError
+from plctool.image.c_functions import C_FUNCTIONS
 from plctool.image.targets import TARGETS, Machine
 
 LEVELS = (0, 2, "s")
@@ -156,3 +157,44 @@ def test_program_with_a_chain_of_1500_functions_is_built(tmp_path: Path) -> None
     main = "PROGRAM Main VAR n : DINT; END_VAR IF n > 0 THEN n := F1499(n); END_IF END_PROGRAM"
     (tmp_path / "long.st").write_text(f"{first}\n{calls}{main}")
     assert compile_sources([tmp_path / "long.st"], level=0, limits=False).needs["stack"].amount >= 1500 * 8
+
+
+@pytest.mark.parametrize(
+    ("target", "statement", "function"),
+    [
+        ("cortex-m0", "r := SIN(r);", "sinf"),
+        ("cortex-m3", "r := SIN(r);", "sinf"),
+        ("cortex-m4f", "r := SIN(r);", "sinf"),
+        ("rv32imac", "l := EXPT(l, 2.5);", "pow"),
+        ("cortex-m3", "r := r * 1.5;", "__mulsf3"),
+        ("cortex-m7", "l := l / 3.0;", "__divdf3"),
+        ("rv32imac", "n := n MOD 7;", "__moddi3"),
+    ],
+)
+def test_a_c_function_counts_with_what_it_takes(tmp_path: Path, target: str, statement: str, function: str) -> None:
+    text = "PROGRAM Main VAR r : REAL; l : LREAL; n : LINT; END_VAR {} END_PROGRAM"
+    (tmp_path / "a.st").write_text(text.format(statement))
+    need = compile_sources([tmp_path / "a.st"], target=target, limits=False).needs["stack"]
+    taken = C_FUNCTIONS[function].stack
+    assert (function, taken) in need.parts and not need.at_least
+    assert taken <= need.amount < taken + 64
+
+
+def test_a_c_function_counts_where_it_is_called(chain: Path) -> None:
+    """Below the shorter branch it changes nothing until it is the deepest."""
+    options = {"target": "cortex-m3", "level": 0, "checks": "none"}
+    without = compile_sources([chain], **options).needs["stack"].amount
+    text = chain.read_text()
+    chain.write_text(text.replace("Wide := t[n];", "Wide := t[n] + REAL_TO_DINT(ATAN(DINT_TO_REAL(n)));"))
+    shallow = compile_sources([chain], **options).needs["stack"]
+    chain.write_text(text.replace("Leaf := t[n];", "Leaf := t[n] + REAL_TO_DINT(SIN(DINT_TO_REAL(n)));"))
+    deep = compile_sources([chain], **options).needs["stack"]
+    sine, arc = C_FUNCTIONS["sinf"].stack, C_FUNCTIONS["atanf"].stack
+    assert without + sine <= deep.amount < without + sine + 64
+    assert shallow.amount < without + arc
+
+
+def test_what_an_unknown_c_function_takes_is_not_known(tmp_path: Path) -> None:
+    text = "{attribute 'external' := 'acme'}\nFUNCTION Acme : DINT VAR_INPUT n : DINT; END_VAR END_FUNCTION\n"
+    (tmp_path / "a.st").write_text(text + "PROGRAM Main VAR n : DINT; END_VAR n := Acme(n); END_PROGRAM")
+    assert compile_sources([tmp_path / "a.st"], target="cortex-m3").needs["stack"].at_least

@@ -11,7 +11,7 @@ from plctool.compiler.codegen.emit import emit_objects
 from plctool.compiler.codegen.link import Linked, link
 from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.codegen.stack import deepest_calls
+from plctool.compiler.codegen.stack import Frames, deepest_calls
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.io_configuration import assign_tasks, configuration_of, io_document
@@ -25,6 +25,7 @@ from plctool.files import write_atomically
 from plctool.iec.areas import Area
 from plctool.iec.types import CLASS_NUMBER, base_of
 from plctool.iec.values import encode
+from plctool.image.c_functions import C_FUNCTIONS
 from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image, image_crc
 from plctool.image.limits import Need, largest, needs_of_image, of_area
 from plctool.image.targets import Machine, Target
@@ -67,7 +68,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
     with room_for_nesting():
         lowered = lower(program, options)
     objects = emit_objects(lowered.parts, options)
-    linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], len(lowered.imports))
+    linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], lowered.imports)
     symbols = _symbols(program, lowered, linked, target, info.project)
     kept = kept_parts(v for v in program.globals if v.area is Area.RETAIN)
     code, io = linked.code, None
@@ -86,7 +87,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
         functions={number: _entry(linked, name, target) for number, name in lowered.functions.items()},
         externals=[
             ExternalFunction(e.name, e.signature, e.version, slot * target.pointer_size)
-            for slot, e in enumerate(lowered.imports + linked.imports)
+            for slot, e in enumerate(linked.imports)
         ],
         tasks=[
             _task(task, _entry(linked, name, target)) for task, name in zip(program.tasks, lowered.tasks, strict=True)
@@ -119,15 +120,23 @@ def _needs(
     for name in ("code", "image"):
         needs[name] = replace(needs[name], parts=tuple(sizes.items()))
     roots = [linked.symbols[name].offset for name in (*lowered.tasks, *lowered.functions.values())]
-    chain = deepest_calls(linked.code, target.machine, linked.frames, roots)
+    chain = deepest_calls(linked.code, target.machine, linked.frames | _frames_of_stubs(linked), roots)
     names = {symbol.offset: name for name, symbol in linked.symbols.items()}
+    names |= {offset: external.name for offset, external in linked.stubs.items()}
     names |= {linked.symbols[name].offset: pou.name for name, pou in lowered.pous.items() if name in linked.symbols}
     names |= {linked.symbols[name].offset: task.name for name, task in zip(lowered.tasks, program.tasks, strict=True)}
     frames: Counter[str] = Counter()
     for offset, frame in chain:
         frames[names[offset]] += frame
-    needs["stack"] = Need(frames.total(), largest((+frames).items()), deepest=True, at_least=program.may_recurse)
+    at_least = program.may_recurse or any(external.name not in C_FUNCTIONS for external in linked.stubs.values())
+    needs["stack"] = Need(frames.total(), largest((+frames).items()), deepest=True, at_least=at_least)
     return needs
+
+
+def _frames_of_stubs(linked: Linked) -> Frames:
+    """A stub takes what its C function takes."""
+    functions = {offset: C_FUNCTIONS.get(external.name) for offset, external in linked.stubs.items()}
+    return {offset: (0, function.stack) for offset, function in functions.items() if function is not None}
 
 
 def _entry(linked: Linked, name: str, target: Target) -> int:

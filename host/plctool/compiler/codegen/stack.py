@@ -1,6 +1,7 @@
 """How much stack a program needs: the frames of its functions, and the deepest chain of calls.
 
-What C functions of the runtime take is not counted, nor what the processor pushes when it is interrupted.
+What the processor pushes when it is interrupted is not counted, nor C functions that are called by their address,
+as on processors of computers, whose stacks are large.
 """
 
 from __future__ import annotations
