@@ -375,3 +375,23 @@ def test_info_of_a_renamed_file_says_its_name(tool: Any, for_m3: Path, scratch: 
         tool("image", str(for_m3), "--board", "mps2-an385/standard", "-o", name)
         (scratch / name).rename(scratch / other)
         refused(tool("info", other), f"name it {Path(other).with_suffix(Path(name).suffix)}")
+
+
+def test_a_program_is_built_for_a_firmware(tool: Any, scratch: Path) -> None:
+    (scratch / "app.st").write_text("PROGRAM Main VAR r : REAL; END_VAR r := r * 1.5; END_PROGRAM")
+    words = ("build", "app.st", "-o", "app.cdl", "--firmware", "fw.elf")
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard", name=b"Acme One", config=b"")))
+    assert tool(*words, "--json").json["target"] == "cortex-m3"
+    assert "has a cortex-m3, not a cortex-m7" in tool(*words, "--target", "cortex-m7").err
+    refused(tool(*words, "--board", "mps2-an385/full"), "fw.elf is the firmware of Acme One, not of mps2-an385/full")
+    (scratch / "app.cdl").unlink()
+    less = facts("mps2-an385/standard", name=b"Acme One", config=b"", components=b"CmpIecTask CmpRetain ", stack=8)
+    (scratch / "fw.elf").write_bytes(elf(less))
+    refused(
+        tool(*words),
+        "The program does not fit Acme One.",
+        "bytes of stack, the device has 8 (",
+        "It needs CmpRealCalls for REAL, which the firmware does not have.",
+    )
+    assert not (scratch / "app.cdl").exists()
+    refused(tool(*words[:-1], "app.st"), "app.st is not an ELF file")

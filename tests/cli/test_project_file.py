@@ -8,6 +8,9 @@ from typing import Any
 import pytest
 
 from plctool import Simulator
+from plctool.cli.file_documents import prepared_source
+from plctool.cli.projects import settings_of_sources
+from plctool.image.file import image_crc
 
 LONG = "x" * 256  # bytes; a name has 255
 PATHS = ("sources", "libraries", "output", "device", "io")
@@ -237,3 +240,33 @@ def test_key_outside_its_table_is_refused_with_the_name_of_that(
 
 def test_command_without_a_link_names_the_project_file(tool: Any, project: Path) -> None:
     assert 'link = "serial:/dev/ttyS0" in plc.toml' in tool("status").err
+
+
+def test_board_of_the_project_gives_target_and_limits(tool: Any, project: Path) -> None:
+    write(project, 'sources = ["src"]\nboard = "mps2-an385/standard"')
+    assert tool("build", "--json").json["target"] == "cortex-m3"
+    (project / "src/main.st").write_text("PROGRAM Main VAR n : LREAL := 1.0; END_VAR n := n * 1.5; END_PROGRAM")
+    assert "It needs CmpLrealCalls for LREAL" in tool("build").err
+    assert tool("build", "--board", "mps2-an385/full").status == 0
+    assert tool("build", "--target", "cortex-m7", "--json").json["target"] == "cortex-m7"
+    assert "Main.n = 1.5" in tool("run", "--cycles", "1", "--get", "Main.n").out  # on this machine
+    assert tool("check").status == 0
+
+
+def test_board_that_is_not_known_is_a_mistake_with_its_line(tool: Any, project: Path) -> None:
+    write(project, 'sources = ["src"]\nboard = "mps2-an385/ful"')
+    done = tool("build")
+    assert done.status == 2 and "plc.toml:2:9: error: there is no board 'mps2-an385/ful'" in done.err
+    write(project, 'sources = ["src"]\nboard = "mps2-an385/full"\ntarget = "cortex-m7"')
+    done = tool("build")
+    assert done.status == 2 and "MPS2 AN385 (full) has a cortex-m3, not a cortex-m7" in done.err
+
+
+def test_sources_of_a_project_with_a_board_make_its_image_again(tool: Any, project: Path) -> None:
+    """The board is in the image of a program with inputs and outputs."""
+    write(project, 'sources = ["src"]\nboard = "mps2-an385/full"')
+    (project / "plc.io.toml").write_text("[gpio.in]\nDI0 = '%IX0.0'\n")
+    assert tool("build").status == 0
+    image = project / "app.cdl"
+    archive, _ = prepared_source(settings_of_sources([project]), image_crc(image.read_bytes()), image)
+    assert archive.build[archive.build.index("--board") + 1] == "mps2-an385/full"

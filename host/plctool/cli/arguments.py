@@ -82,6 +82,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     )
     target.completer = lambda **words: TARGETS  # type: ignore[attr-defined]  # for argcomplete
     _add_board(build, "whose limits the program must keep, such as mps2-an385/standard")
+    _add_firmware(build, "the same for a board of your own: what runs on it")
     build.add_argument(
         "--no-limits", action="store_true", help="build also what no device that plctool knows has room for"
     )
@@ -103,12 +104,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     image = command("image", "write what a production programmer burns: a flash with its program")
     _add_image(image)
     _add_board(image, "such as plcrt, mps2-an385/standard")
-    image.add_argument(
-        "--firmware",
-        type=usable_path,
-        metavar="FILE.elf",
-        help="burn it as well; a board of your own is read from it",
-    )
+    _add_firmware(image, "burn it as well; a board of your own is read from it")
     image.add_argument("-o", "--output", type=file_path, required=True, metavar="FILE.hex|.bin")
 
     symbols = command("symbols", "list the variables of an image with their types")
@@ -346,6 +342,10 @@ def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     param.add_argument("parameter", metavar="NAME|ID[=VALUE]", help="set: with its value")
     param.add_argument("--type", metavar="TYPE", help="of one that the description does not have; default: UDINT")
     _add_link(param, symbols=True)
+
+
+def _add_firmware(parser: argparse.ArgumentParser, text: str) -> None:
+    parser.add_argument("--firmware", type=usable_path, metavar="FILE.elf", help=text)
 
 
 def _add_board(parser: argparse.ArgumentParser, text: str) -> None:

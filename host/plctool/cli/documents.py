@@ -86,6 +86,7 @@ def compiled(settings: Settings) -> BuildResult:
 def _compile(settings: Settings, target: str | None) -> BuildResult:
     from plctool.compiler import compile_sources
 
+    is_own = target == settings.target  # else it is for this machine, whatever board the program is for
     return compile_sources(
         settings.files,
         target=target,
@@ -93,7 +94,8 @@ def _compile(settings: Settings, target: str | None) -> BuildResult:
         checks=settings.checks,
         debug=settings.debug,
         warnings=settings.warnings,
-        board=settings.board,
+        board=settings.board if is_own else None,
+        firmware=settings.firmware if is_own else None,
         limits=settings.limits,
         dialect=settings.dialect,
     )

@@ -31,6 +31,7 @@ class Settings:
     checks: str = "all"
     debug: bool = False
     board: str | None = None
+    firmware: Path | None = None
     limits: bool = True
     dialect: str | None = None
 
@@ -46,7 +47,8 @@ def settings_of(args: argparse.Namespace) -> Settings:
         files,
         _warnings(args, project),
         own_folder=project is not None and getattr(args, "output", None) is None,
-        board=getattr(args, "board", None),
+        board=_board(args, project),
+        firmware=getattr(args, "firmware", None),
         limits=not getattr(args, "no_limits", False),
         **_of_build(args, project),
     )
@@ -84,12 +86,20 @@ def _warnings(args: argparse.Namespace, project: Project | None) -> WarningOptio
     return warning_options(names, as_errors=werror)
 
 
+def _board(args: argparse.Namespace, project: Project | None) -> str | None:
+    """The board that is named; that of the project unless another one, or a target, is asked for."""
+    board: str | None = getattr(args, "board", None)
+    asked = board or getattr(args, "firmware", None) or getattr(args, "target", None)
+    return board if asked or project is None else project.board
+
+
 def _of_build(args: argparse.Namespace, project: Project | None) -> dict[str, Any]:
     """Those that were chosen: by the arguments, else by the project. A board has its own target."""
     chosen = {}
+    has_board = getattr(args, "board", None) or getattr(args, "firmware", None)
     for name in ("output", "target", "level", "checks", "debug", "dialect"):
         value = getattr(args, name, None)
-        if value is None and project is not None and not (name == "target" and getattr(args, "board", None)):
+        if value is None and project is not None and not (name == "target" and has_board):
             value = getattr(project, name)
         if value is not None:
             chosen[name] = value

@@ -139,7 +139,8 @@ def _words(settings: Settings, root: Path) -> list[str]:
             words += ["--io", _below(root, files.io.description)]
         if files.io.device is not None:
             words += ["--device", _below(root, files.io.device)]
-    words += ["--target", settings.target, f"-O{settings.level}", "--checks", settings.checks]
+    words += ["--board", settings.board] if settings.board else ["--target", settings.target]
+    words += [f"-O{settings.level}", "--checks", settings.checks]
     words += [] if settings.dialect is None else ["--dialect", settings.dialect]
     return [*map(str, words), *(["--debug"] if settings.debug else [])]
 

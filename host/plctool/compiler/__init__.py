@@ -112,6 +112,7 @@ def compile_sources(
     io: IoFiles | None = None,
     libraries: Sequence[Path | str] = (),
     board: str | None = None,
+    firmware: Path | None = None,
     limits: bool = True,
     python: PythonFunctions | None = None,
     dialect: str | None = None,
@@ -120,7 +121,8 @@ def compile_sources(
     said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
     inputs and outputs; `libraries`: folders or .zips of those that it uses; both are in `ProgramFiles` already. Of a
     project its files are taken, its options are for the command line. `board`: one that plctool knows, such as
-    mps2-an385/standard, to whose target and limits the program is held, so that another `target` is refused; without
+    mps2-an385/standard, to whose target and limits the program is held, so that another `target` is refused;
+    `firmware`: the ELF file of any board's firmware, which says the same; without
     `limits` it may need more than any device has. `python`: functions that Python implements, in the simulator.
     `dialect`: iec, codesys or twincat, where systems disagree about what a program means.
 
@@ -135,14 +137,16 @@ def compile_sources(
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
     from plctool.iec.dialect import find_dialect
-    from plctool.image.board import find_board
+    from plctool.image.board import board_of, read_firmware
     from plctool.image.targets import find_target
 
     system = find_dialect(dialect)
     number, size = (2, True) if level == "s" else (level, False)
     files = program_files(paths, io, libraries)
     description = files.load_io()
-    known = None if board is None else find_board(board)
+    known = None
+    if board is not None or firmware is not None:
+        known = board_of(board, None if firmware is None else read_firmware(firmware))
     options = Options(find_target(_target(target, known, description)), number, parse_checks(checks), debug, size)
     if known is not None and known.target != options.target.name:
         raise UsageError(

@@ -21,6 +21,7 @@ from plctool.compiler.warnings import WARNINGS
 from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import read_utf8
 from plctool.iec.dialect import DIALECTS
+from plctool.image.board import find_board
 from plctool.image.file import ApplicationInfo
 from plctool.image.targets import TARGETS
 from plctool.io.tables import Entry, Table
@@ -42,6 +43,7 @@ class Project:
     libraries: list[Path]
     output: Path
     target: str | None = None
+    board: str | None = None
     device: Path | None = None
     io: Path | None = None
     level: Level | None = None
@@ -73,6 +75,7 @@ def _project(file: Path, table: Table) -> Project:
         _libraries(folder, table),
         _output(folder, table),
         table.choice("target", {name: name for name in TARGETS}),
+        _board(table),
         _file(folder, table, "device"),
         _file(folder, table, "io"),
         _level(options),
@@ -88,6 +91,17 @@ def _project(file: Path, table: Table) -> Project:
     options.close()
     information.close()
     return project
+
+
+def _board(table: Table) -> str | None:
+    """The board that plctool knows by this name."""
+    name = table.text("board")
+    try:
+        return None if name is None else find_board(name).slug
+    except UsageError as error:
+        message = str(error).rstrip(".")
+        table.error(f"{message[:1].lower()}{message[1:]}", "board")
+        return None
 
 
 def _path(folder: Path, entry: Entry, table: Table) -> Path | None:
