@@ -9,7 +9,8 @@ import pytest
 
 from plctool.compiler import load_sources
 from plctool.compiler.build import BuildResult, build_program
-from plctool.compiler.codegen.emit import optimised
+from plctool.compiler.codegen.elf_object import code_size
+from plctool.compiler.codegen.emit import emit_object, optimised
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.partition import Part
@@ -319,3 +320,22 @@ def test_small_code_is_smaller(timers: TypedProgram) -> None:
         code(build_program(timers, Options(find_target("x86_64-linux"), size=size))) for size in (False, True)
     )
     assert small < normal / 2
+
+
+def test_small_code_is_the_smaller_one_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = lowered("PROGRAM Main VAR s, t : STRING; END_VAR s := CONCAT(s, LEFT(t, 3)); END_PROGRAM", size=True)
+    options = Options(find_target("x86_64-linux"), size=True)
+    chosen = code_size(emit_object(Part(text), options))
+    sizes = []
+    for worth in (0.0, 1000.0):  # always one of the two
+        monkeypatch.setattr("plctool.compiler.codegen.emit._WORTH", worth)
+        sizes.append(code_size(emit_object(Part(text), options)))
+    lean, usual = sizes
+    assert lean < usual and chosen == lean
+
+
+def test_small_code_leaves_the_code_generator_as_it_was(timers: TypedProgram) -> None:
+    options = Options(find_target("cortex-m3"))
+    before = build_program(timers, options).image
+    build_program(timers, Options(find_target("cortex-m3"), size=True))
+    assert build_program(timers, options).image == before

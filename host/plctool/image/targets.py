@@ -30,6 +30,8 @@ class Target:
     size work at any address. `vectors`: 16-byte vector compares are cheap. `registers`: that carry arguments inside the
     image, for addresses and integers, and for reals (0: reals are like integers). `probes`: a function that is entered
     touches each page of its frame, so that a large one does not pass over the guard at the end of the stack.
+    `features_for_speed`: those of level 3 besides. A processor that executes one instruction after the other gains
+    nothing from their order, and the search for a good one costs registers.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Target:
     external_convention: str = (
         ""  # LLVM calling convention of C functions that take or return floats; "" is the default
     )
+    features_for_speed: str = ""
 
     @property
     def exchanges(self) -> bool:
@@ -63,6 +66,11 @@ class Target:
     def shortens(self) -> bool:
         """Whether instructions are of different length, and the short ones reach only some of the registers."""
         return self.small_flash and self.machine is not Machine.THUMB_V6M
+
+    @property
+    def divides_words(self) -> bool:
+        """Whether words are as easy to divide by constants as smaller numbers are, or easier."""
+        return self.machine in (Machine.THUMB, Machine.RISCV32)
 
     def saves_room(self, opt_level: int) -> bool:
         """Whether code for a small flash is to stay small, at that level of optimisation."""
@@ -86,12 +94,12 @@ TARGETS: dict[str, Target] = {
         ),
         Target(
             "cortex-m3", "thumbv7m-none-unknown", "cortex-m3", "+reserve-r9", Machine.THUMB, "TARGET_ID_CORTEX_M3",
-            pointer_size=4, registers=(4, 0), stubs=True, unaligned=True,
+            pointer_size=4, registers=(4, 0), stubs=True, unaligned=True, features_for_speed=",-use-misched",
         ),
         Target(
             "cortex-m4f", "thumbv7em-none-unknown", "cortex-m4", "+reserve-r9", Machine.THUMB, "TARGET_ID_CORTEX_M4F",
             pointer_size=4, registers=(4, 8), stubs=True, unaligned=True,
-            external_convention="arm_aapcs_vfpcc",
+            external_convention="arm_aapcs_vfpcc", features_for_speed=",-use-misched",
         ),
         Target(
             "cortex-m7", "thumbv7em-none-unknown", "cortex-m7", "+reserve-r9,-fp64", Machine.THUMB,

@@ -6,11 +6,11 @@ applied, everything else (writable data, absolute addresses, undefined symbols) 
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
+from plctool.compiler.codegen.elf_object import ElfSymbol, Section, read_object
 from plctool.compiler.codegen.line_table import Line, in_order, read_line_table
 from plctool.compiler.codegen.lower_unit import import_symbol
 from plctool.compiler.codegen.memory_functions import MEMORY_FUNCTIONS, memory_object
@@ -24,7 +24,6 @@ from plctool.compiler.codegen.relocations import (
     Relocation,
     RiscV,
     stub,
-    thumb_addend,
 )
 from plctool.compiler.codegen.stack import Frames, read_frames
 from plctool.compiler.typed import External
@@ -32,10 +31,6 @@ from plctool.errors import UsageError
 from plctool.iec.types import align_up
 from plctool.image.targets import Machine, Target
 
-_WRITABLE, _ALLOCATED, _EXECUTABLE = 1, 2, 4
-_DROPPED = (".ARM.exidx", ".ARM.extab", ".eh_frame")
-_FUNCTION = 2  # STT_FUNC
-_SYMBOL_TABLE, _RELOCATIONS_WITH_ADDENDS, _NO_BITS, _RELOCATIONS = 2, 4, 8, 9  # SHT_SYMTAB, RELA, NOBITS, REL
 _THUMBS = (Machine.THUMB, Machine.THUMB_V6M)
 
 
@@ -63,31 +58,6 @@ class Linked:
     frames: Frames
 
 
-@dataclass(frozen=True)
-class _ElfSymbol:
-    name: str
-    section: int  # index in `_Linker`; 0 when undefined
-    value: int
-    size: int
-    kind: int
-    is_global: bool
-
-
-@dataclass
-class _Section:
-    name: str
-    data: bytes
-    flags: int
-    align: int
-    relocations: list[tuple[int, int, _ElfSymbol, int]]  # offset, kind, symbol, addend
-    place: int  # in its object
-    offset: int = -1  # in the block; -1 when it is not part of it
-
-    @property
-    def is_debug(self) -> bool:
-        return self.name.startswith(".debug_")
-
-
 def link(objects: Sequence[bytes], target: Target, roots: Sequence[str], imports: Sequence[External]) -> Linked:
     """Links the objects of one program. `roots`: symbols that have to be in the block. `imports`: C functions that the
     program names, in the order of their slots.
@@ -101,9 +71,9 @@ class _Linker:
     def __init__(self, objects: Sequence[bytes], target: Target, imports: Sequence[External]) -> None:
         self._target = target
         self._imports = {import_symbol(external.name): external for external in imports}
-        self._sections: list[_Section] = []
-        self._symbols: list[_ElfSymbol] = []
-        self._objects: list[tuple[list[_Section], bytes]] = []
+        self._sections: list[Section] = []
+        self._symbols: list[ElfSymbol] = []
+        self._objects: list[tuple[list[Section], bytes]] = []
         for data in objects:
             self._read(data)
         if any(not s.section and s.name in MEMORY_FUNCTIONS for s in self._symbols):
@@ -112,7 +82,7 @@ class _Linker:
         self._stubs: dict[str, int] = {}  # offset in the block, by symbol
 
     def _read(self, data: bytes) -> None:
-        sections, symbols = _read_elf(data, self._target, len(self._sections))
+        sections, symbols = read_object(data, self._target, len(self._sections))
         self._objects.append((sections, data))
         self._sections += sections
         self._symbols += symbols
@@ -145,13 +115,13 @@ class _Linker:
                     todo.append(index)
         for index in found:
             section = self._sections[index]
-            if section.flags & _WRITABLE or not section.flags & _ALLOCATED:
+            if section.is_writable or not section.is_allocated:
                 raise UsageError(
                     f"The program needs the writable section {section.name}, which the image has no room for; "
                     "please report this as a bug of plctool.",
                     "link",
                 )
-        return sorted(found, key=lambda i: (not self._sections[i].flags & _EXECUTABLE, i))
+        return sorted(found, key=lambda i: (not self._sections[i].is_executable, i))
 
     def _lay_out(self, used: list[int]) -> bytearray:
         code = bytearray()
@@ -189,18 +159,18 @@ class _Linker:
     def _too_large(self, why: str) -> UsageError:
         return UsageError(f"The program is too large for {self._target.name}: {why}.", "too-large")
 
-    def _resolved(self, symbol: _ElfSymbol) -> _ElfSymbol:
+    def _resolved(self, symbol: ElfSymbol) -> ElfSymbol:
         """The definition, which may be in another object, or the symbol itself when there is none."""
         return symbol if symbol.section else self._defined.get(symbol.name, symbol)
 
-    def _address(self, symbol: _ElfSymbol) -> int:
+    def _address(self, symbol: ElfSymbol) -> int:
         symbol = self._resolved(symbol)
         if not symbol.section:
             return self._stubs[symbol.name]
-        value = symbol.value & ~1 if symbol.kind == _FUNCTION and self._target.machine in _THUMBS else symbol.value
+        value = symbol.value & ~1 if symbol.is_function and self._target.machine in _THUMBS else symbol.value
         return self._sections[symbol.section].offset + value
 
-    def _apply(self, code: bytearray, section: _Section) -> None:
+    def _apply(self, code: bytearray, section: Section) -> None:
         table = APPLY[self._target.machine]
         high = {
             section.offset + offset: self._address(symbol) + addend
@@ -214,7 +184,7 @@ class _Linker:
             symbol = self._resolved(symbol)
             target = self._address(symbol)
             paired = high[target] if self._target.machine is Machine.RISCV32 and kind in RISCV_LOW else 0
-            function = symbol.kind == _FUNCTION or not symbol.section
+            function = symbol.is_function or not symbol.section
             apply = table.get(kind)
             if apply is None:
                 raise UsageError(
@@ -227,7 +197,7 @@ class _Linker:
             except OutOfReach:
                 raise self._too_large(f"'{symbol.name}' is out of reach of its caller") from None
 
-    def _check_pages(self, section: _Section) -> None:
+    def _check_pages(self, section: Section) -> None:
         """AArch64: every low part must have the ADRP of exactly its target, which becomes an ADR."""
         if self._target.machine is not Machine.AARCH64:
             return
@@ -253,7 +223,7 @@ class _Linker:
                 data[offset : offset + width] = value.to_bytes(width, "little")
             section.data = bytes(data)
 
-    def _debug_address(self, symbol: _ElfSymbol, addend: int) -> int:
+    def _debug_address(self, symbol: ElfSymbol, addend: int) -> int:
         target = self._sections[symbol.section]
         if target.is_debug:
             return symbol.value + addend
@@ -272,83 +242,13 @@ class _Linker:
         return in_order([line for table in tables for line in read_line_table(table) if line.address < 1 << 31])
 
 
-def _only_debug(sections: list[_Section], data: bytes) -> bytes:
+def _only_debug(sections: list[Section], data: bytes) -> bytes:
     """An object with its debugging information as it is now, without code and relocations; all keeps its place."""
     kept = bytearray(data)
     for section in sections:
         size = len(section.data)
         if section.is_debug:
             kept[section.place : section.place + size] = section.data
-        elif section.flags & _ALLOCATED or section.name.startswith(".rel"):
+        elif section.is_allocated or section.name.startswith(".rel"):
             kept[section.place : section.place + size] = bytes(size)
     return bytes(kept)
-
-
-def _read_elf(data: bytes, target: Target, base: int) -> tuple[list[_Section], list[_ElfSymbol]]:
-    """`base`: index of the first section; symbols refer to sections by index."""
-    wide = target.pointer_size == 8
-    headers = _read_section_headers(data, wide)
-    bodies = [b"" if h.type == _NO_BITS else data[h.offset : h.offset + h.size] for h in headers]
-    sections: list[_Section] = []
-    symbols: list[_ElfSymbol] = []
-    for h, body in zip(headers, bodies, strict=True):
-        kept = b"" if h.name.startswith(_DROPPED) else body
-        sections.append(_Section(h.name, kept, h.flags, max(h.alignment, 1), [], h.offset))
-    for h, body in zip(headers, bodies, strict=True):
-        if h.type == _SYMBOL_TABLE:
-            symbols = _read_symbols(body, bodies[h.link], len(sections), base, wide)
-    for h, body in zip(headers, bodies, strict=True):
-        owner = sections[h.info] if h.type in (_RELOCATIONS, _RELOCATIONS_WITH_ADDENDS) else None
-        if owner is not None and owner.data and (owner.flags & _ALLOCATED or owner.is_debug):
-            entries = _read_relocations(body, h.type == _RELOCATIONS_WITH_ADDENDS, wide, owner.data)
-            owner.relocations = [(offset, kind, symbols[number], addend) for offset, kind, number, addend in entries]
-    return sections, symbols
-
-
-@dataclass(frozen=True)
-class _Header:
-    """What the section header table says of a section. `offset`, `size` [bytes]: its place in the file; `link`, `info`:
-    sections that belong to it, depending on its type."""
-
-    name: str
-    type: int
-    flags: int
-    offset: int
-    size: int
-    link: int
-    info: int
-    alignment: int
-
-
-def _read_section_headers(data: bytes, wide: bool) -> list[_Header]:
-    """The section header table of an ELF file, whose place and size are in the file's header."""
-    table, entry, count, of_names = struct.unpack_from("<Q10x3H" if wide else "<I10x3H", data, 40 if wide else 32)
-    layout = "<IIQ8xQQIIQ" if wide else "<III4xIIIII"
-    rows = [struct.unpack_from(layout, data, table + entry * number) for number in range(count)]
-    names = rows[of_names][3]
-    return [_Header(_name_at(data, names + row[0]), *row[1:]) for row in rows]
-
-
-def _name_at(data: bytes, place: int) -> str:
-    return data[place : data.index(0, place)].decode()
-
-
-def _read_symbols(data: bytes, names: bytes, section_count: int, base: int, wide: bool) -> list[_ElfSymbol]:
-    symbols = []
-    for fields in struct.iter_unpack("<IBBHQQ" if wide else "<IIIBBH", data):
-        if wide:
-            name, info, _, section, value, size = fields
-        else:
-            name, value, size, info, _, section = fields
-        index = base + section if 0 < section < section_count else 0
-        symbols.append(_ElfSymbol(_name_at(names, name), index, value, size, info & 15, info >> 4 == 1))
-    return symbols
-
-
-def _read_relocations(data: bytes, explicit: bool, wide: bool, body: bytes) -> list[tuple[int, int, int, int]]:
-    """(offset, kind, symbol, addend) of each entry."""
-    if wide:
-        return [(o, i & 0xFFFFFFFF, i >> 32, a) for o, i, a in struct.iter_unpack("<QQq", data)]
-    if explicit:
-        return [(o, i & 0xFF, i >> 8, a) for o, i, a in struct.iter_unpack("<IIi", data)]
-    return [(o, i & 0xFF, i >> 8, thumb_addend(body, o, i & 0xFF)) for o, i in struct.iter_unpack("<II", data)]
