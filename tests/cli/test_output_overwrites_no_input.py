@@ -148,3 +148,10 @@ def test_c_header_of_a_board_does_not_replace_its_device_file(tool: Any, scratch
     (scratch / header).write_text(BOARD)
     assert refused(tool("export-itf", "--device", header), header)
     assert (scratch / header).read_text() == BOARD
+
+
+def test_program_replaces_no_firmware(tool: Any, scratch: Path) -> None:
+    (scratch / "main.st").write_text("PROGRAM Main END_PROGRAM")
+    (scratch / "firmware").write_bytes(bytes(8))
+    assert refused(tool("build", "main.st", "--firmware", "firmware", "-o", "firmware"), "firmware")
+    assert (scratch / "firmware").read_bytes() == bytes(8)

@@ -11,7 +11,7 @@ from plctool.compiler.codegen.calls import branches
 from plctool.compiler.codegen.stack import deepest_calls
 from plctool.errors import UsageError
 from plctool.image.c_functions import C_FUNCTIONS
-from plctool.image.targets import TARGETS, Machine
+from plctool.image.targets import TARGETS, Machine, find_target
 
 LEVELS = (0, 2, "s")
 # Arrays that stay, in functions that are called from two places each, so that they are not inlined at -O0 and -Os.
@@ -175,7 +175,7 @@ def test_a_c_function_counts_with_what_it_takes(tmp_path: Path, target: str, sta
     text = "PROGRAM Main VAR r : REAL; l : LREAL; n : LINT; END_VAR {} END_PROGRAM"
     (tmp_path / "a.st").write_text(text.format(statement))
     need = compile_sources([tmp_path / "a.st"], target=target, limits=False).needs["stack"]
-    taken = C_FUNCTIONS[function].stack
+    taken = C_FUNCTIONS[function].stack(find_target(target).machine)
     assert (function, taken) in need.parts and not need.at_least
     assert taken <= need.amount < taken + 64
 
@@ -189,7 +189,7 @@ def test_a_c_function_counts_where_it_is_called(chain: Path) -> None:
     shallow = compile_sources([chain], **options).needs["stack"]
     chain.write_text(text.replace("Leaf := t[n];", "Leaf := t[n] + REAL_TO_DINT(SIN(DINT_TO_REAL(n)));"))
     deep = compile_sources([chain], **options).needs["stack"]
-    sine, arc = C_FUNCTIONS["sinf"].stack, C_FUNCTIONS["atanf"].stack
+    sine, arc = C_FUNCTIONS["sinf"].cortex_m, C_FUNCTIONS["atanf"].cortex_m
     assert without + sine <= deep.amount < without + sine + 64
     assert shallow.amount < without + arc
 

@@ -6,10 +6,12 @@ from functools import cache
 
 import pytest
 from c_stack import Stacks, c_functions
-from environment import IS_RISCV, firmware
+from environment import IS_RISCV, TARGET, firmware
 
 from plctool.image.c_functions import C_FUNCTIONS
+from plctool.image.targets import find_target
 
+MACHINE = find_target(TARGET).machine
 CONFIGS = [config for config in ("minimal", "standard", "full", "modbus") if firmware(config).exists()]
 
 
@@ -32,9 +34,11 @@ def test_the_functions_of_all_components_are_found() -> None:
 @pytest.mark.parametrize("name", C_FUNCTIONS)
 def test_a_function_takes_no_more_than_plctool_counts(name: str) -> None:
     if name in measured():
-        assert measured()[name] <= C_FUNCTIONS[name].stack
+        assert measured()[name] <= C_FUNCTIONS[name].stack(MACHINE)
 
 
 def test_what_takes_much_is_not_counted_much_higher() -> None:
+    """On RISC-V compilers differ: one has all of the arithmetic of LREAL in each function."""
+    allowed = 3 if IS_RISCV else 1.5
     large = {name: size for name, size in measured().items() if size >= 256}
-    assert {name for name, size in large.items() if C_FUNCTIONS[name].stack > 2 * size} == set()
+    assert large and {n for n, size in large.items() if C_FUNCTIONS[n].stack(MACHINE) > allowed * size} == set()

@@ -56,7 +56,7 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
     from plctool.files import make_folder
 
     output = settings.output
-    inputs = settings.files.every_file
+    inputs = settings.every_file
     check_output(output, inputs(), f"-o {output.stem}.cdl")
     check_not_read(symbol_path(output), inputs(), f"-o {output.stem}-image.cdl")
     result = _compile(settings, settings.target)

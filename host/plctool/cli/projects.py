@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,12 @@ class Settings:
     firmware: Path | None = None
     limits: bool = True
     dialect: str | None = None
+
+    def every_file(self) -> Iterator[Path]:
+        """All that is read."""
+        yield from self.files.every_file()
+        if self.firmware is not None:
+            yield self.firmware
 
 
 def settings_of(args: argparse.Namespace) -> Settings:

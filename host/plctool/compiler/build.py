@@ -120,7 +120,7 @@ def _needs(
     for name in ("code", "image"):
         needs[name] = replace(needs[name], parts=tuple(sizes.items()))
     roots = [linked.symbols[name].offset for name in (*lowered.tasks, *lowered.functions.values())]
-    chain = deepest_calls(linked.code, target.machine, linked.frames | _frames_of_stubs(linked), roots)
+    chain = deepest_calls(linked.code, target.machine, linked.frames | _frames_of_stubs(linked, target), roots)
     names = {symbol.offset: name for name, symbol in linked.symbols.items()}
     names |= {offset: external.name for offset, external in linked.stubs.items()}
     names |= {linked.symbols[name].offset: pou.name for name, pou in lowered.pous.items() if name in linked.symbols}
@@ -133,10 +133,12 @@ def _needs(
     return needs
 
 
-def _frames_of_stubs(linked: Linked) -> Frames:
+def _frames_of_stubs(linked: Linked, target: Target) -> Frames:
     """A stub takes what its C function takes."""
     functions = {offset: C_FUNCTIONS.get(external.name) for offset, external in linked.stubs.items()}
-    return {offset: (0, function.stack) for offset, function in functions.items() if function is not None}
+    return {
+        offset: (0, function.stack(target.machine)) for offset, function in functions.items() if function is not None
+    }
 
 
 def _entry(linked: Linked, name: str, target: Target) -> int:
