@@ -125,12 +125,12 @@ def profile(path: Path) -> Stages:
         with stages.stage("LLVM: reading"):
             llvm.parse_assembly(part.text, llvm.create_context())
         with stages.stage("LLVM: optimising"):
-            module, machine = optimised(part, target, options.opt_level)
+            module, machine = optimised(part, options)
         with stages.stage("LLVM: code"):
             objects.append(machine.emit_object(module))
     stages.seconds["LLVM: optimising"] -= stages.seconds["LLVM: reading"]
     with stages.stage("linking"):
-        link(objects, target, [*lowered.tasks, *lowered.functions.values()], len(lowered.imports))
+        link(objects, target, [*lowered.tasks, *lowered.functions.values()], lowered.imports)
     return stages
 
 
