@@ -5,9 +5,8 @@
  *
  * Made of what the firmware itself is compiled with, by CmpList.h. In the ELF file of a firmware it is the section
  * `board_facts`, which takes no flash (sections.ld); plctool has those of the boards here. A port has one whose
- * rts_config_port.h gives
- * BOARD_TARGET_ID, BOARD_DEVICE_NAME, BOARD_FLASH_SIZE, BOARD_FLASH_SECTOR_SIZE and, if it is memory of the processor,
- * BOARD_FLASH_ADDRESS.
+ * rts_config_port.h gives BOARD_TARGET_ID, BOARD_DEVICE_NAME, BOARD_FLASH_SIZE, BOARD_FLASH_SECTOR_SIZE and, if it is
+ * memory of the processor, BOARD_FLASH_ADDRESS.
  */
 #ifndef BOARDFACTS_H
 #define BOARDFACTS_H
@@ -41,6 +40,7 @@ typedef struct {
     RTS_UI32 modbus_lines;        /* with devices; all of Modbus as in rts_config.h */
     RTS_UI32 modbus_devices;
     RTS_UI32 modbus_jobs;
+    RTS_UI32 modbus_calls;
     RTS_UI32 modbus_servers;
     RTS_UI32 modbus_ranges;
     RTS_UI32 modbus_data;

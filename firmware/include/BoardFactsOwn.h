@@ -45,6 +45,7 @@ __attribute__((used, section("board_facts"), aligned(4))) static const BOARD_FAC
     .modbus_lines = MODBUS_MAX_CLIENTS,
     .modbus_devices = MODBUS_MAX_DEVICES,
     .modbus_jobs = MODBUS_MAX_JOBS,
+    .modbus_calls = MODBUS_MAX_CALLS,
     .modbus_servers = MODBUS_MAX_SERVERS,
     .modbus_ranges = MODBUS_MAX_RANGES,
     .modbus_data = MODBUS_DATA_SIZE,

@@ -13,6 +13,7 @@ from intelhex import IntelHex
 
 from plctool.core import ffi, lib
 from plctool.image.board import Board, board_of, known_boards, read_firmware
+from plctool.image.c_functions import C_FUNCTIONS
 from plctool.image.production import production_pieces, write_production
 
 PROGRAM = "PROGRAM Main VAR n : DINT; END_VAR n := n + 1; END_PROGRAM"
@@ -395,3 +396,14 @@ def test_a_program_is_built_for_a_firmware(tool: Any, scratch: Path) -> None:
     )
     assert not (scratch / "app.cdl").exists()
     refused(tool(*words[:-1], "app.st"), "app.st is not an ELF file")
+
+
+def test_a_firmware_may_have_a_function_in_a_component_of_its_own(tool: Any, scratch: Path) -> None:
+    """It is found by its signature in what is loaded."""
+    (scratch / "app.st").write_text("PROGRAM Main VAR r : REAL; END_VAR r := r * 1.5; END_PROGRAM")
+    words = ("build", "app.st", "-o", "app.cdl", "--firmware", "fw.elf")
+    less = facts("mps2-an385/standard", components=b"CmpIecTask AcmeReal ")
+    signature = C_FUNCTIONS["__mulsf3"].signature.to_bytes(4, "little")
+    for code, status in ((bytes(64), 2), (bytes(30) + signature + bytes(30), 0)):
+        (scratch / "fw.elf").write_bytes(elf(less).replace(bytes(range(64)), code))
+        assert tool(*words).status == status

@@ -134,7 +134,7 @@ def test_a_board_and_a_target_that_it_does_not_have_are_refused(tool: Any, scrat
     done = tool(*words, "cortex-m4f")
     assert done.status == 2
     assert done.err == (
-        "plctool: MPS2 AN385 (standard) has a cortex-m3, not a cortex-m4f; leave out --target, or name a board "
+        "plctool: MPS2 AN385 (standard) has a cortex-m3, not a cortex-m4f; leave the target out, or name a board "
         "that has it.\n"
     )
     assert not (scratch / "app.cdl").exists()

@@ -7,7 +7,6 @@ from back_support import POS, ProgramBuilder, binary, build, const, load, place
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool.compiler.codegen.lower_unit import interface_signature
 from plctool.compiler.typed import (
     ArrayInit,
     Assign,
@@ -51,6 +50,7 @@ from plctool.iec.types import (
     StructType,
     Type,
 )
+from plctool.image.c_functions import interface_signature
 
 STRING = StringType(80)
 

@@ -198,3 +198,26 @@ def test_what_an_unknown_c_function_takes_is_not_known(tmp_path: Path) -> None:
     text = "{attribute 'external' := 'acme'}\nFUNCTION Acme : DINT VAR_INPUT n : DINT; END_VAR END_FUNCTION\n"
     (tmp_path / "a.st").write_text(text + "PROGRAM Main VAR n : DINT; END_VAR n := Acme(n); END_PROGRAM")
     assert compile_sources([tmp_path / "a.st"], target="cortex-m3").needs["stack"].at_least
+
+
+def test_a_c_function_is_declared_once(tmp_path: Path) -> None:
+    one, other = (
+        f"{{attribute 'external' := 'adc'}}\nFUNCTION {name} : DINT VAR_INPUT {given} END_VAR END_FUNCTION\n"
+        for name, given in (("One", "a : DINT;"), ("Other", "a : REAL; b : DINT;"))
+    )
+    text = f"{one}{other}PROGRAM Main VAR n : DINT; END_VAR n := One(n) + Other(1.0, n); END_PROGRAM"
+    (tmp_path / "a.st").write_text(text)
+    with pytest.raises(UsageError, match="The C function adc is declared twice, with other parameters"):
+        compile_sources([tmp_path / "a.st"], target="cortex-m3")
+
+
+@pytest.mark.parametrize("target", ["cortex-m0", "cortex-m3"])
+def test_a_program_may_call_more_c_functions_than_stubs_reach(tmp_path: Path, target: str) -> None:
+    functions = "".join(
+        f"{{attribute 'external' := 'f{i}'}}\nFUNCTION F{i} : DINT VAR_INPUT a : DINT; END_VAR END_FUNCTION\n"
+        for i in range(90)
+    )
+    calls = "".join(f"n := F{i}(n);" for i in range(90))
+    (tmp_path / "a.st").write_text(f"{functions}PROGRAM Main VAR n : DINT; END_VAR {calls} END_PROGRAM")
+    built = compile_sources([tmp_path / "a.st"], target=target, limits=False)
+    assert built.needs["functions"].amount == 90 and built.needs["stack"].at_least

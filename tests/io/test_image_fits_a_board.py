@@ -126,6 +126,21 @@ def test_room_that_the_driver_does_not_have(refused: Any, description: str, said
     assert said in message and bool(said) == bool(message)
 
 
+def test_function_of_the_same_name_is_another_one(refused: Any) -> None:
+    """A vendor's own `log` needs no CmpMath, and what it takes of the stack is not known."""
+    text = (
+        "{attribute 'external' := 'log'}\nFUNCTION WriteLog : DINT VAR_INPUT a, b : DINT; END_VAR END_FUNCTION\n"
+        "PROGRAM Main VAR n : DINT; END_VAR n := WriteLog(n, 1); END_PROGRAM\n"
+    )
+    assert refused("mps2-an385/standard", text) == ""
+
+
+def test_what_a_driver_has_no_room_for_is_not_said_where_it_is_missing(refused: Any) -> None:
+    message = refused("mps2-an385/standard", BITS, line(*map(device, range(1, 12))))
+    assert "It needs IoDrvModbus for " in message and "Modbus devices, the device has" not in message
+    assert "devices and buses" not in message and "smaller" not in message
+
+
 def test_data_of_modbus_is_what_is_read_and_twice_what_is_written() -> None:
     jobs = [
         {"function": lib.MODBUS_READ_INPUT_REGISTERS, "read_count": 100},

@@ -150,7 +150,7 @@ def compile_sources(
     options = Options(find_target(_target(target, known, description)), number, parse_checks(checks), debug, size)
     if known is not None and known.target != options.target.name:
         raise UsageError(
-            f"{known.title} has a {known.target}, not a {options.target.name}; leave out --target, or name a board "
+            f"{known.title} has a {known.target}, not a {options.target.name}; leave the target out, or name a board "
             "that has it.",
             "bad-target",
         )

@@ -25,7 +25,7 @@ from plctool.files import write_atomically
 from plctool.iec.areas import Area
 from plctool.iec.types import CLASS_NUMBER, base_of
 from plctool.iec.values import encode
-from plctool.image.c_functions import C_FUNCTIONS
+from plctool.image.c_functions import find_c_function
 from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image, image_crc
 from plctool.image.limits import Need, largest, needs_of_image, of_area
 from plctool.image.targets import Machine, Target
@@ -38,7 +38,7 @@ _CODE_ALIGN = int(lib.APP_CODE_ALIGN)
 @dataclass(frozen=True)
 class BuildResult:
     """An image and its symbols. `sizes`: bytes of code made from each POU's source, inlined copies included; `needs`:
-    what a device must have room for, by the names of `LIMITS`."""
+    what a device must have room for, by the names of `limits.py`."""
 
     image: bytes
     symbols: SymbolTable
@@ -128,14 +128,21 @@ def _needs(
     frames: Counter[str] = Counter()
     for offset, frame in chain:
         frames[names[offset]] += frame
-    at_least = program.may_recurse or any(external.name not in C_FUNCTIONS for external in linked.stubs.values())
+    at_least = program.may_recurse or _has_unknown(linked, target)
     needs["stack"] = Need(frames.total(), largest((+frames).items()), deepest=True, at_least=at_least)
     return needs
 
 
+def _has_unknown(linked: Linked, target: Target) -> bool:
+    """Whether it calls C functions of which it is not known how much stack they take. Where there are no stubs, stacks
+    are large."""
+    known = all(find_c_function(e.name, e.signature) for e in linked.stubs.values())
+    return target.stubs and not (known and len(linked.imports) == len(linked.stubs))
+
+
 def _frames_of_stubs(linked: Linked, target: Target) -> Frames:
     """A stub takes what its C function takes."""
-    functions = {offset: C_FUNCTIONS.get(external.name) for offset, external in linked.stubs.items()}
+    functions = {offset: find_c_function(e.name, e.signature) for offset, e in linked.stubs.items()}
     return {
         offset: (0, function.stack(target.machine)) for offset, function in functions.items() if function is not None
     }

@@ -15,20 +15,21 @@ _OTHERWISE = "say so in a device file (docs/io.md) or build with --no-limits"
 
 
 def check_program_fits(built: BuildResult, target: Target, board: Board | None, device: DeviceFile | None) -> None:
-    """Compares with what `board` has, else with the limits of the device file, else with the most that any firmware of
-    this repository has on this processor, or on its like. Raises UsageError saying what does not fit, and what needs
-    most of it."""
-    needs, own = built.needs, {}
+    """Compares with what `board` has and with the limits of the device file, without both with the most that any
+    firmware of this repository has on this processor, or on its like. Raises UsageError saying what does not fit, and
+    what needs most of it."""
+    needs = built.needs
+    own: dict[str, int] = {}
     if device is not None and device.target in ("", target.name):  # not when it is built for a simulator
         own = {name: n for name, n in device.limits.items() if name in PROGRAM_LIMITS}
     if board is not None:
         check_board(parse_image(built.image), needs, board, "Make the program smaller.")
-    elif own and device is not None:
+    if own and device is not None:
         check_fit(
             needs, own, device.title,
             f"Make the program smaller; if the firmware has more room, correct {device.path}.",
         )  # fmt: skip
-    else:
+    elif board is None:
         same = _boards_like(target)
         limits = {name: max(b.limits.get(name, 0) for b in same) for name in LIMITS}
         names = " or ".join(dict.fromkeys(b.name for b in same))

@@ -21,7 +21,6 @@ from plctool.compiler.warnings import WARNINGS
 from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import read_utf8
 from plctool.iec.dialect import DIALECTS
-from plctool.image.board import find_board
 from plctool.image.file import ApplicationInfo
 from plctool.image.targets import TARGETS
 from plctool.io.tables import Entry, Table
@@ -94,14 +93,13 @@ def _project(file: Path, table: Table) -> Project:
 
 
 def _board(table: Table) -> str | None:
-    """The board that plctool knows by this name."""
-    name = table.text("board")
-    try:
-        return None if name is None else find_board(name).slug
-    except UsageError as error:
-        message = str(error).rstrip(".")
-        table.error(f"{message[:1].lower()}{message[1:]}", "board")
+    """A board that plctool knows, with its configuration."""
+    if "board" not in table:
+        table.text("board")
         return None
+    from plctool.image.board import known_boards
+
+    return table.choice("board", {board.slug: board.slug for board in known_boards()})
 
 
 def _path(folder: Path, entry: Entry, table: Table) -> Path | None:

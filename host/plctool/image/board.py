@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError, did_you_mean
 from plctool.iec.areas import Area
 from plctool.image.file import ELF_TAG, target_name
-from plctool.image.limits import BOARD_LIMITS, of_area
+from plctool.image.limits import ROOM, of_area
 from plctool.image.targets import TARGETS
 
 SLOT_A, SLOT_B, COMMIT, RETAIN = (int(n) for n in (lib.FILE_SLOT_A, lib.FILE_SLOT_B, lib.FILE_COMMIT, lib.FILE_RETAIN))
@@ -50,7 +50,7 @@ class Flash:
 @dataclass(frozen=True)
 class Board:
     """`limits`: what a program may need at most, by the names of `limits.py`. `record`: bytes of a commit record.
-    `components`: of the runtime that its firmware has."""
+    `components`: of the runtime that its firmware has. `content`: the firmware, if its file was read."""
 
     name: str
     config: str
@@ -59,6 +59,11 @@ class Board:
     record: int
     limits: dict[str, int] = field(hash=False)
     components: frozenset[str]
+    content: bytes = field(default=b"", repr=False, compare=False)
+
+    def offers(self, signature: int) -> bool:
+        """Whether its firmware may have a C function with this signature in a component of another name."""
+        return signature.to_bytes(4, "little") in self.content
 
     @property
     def target(self) -> str:
@@ -130,10 +135,9 @@ def _board(facts: Any) -> Board:
         "code": int(facts.code) or slot,
         "image": slot,
     }
-    limits |= {name: int(getattr(facts, name)) for name in BOARD_LIMITS if hasattr(facts, name)}
-    copies = limits.pop("copies")
-    if copies:
-        limits["all_copies" if facts.copies_always else "copies"] = copies
+    limits |= {name: int(getattr(facts, name)) for name in ROOM}
+    if facts.copies:
+        limits["all_copies" if facts.copies_always else "copies"] = int(facts.copies)
     if facts.stack:
         limits["stack"] = int(facts.stack)
     name, config, components = (
@@ -193,7 +197,7 @@ def read_firmware(path: Path) -> Firmware:
         raise UsageError(
             f"{path} is a firmware of another version of plctool; build it again with this one.", "bad-firmware"
         )
-    return Firmware(path, _board(facts), segments)
+    return Firmware(path, replace(_board(facts), content=b"".join(s.data for s in segments)), segments)
 
 
 def _not_elf(head: bytes) -> str:

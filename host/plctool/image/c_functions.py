@@ -5,60 +5,163 @@ Those that a vendor adds are not known here.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from plctool.image.targets import Machine
 
 _FUNCTIONS = {
-    "CmpIecTask": "iecraise 48 80",
-    "CmpRetain": "ieckept 304 288",
+    "CmpIecTask": """
+        iecraise(UDINT)                                     48    80""",
+    "CmpRetain": """
+        ieckept(POINTER TO BYTE,UDINT):BOOL                304   288""",
     "CmpMath": """
-        sin 1008 1856  cos 1008 1856  tan 1008 1856  asin 128 672  acos 112 688  atan 80 384  exp 112 384
-        log 112 672  log10 160 784  atan2 128 480  pow 208 1424  sinf 640 768  cosf 640 768  tanf 640 768
-        asinf 96 208  acosf 80 224  atanf 80 128  expf 96 144  logf 96 176  log10f 128 192  atan2f 112 144
-        powf 224 1456""",
+        sin(LREAL):LREAL                                  1008  1856
+        cos(LREAL):LREAL                                  1008  1856
+        tan(LREAL):LREAL                                  1008  1856
+        asin(LREAL):LREAL                                  128   672
+        acos(LREAL):LREAL                                  112   688
+        atan(LREAL):LREAL                                   80   384
+        exp(LREAL):LREAL                                   112   384
+        log(LREAL):LREAL                                   112   672
+        log10(LREAL):LREAL                                 160   784
+        atan2(LREAL,LREAL):LREAL                           128   480
+        pow(LREAL,LREAL):LREAL                             208  1424
+        sinf(REAL):REAL                                    640   768
+        cosf(REAL):REAL                                    640   768
+        tanf(REAL):REAL                                    640   768
+        asinf(REAL):REAL                                    96   208
+        acosf(REAL):REAL                                    80   224
+        atanf(REAL):REAL                                    80   128
+        expf(REAL):REAL                                     96   144
+        logf(REAL):REAL                                     96   176
+        log10f(REAL):REAL                                  128   192
+        atan2f(REAL,REAL):REAL                             112   144
+        powf(REAL,REAL):REAL                               224  1456""",
     "IoDrvModbus": """
-        modbus_take 112 160  modbus_put 48 64  modbus_send 32 48  modbus_state 32 48  modbus_get 48 64
-        modbus_free 32 48""",
+        modbus_take(POINTER TO BYTE,USINT,UINT,UINT):DINT   112   160
+        modbus_put(DINT,UINT,WORD):BOOL                     48    64
+        modbus_send(DINT):BOOL                              32    48
+        modbus_state(DINT):DINT                             32    48
+        modbus_get(DINT,UINT):WORD                          48    64
+        modbus_free(DINT):BOOL                              32    48""",
     "CmpIntCalls": """
-        __divdi3 80 32  __udivdi3 80 32  __moddi3 80 32  __umoddi3 80 32  __muldi3 32 32  __ashldi3 32 32
-        __ashrdi3 32 32  __lshrdi3 32 32  __divsi3 32 32  __udivsi3 32 32  __modsi3 32 32  __umodsi3 32 32
-        __clzsi2 32 32  __clzdi2 32 32""",
+        __divdi3(LINT,LINT):LINT                            80    32
+        __udivdi3(ULINT,ULINT):ULINT                        80    32
+        __moddi3(LINT,LINT):LINT                            80    32
+        __umoddi3(ULINT,ULINT):ULINT                        80    32
+        __muldi3(LINT,LINT):LINT                            32    32
+        __ashldi3(LINT,DINT):LINT                           32    32
+        __ashrdi3(LINT,DINT):LINT                           32    32
+        __lshrdi3(LINT,DINT):LINT                           32    32
+        __divsi3(DINT,DINT):DINT                            32    32
+        __udivsi3(UDINT,UDINT):UDINT                        32    32
+        __modsi3(DINT,DINT):DINT                            32    32
+        __umodsi3(UDINT,UDINT):UDINT                        32    32
+        __clzsi2(UDINT):DINT                                32    32
+        __clzdi2(ULINT):DINT                                32    32""",
     "CmpRealCalls": """
-        __fixsfdi 32 48  __fixunssfdi 16 32  __floatdisf 32 80  __floatundisf 32 80  sqrtf 48 128
-        __addsf3 16 32  __subsf3 16 32  __mulsf3 16 48  __divsf3 16 48  __eqsf2 16 16  __nesf2 16 16
-        __ltsf2 16 16  __lesf2 16 16  __gtsf2 16 16  __gesf2 16 16  __unordsf2 16 16  __fixsfsi 16 16
-        __fixunssfsi 16 16  __floatsisf 16 32  __floatunsisf 16 32""",
+        __fixsfdi(REAL):LINT                                32    48
+        __fixunssfdi(REAL):ULINT                            16    32
+        __floatdisf(LINT):REAL                              32    80
+        __floatundisf(ULINT):REAL                           32    80
+        sqrtf(REAL):REAL                                    48   128
+        __addsf3(REAL,REAL):REAL                            16    32
+        __subsf3(REAL,REAL):REAL                            16    32
+        __mulsf3(REAL,REAL):REAL                            16    48
+        __divsf3(REAL,REAL):REAL                            16    48
+        __eqsf2(REAL,REAL):DINT                             16    16
+        __nesf2(REAL,REAL):DINT                             16    16
+        __ltsf2(REAL,REAL):DINT                             16    16
+        __lesf2(REAL,REAL):DINT                             16    16
+        __gtsf2(REAL,REAL):DINT                             16    16
+        __gesf2(REAL,REAL):DINT                             16    16
+        __unordsf2(REAL,REAL):DINT                          16    16
+        __fixsfsi(REAL):DINT                                16    16
+        __fixunssfsi(REAL):UDINT                            16    16
+        __floatsisf(DINT):REAL                              16    32
+        __floatunsisf(UDINT):REAL                           16    32""",
     "CmpLrealCalls": """
-        __fixdfdi 80 48  __fixunsdfdi 64 48  sqrt 64 224  __adddf3 80 48  __subdf3 80 48  __muldf3 32 80
-        __divdf3 32 80  __eqdf2 16 16  __nedf2 16 16  __ltdf2 16 16  __ledf2 16 16  __gtdf2 16 16
-        __gedf2 16 16  __unorddf2 16 16  __fixdfsi 16 16  __fixunsdfsi 16 16  __floatsidf 32 48
-        __floatunsidf 32 32  __floatdidf 32 80  __floatundidf 32 48  __extendsfdf2 32 48  __truncdfsf2 16 16""",
+        __fixdfdi(LREAL):LINT                               80    48
+        __fixunsdfdi(LREAL):ULINT                           64    48
+        sqrt(LREAL):LREAL                                   64   224
+        __adddf3(LREAL,LREAL):LREAL                         80    48
+        __subdf3(LREAL,LREAL):LREAL                         80    48
+        __muldf3(LREAL,LREAL):LREAL                         32    80
+        __divdf3(LREAL,LREAL):LREAL                         32    80
+        __eqdf2(LREAL,LREAL):DINT                           16    16
+        __nedf2(LREAL,LREAL):DINT                           16    16
+        __ltdf2(LREAL,LREAL):DINT                           16    16
+        __ledf2(LREAL,LREAL):DINT                           16    16
+        __gtdf2(LREAL,LREAL):DINT                           16    16
+        __gedf2(LREAL,LREAL):DINT                           16    16
+        __unorddf2(LREAL,LREAL):DINT                        16    16
+        __fixdfsi(LREAL):DINT                               16    16
+        __fixunsdfsi(LREAL):UDINT                           16    16
+        __floatsidf(DINT):LREAL                             32    48
+        __floatunsidf(UDINT):LREAL                          32    32
+        __floatdidf(LINT):LREAL                             32    80
+        __floatundidf(ULINT):LREAL                          32    48
+        __extendsfdf2(REAL):LREAL                           32    48
+        __truncdfsf2(LREAL):REAL                            16    16""",
 }
-"""By component: names, each with bytes of stack on Cortex-M and on RISC-V."""
+"""By component: the interface of each function, and the bytes of stack that a call takes on Cortex-M and on RISC-V.
+Those of the last three are for LLVM, and have the names of the GNU compiler runtime, which libgcc and compiler-rt
+share. Cortex-M0 is taken for one like the others: there is no firmware here to measure."""
+
+COMPILER_COMPONENTS = {
+    "CmpIntCalls": "LINT and division",
+    "CmpRealCalls": "REAL",
+    "CmpLrealCalls": "LREAL",
+}
+"""The last three, and what their functions are for."""
+
+VERSION = 0x00010000
+"""Of the library of all of them."""
 
 
 @dataclass(frozen=True)
 class CFunction:
-    """`cortex_m`, `riscv`: bytes of stack that a call takes at most, with all that it calls, in any firmware of this
-    repository by the compilers of Debian 12 and 13, and a fifth more."""
+    """`interface`: what the signature is made of, e.g. 'sin(LREAL):LREAL'. `cortex_m`, `riscv`: bytes of stack that a
+    call takes at most, with all that it calls, in any firmware of this repository by the compilers of Debian 12 and 13,
+    and a fifth more."""
 
     component: str
+    interface: str
     cortex_m: int
     riscv: int
+
+    @property
+    def name(self) -> str:
+        return self.interface.partition("(")[0]
+
+    @property
+    def signature(self) -> int:
+        return interface_signature(self.interface)
 
     def stack(self, machine: Machine) -> int:
         """Bytes on a processor."""
         return self.riscv if machine is Machine.RISCV32 else self.cortex_m
 
 
-def _functions() -> Iterator[tuple[str, CFunction]]:
+def interface_signature(text: str) -> int:
+    """The signature id of a C function: CRC-32 of its interface text."""
+    return zlib.crc32(text.encode("ascii"))
+
+
+def _functions() -> Iterator[CFunction]:
     for component, text in _FUNCTIONS.items():
-        words = iter(text.split())
-        for name, cortex_m, riscv in zip(words, words, words, strict=True):
-            yield name, CFunction(component, int(cortex_m), int(riscv))
+        for line in text.split("\n")[1:]:
+            interface, cortex_m, riscv = line.strip().rsplit(maxsplit=2)
+            yield CFunction(component, interface, int(cortex_m), int(riscv))
 
 
-C_FUNCTIONS = dict(_functions())
+C_FUNCTIONS = {function.name: function for function in _functions()}
 """By name."""
+
+
+def find_c_function(name: str, signature: int) -> CFunction | None:
+    """The function of the runtime that an image calls; None for another one, perhaps of the same name."""
+    function = C_FUNCTIONS.get(name)
+    return function if function is not None and function.signature == signature else None

@@ -24,21 +24,26 @@ LIMITS = {
 }
 """What a device may limit, and what messages call it."""
 
-BOARD_LIMITS = {
+COPIES = {
     "copies": "bytes of copies of the inputs and outputs that tasks share",
     "all_copies": "bytes of copies of inputs and outputs",
+}
+"""The same: a firmware limits one of them, the second one if its tasks have copies also of what they use alone."""
+
+ROOM = {
     "connectors": "devices and buses",
     "gpio_groups": "groups of lines",
     "events": "events of lines",
     "modbus_lines": "lines to Modbus devices",
     "modbus_devices": "Modbus devices",
     "modbus_jobs": "reads and writes of Modbus",
+    "modbus_calls": "request of a program to Modbus devices at a time",
     "modbus_servers": "Modbus servers",
     "modbus_ranges": "ranges of Modbus servers",
     "modbus_data": "bytes of Modbus data",
     "modbus_tcp": "lines and servers of Modbus TCP",
 }
-"""The same, of which only a board that is named says how much it has."""
+"""The same of the manager of inputs and outputs and its drivers: fields of BOARD_FACTS."""
 
 _OF_AREA = {Area.INPUT: "inputs", Area.OUTPUT: "outputs"}
 
@@ -96,7 +101,7 @@ def check_fit(
     sentence; `lacking`: sentences about what else does not fit."""
     passed = [
         _sentence(title, needs[name], limits[name])
-        for name, title in (LIMITS | BOARD_LIMITS).items()
+        for name, title in (LIMITS | COPIES | ROOM).items()
         if name in needs and name in limits and needs[name].amount > limits[name]
     ]
     sentences = [*passed, *([advice] if passed else []), *lacking]

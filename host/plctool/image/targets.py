@@ -94,12 +94,12 @@ TARGETS: dict[str, Target] = {
         ),
         Target(
             "cortex-m3", "thumbv7m-none-unknown", "cortex-m3", "+reserve-r9", Machine.THUMB, "TARGET_ID_CORTEX_M3",
-            pointer_size=4, registers=(4, 0), stubs=True, unaligned=True, features_for_speed=",-use-misched",
+            pointer_size=4, registers=(4, 0), stubs=True, unaligned=True, features_for_speed="-use-misched",
         ),
         Target(
             "cortex-m4f", "thumbv7em-none-unknown", "cortex-m4", "+reserve-r9", Machine.THUMB, "TARGET_ID_CORTEX_M4F",
             pointer_size=4, registers=(4, 8), stubs=True, unaligned=True,
-            external_convention="arm_aapcs_vfpcc", features_for_speed=",-use-misched",
+            external_convention="arm_aapcs_vfpcc", features_for_speed="-use-misched",
         ),
         Target(
             "cortex-m7", "thumbv7em-none-unknown", "cortex-m7", "+reserve-r9,-fp64", Machine.THUMB,

@@ -5,52 +5,52 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from plctool.image.board import Board, known_boards
-from plctool.image.c_functions import C_FUNCTIONS
+from plctool.image.c_functions import COMPILER_COMPONENTS, CFunction, find_c_function
 from plctool.image.file import Image
 from plctool.image.limits import Need, check_fit
-from plctool.io.room import DRIVERS, configuration_of_image, needs_of_io, required
-
-_IO_MANAGER = "CmpIoMgrEmbedded"
-_UNNAMED = {
-    "CmpIntCalls": "LINT and division",
-    "CmpRealCalls": "REAL",
-    "CmpLrealCalls": "LREAL",
-}
-"""What the functions are for that no program names."""
+from plctool.io.room import DRIVER_OF, DRIVERS, IO_MANAGER, configuration_of_image, needs_of_io, required
 
 
 def check_board(image: Image, needs: Mapping[str, Need], board: Board, advice: str) -> None:
     """Raises UsageError that says all that a board lacks for an image. `needs`: what is known of it besides its inputs
     and outputs; `advice`: a sentence about what to do when it needs too much."""
+    lacking = _lacking(image, board)
+    limits = {name: limit for name, limit in board.limits.items() if DRIVER_OF.get(name) not in lacking}
+    check_fit({**needs, **_needs_of_io(image)}, limits, board.title, advice, _sentences(lacking, board))
+
+
+def _needs_of_io(image: Image) -> dict[str, Need]:
     configuration = configuration_of_image(image)
-    of_io = {} if configuration is None else needs_of_io(configuration)
-    check_fit({**needs, **of_io}, board.limits, board.title, advice, _lacking(image, board))
+    calls = any(external.name.startswith("modbus_") for external in image.externals)
+    return ({} if configuration is None else needs_of_io(configuration)) | {"modbus_calls": Need(int(calls))}
 
 
-def components_of_image(image: Image) -> dict[str, list[str]]:
-    """The components that it needs, and what of it needs each. Of functions and drivers of a vendor's own they are not
-    known."""
+def _lacking(image: Image, board: Board) -> dict[str, list[str]]:
+    """By component that the firmware does not have: what of the image needs it. Of functions and drivers of a vendor's
+    own nothing is known."""
     found: dict[str, list[str]] = {}
-    for external in image.externals:
-        function = C_FUNCTIONS.get(external.name)
-        if function is not None:
+    for function in _functions(image):
+        if function.component not in board.components and not board.offers(function.signature):
             names = found.setdefault(function.component, [])
-            name = _UNNAMED.get(function.component, external.name)
+            name = COMPILER_COMPONENTS.get(function.component, function.name)
             names += [name] if name not in names else []
     configuration = configuration_of_image(image)
     if configuration is not None:
-        found[_IO_MANAGER] = ["inputs and outputs"]
-        for connector in required(configuration):
-            if connector.driver in DRIVERS:
-                found.setdefault(connector.driver, []).append(connector.name)
+        users = [(IO_MANAGER, "inputs and outputs")]
+        users += [(c.driver, c.name) for c in required(configuration) if c.driver in DRIVERS]
+        for component, user in users:
+            if component not in board.components:
+                found.setdefault(component, []).append(user)
     return found
 
 
-def _lacking(image: Image, board: Board) -> Iterator[str]:
-    """A sentence for each component that the firmware does not have."""
-    for component, users in components_of_image(image).items():
-        if component in board.components:
-            continue
+def _functions(image: Image) -> Iterator[CFunction]:
+    found = (find_c_function(external.name, external.signature) for external in image.externals)
+    return (function for function in found if function is not None)
+
+
+def _sentences(lacking: Mapping[str, Sequence[str]], board: Board) -> Iterator[str]:
+    for component, users in lacking.items():
         others = [b.slug for b in known_boards() if b.name == board.name and component in b.components]
         where = f"; {_list(others)} {'have' if len(others) > 1 else 'has'} it" if others else ""
         yield f"It needs {component} for {_list(users)}, which the firmware does not have{where}."

@@ -11,12 +11,19 @@ from typing import Any
 
 from plctool.core import ffi, lib
 from plctool.image.file import Image
-from plctool.image.limits import Need
+from plctool.image.limits import ROOM, Need
 from plctool.io.configuration import Configuration, ConnectorEntry, parse_configuration
 
 GPIO, MODBUS = "IoDrvGpio", "IoDrvModbus"
 DRIVERS = (GPIO, MODBUS, "IoDrvSim", "IoDrvSysfs")
 """Those of this project, each a component of that name."""
+
+IO_MANAGER = "CmpIoMgrEmbedded"
+DRIVER_OF = {
+    name: GPIO if name in ("gpio_groups", "events") else MODBUS if name.startswith("modbus") else IO_MANAGER
+    for name in ROOM
+}
+"""The component that has so much room."""
 
 _CLIENTS = (lib.MODBUS_ROLE_SERIAL_CLIENT, lib.MODBUS_ROLE_TCP_CLIENT)
 _TCP = (lib.MODBUS_ROLE_TCP_CLIENT, lib.MODBUS_ROLE_TCP_SERVER)
@@ -32,7 +39,7 @@ def configuration_of_image(image: Image) -> Configuration | None:
 
 
 def needs_of_io(configuration: Configuration) -> dict[str, Need]:
-    """What the drivers have to have room for, by the names of `DRIVER_LIMITS`."""
+    """What the drivers have to have room for, by the names of `ROOM`."""
     found: Counter[str] = Counter(connectors=len(configuration.connectors))
     for connector in required(configuration):
         if connector.driver == GPIO:

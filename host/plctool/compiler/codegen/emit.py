@@ -42,7 +42,7 @@ def _initialise() -> None:
 def target_machine(target: Target, opt_level: int) -> llvm.TargetMachine:
     """LLVM's code generator for a target."""
     _initialise()
-    features = target.features + (target.features_for_speed if opt_level >= FASTEST else "")
+    features = ",".join([target.features, *([target.features_for_speed] if opt_level >= FASTEST else [])])
     return llvm.Target.from_triple(target.triple).create_target_machine(
         cpu=target.cpu, features=features, opt=opt_level, reloc="pic", codemodel="small", abiname=target.abi
     )
@@ -92,7 +92,8 @@ def _remove_dead_stores(module: llvm.ModuleRef, builder: llvm.PassBuilder) -> No
 
 def _widen(module: llvm.ModuleRef) -> llvm.ModuleRef:
     """Has divisions by constants done in words. LLVM narrows them where it knows that the numbers are small, for
-    processors that divide so in less time; here it only costs the instructions that cut the numbers."""
+    processors that divide so in less time; here it only costs the instructions that cut the numbers. Names in modules
+    have no quotes (`Unit.unique`), and none begins as those that are made here."""
     text = str(module)
     if not _NARROW.search(text):
         return module

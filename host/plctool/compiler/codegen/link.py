@@ -32,6 +32,7 @@ from plctool.iec.types import align_up
 from plctool.image.targets import Machine, Target
 
 _THUMBS = (Machine.THUMB, Machine.THUMB_V6M)
+_STUB_ALIGN = 2  # bytes: instructions of the processors with stubs are of 16 bits, or of two such units
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ class _Linker:
         for slot, (name, external) in enumerate(self._imports.items()):
             if name not in names:
                 continue
-            code += bytes(align_up(len(code), 4) - len(code))
+            code += bytes(align_up(len(code), _STUB_ALIGN) - len(code))
             self._stubs[name] = len(code)
             try:
                 code += stub(self._target.machine, slot)

@@ -5,7 +5,6 @@ A function enters the queue the first time something refers to it, so what is no
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass
 from enum import Enum
 
@@ -19,6 +18,7 @@ from plctool.debug.bounds import BoundsCheck
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import Elementary, Kind, PointerType, StructType, Type, base_of
+from plctool.image.c_functions import C_FUNCTIONS, VERSION
 from plctool.image.targets import FASTEST, Target
 
 _ALWAYS = 'nounwind "no-builtins"'
@@ -84,18 +84,15 @@ class Form(Enum):
     MEASURED = 2  # a function of the library that is given the lengths of its strings
 
 
-def interface_signature(text: str) -> int:
-    """The signature id of an external function: CRC-32 of its interface text, e.g. 'sin(LREAL):LREAL'."""
-    return zlib.crc32(text.encode("ascii"))
-
-
 def import_symbol(name: str) -> str:
     """The symbol by which the linker knows a C function."""
     return f"import.{name}"
 
 
-RAISE = External("iecraise", interface_signature("iecraise(UDINT)"), 0x00010000)
+RAISE = External("iecraise", C_FUNCTIONS["iecraise"].signature, VERSION)
 
+
+STUBS_REACH = 40  # slots; on Cortex-M0 there are 64, some of which are for compiler calls
 
 REALS = ("float", "double")  # LLVM types
 
@@ -239,13 +236,19 @@ class Unit:
             slot = len(self.imports)
             self._import_slots[external.name] = slot
             self.imports.append(external)
+        if self.imports[slot] != external:
+            raise UsageError(
+                f"The C function {external.name} is declared twice, with other parameters or another version; it is "
+                "one function, declare it once.",
+                "external",
+            )
         return slot
 
     def imported(self, external: External, result: str, arguments: list[str], convention: str) -> str | None:
-        """The symbol of a C function, where the linker makes a stub for it; None where its address has to be loaded."""
-        if not self.target.stubs:
+        """The symbol of a C function, where the linker makes a stub for it; None where its address has to be loaded,
+        also of those that a stub does not reach on each processor when compiler calls come after them."""
+        if not self.target.stubs or self.import_slot(external) >= STUBS_REACH:
             return None
-        self.import_slot(external)
         symbol = import_symbol(external.name)
         types = ", ".join(argument.split()[0] for argument in arguments)
         self.module.declare(symbol, f"declare {convention}{result} @{symbol}({types})")

@@ -251,15 +251,13 @@ def stub(machine: Machine, slot: int) -> bytes:
     none so far from it."""
     if slot >= _SLOTS[machine]:
         raise OutOfReach
-    if machine is Machine.THUMB:  # ldr.w ip, [r9, #4*slot]; bx ip; nop
-        return struct.pack("<HHHH", 0xF8D9, 0xC000 | 4 * slot, 0x4760, 0xBF00)
+    if machine is Machine.THUMB:  # ldr.w ip, [r9, #4*slot]; bx ip
+        return struct.pack("<HHH", 0xF8D9, 0xC000 | 4 * slot, 0x4760)
     if (
         machine is Machine.THUMB_V6M
-    ):  # push {r4}; mov r4, r9; adds r4, #128*n; ldr r4, [r4, #..]; mov ip, r4; pop {r4}; bx ip; nop
+    ):  # push {r4}; mov r4, r9; adds r4, #128*n; ldr r4, [r4, #..]; mov ip, r4; pop {r4}; bx ip
         far, near = slot // 32, slot % 32
-        return struct.pack(
-            "<HHHHHHHH", 0xB410, 0x464C, 0x3400 | 128 * far, 0x6824 | near << 6, 0x46A4, 0xBC10, 0x4760, 0xBF00
-        )
+        return struct.pack("<HHHHHHH", 0xB410, 0x464C, 0x3400 | 128 * far, 0x6824 | near << 6, 0x46A4, 0xBC10, 0x4760)
     return struct.pack(
         "<II", 4 * slot << 20 | 27 << 15 | 2 << 12 | 6 << 7 | 0x03, 6 << 15 | 0x67
     )  # lw t1, (s11); jr t1
