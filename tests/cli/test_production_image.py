@@ -407,3 +407,17 @@ def test_a_firmware_may_have_a_function_in_a_component_of_its_own(tool: Any, scr
     for code, status in ((bytes(64), 2), (bytes(30) + signature + bytes(30), 0)):
         (scratch / "fw.elf").write_bytes(elf(less).replace(bytes(range(64)), code))
         assert tool(*words).status == status
+
+
+def test_requests_to_modbus_need_a_firmware_with_room_for_them(tool: Any, scratch: Path) -> None:
+    (scratch / "app.st").write_text(
+        "PROGRAM Main VAR r : MODBUS_READ; words : ARRAY[0..3] OF WORD; END_VAR\n"
+        "r(Execute := NOT r.Done, Device := 'Drive', FunctionCode := 3, Address := 1, Count := 4, Data := words);\n"
+        "END_PROGRAM"
+    )
+    words = ("build", "app.st", "-o", "app.cdl", "--firmware", "fw.elf")
+    for calls, status in ((2, 0), (0, 2)):
+        (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/modbus", modbus_calls=calls)))
+        done = tool(*words)
+        assert done.status == status
+        assert ("1 request of a program to Modbus devices at a time, the device has 0." in done.err) == (status > 0)

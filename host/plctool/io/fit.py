@@ -8,7 +8,7 @@ from plctool.image.board import Board, known_boards
 from plctool.image.c_functions import COMPILER_COMPONENTS, CFunction, find_c_function
 from plctool.image.file import Image
 from plctool.image.limits import Need, check_fit
-from plctool.io.room import DRIVER_OF, DRIVERS, IO_MANAGER, configuration_of_image, needs_of_io, required
+from plctool.io.room import DRIVER_OF, DRIVERS, IO_MANAGER, MODBUS, configuration_of_image, needs_of_io, required
 
 
 def check_board(image: Image, needs: Mapping[str, Need], board: Board, advice: str) -> None:
@@ -21,7 +21,7 @@ def check_board(image: Image, needs: Mapping[str, Need], board: Board, advice: s
 
 def _needs_of_io(image: Image) -> dict[str, Need]:
     configuration = configuration_of_image(image)
-    calls = any(external.name.startswith("modbus_") for external in image.externals)
+    calls = any(function.component == MODBUS for function in _functions(image))
     return ({} if configuration is None else needs_of_io(configuration)) | {"modbus_calls": Need(int(calls))}
 
 
