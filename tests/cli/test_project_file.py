@@ -286,3 +286,13 @@ def test_limits_of_board_and_device_both_hold(tool: Any, project: Path) -> None:
     (project / "io16.toml").write_text('name = "IO-16"\ntarget = "cortex-m3"\n[limits]\ncode = 10\n')
     (project / "plc.io.toml").write_text("")
     assert "bytes of code, the device has 10" in tool("build").err
+
+
+def test_board_and_device_of_different_processors_are_refused(tool: Any, project: Path) -> None:
+    write(project, 'sources = ["src"]\nboard = "mps2-an385/full"\ndevice = "io16.toml"')
+    (project / "io16.toml").write_text('name = "IO-16"\ntarget = "cortex-m4f"\n')
+    (project / "plc.io.toml").write_text("")
+    assert "io16.toml describes a board with a cortex-m4f, MPS2 AN385 (full) has a cortex-m3" in tool("build").err
+    assert tool("run", "--cycles", "1", "--get", "Main.n").status == 0  # on this machine
+    write(project, 'sources = ["src"]\nboard = "plcrt"\ndevice = "io16.toml"')
+    assert tool("build").status == 0

@@ -53,6 +53,17 @@ def _target(wanted: str | None, board: Board | None, io: Description | None) -> 
     return wanted or of_board or of_device or DEFAULT_TARGET
 
 
+def _check_device(board: Board | None, io: Description | None) -> None:
+    """The vendor's description is not one of another processor. plcrt may run instead of any of them."""
+    device = None if io is None else io.device
+    if board is not None and device is not None and not board.is_program and device.target not in ("", board.target):
+        raise UsageError(
+            f"{device.path} describes a board with a {device.target}, {board.title} has a {board.target}; name one of "
+            "the two.",
+            "bad-target",
+        )
+
+
 def io_sources(io: Description | None) -> list[Source]:
     """What messages about a description quote."""
     from plctool.compiler.source import Source
@@ -154,6 +165,7 @@ def compile_sources(
             "that has it.",
             "bad-target",
         )
+    _check_device(known, description)
     if description is not None:
         description.board = board_meant(options.target, known, description.device)
     sources = files.load_sources()
