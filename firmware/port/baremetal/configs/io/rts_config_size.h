@@ -18,7 +18,7 @@
 #define COM_QUEUE_SIZE 540
 #define LOG_MAX_ENTRIES 6
 #define EXCEPT_MAX_CALLS 6
-#define RTS_IEC_UNPRIVILEGED 0 /* 1: 300 bytes of flash, 24 of RAM */
+#define RTS_IEC_UNPRIVILEGED 0   /* 1: 300 bytes of flash, 24 of RAM */
 #define RTS_MAIN_STACK_SIZE 2400 /* a driver refuses its configuration, and what ran before is loaded again */
 #define LOG_TEXT_SIZE 48
 #define SRV_MAX_GROUPS 4
