@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from itertools import accumulate
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool.core import ffi
+from plctool.core import ffi, lib
 from plctool.errors import UsageError
 from plctool.io.configuration import (
     ChannelEntry,
@@ -21,6 +22,7 @@ from plctool.io.configuration import (
     pack_configuration,
     parse_configuration,
 )
+from plctool.io.room import needs_of_io
 
 U16, U32 = st.integers(0, 0xFFFE), st.integers(0, 0xFFFF_FFFE)
 NAMES = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=31)
@@ -34,8 +36,17 @@ CONNECTORS = st.builds(
 CHANNELS = st.builds(ChannelEntry, U32, U32, U32, U16, U16, U32)
 MAPS = st.builds(ConnectorMap, U16, st.lists(CHANNELS, max_size=3).map(tuple))
 TASKS = st.builds(TaskMap, U16, st.sampled_from([0, 1]), st.lists(MAPS, max_size=3).map(tuple))
+
+
+def in_order(connectors: list[ConnectorEntry]) -> tuple[ConnectorEntry, ...]:
+    """Each is on one before it, or on none."""
+    return tuple(
+        replace(c, parent=c.parent % n if n and c.parent is not None else None) for n, c in enumerate(connectors)
+    )
+
+
 CONFIGURATIONS = st.builds(
-    Configuration, st.lists(CONNECTORS, max_size=4).map(tuple), st.lists(TASKS, max_size=3).map(tuple), NAMES
+    Configuration, st.lists(CONNECTORS, max_size=4).map(in_order), st.lists(TASKS, max_size=3).map(tuple), NAMES
 )
 
 
@@ -61,7 +72,14 @@ def test_changed_bytes_are_read_or_refused(configuration: Configuration, data: s
     packed = bytearray(pack_configuration(configuration))
     packed[data.draw(st.integers(0, len(packed) - 1))] ^= 1 << data.draw(st.integers(0, 7))
     with suppress(UsageError):
-        parse_configuration(bytes(packed))
+        needs_of_io(parse_configuration(bytes(packed)))
+
+
+def test_what_a_device_is_on_comes_before_it() -> None:
+    """As the loader demands it."""
+    connectors = tuple(ConnectorEntry(f"C{n}", "IoDrvSim", lib.CT_MASTER, lib.CF_ENABLE, parent=2) for n in range(2))
+    with pytest.raises(UsageError, match="before that which it is on"):
+        parse_configuration(pack_configuration(Configuration(connectors, ())))
 
 
 def test_ranges_of_tables_follow_each_other() -> None:

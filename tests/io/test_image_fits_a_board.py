@@ -137,7 +137,11 @@ def test_function_of_the_same_name_is_another_one(refused: Any) -> None:
 
 def test_what_a_driver_has_no_room_for_is_not_said_where_it_is_missing(refused: Any) -> None:
     message = refused("mps2-an385/standard", BITS, line(*map(device, range(1, 12))))
-    assert "It needs IoDrvModbus for " in message and "Modbus devices, the device has" not in message
+    assert (
+        "It needs IoDrvModbus for " in message
+        and " and 9 more, which" in message
+        and "Modbus devices, the device has" not in message
+    )
     assert "devices and buses" not in message and "smaller" not in message
 
 

@@ -56,13 +56,9 @@ def oldest_input(channels: Sequence[Document]) -> Document | None:
 def configuration_in(data: bytes) -> Configuration | None:
     """The I/O configuration of an image, None if it has none. Raises UsageError for one that is damaged."""
     from plctool.image.file import parse_image
-    from plctool.io.configuration import parse_configuration
+    from plctool.io.configuration import configuration_of_image
 
-    image = parse_image(data)
-    if image.io is None:
-        return None
-    offset, size = image.io
-    return parse_configuration(image.code[offset : offset + size])
+    return configuration_of_image(parse_image(data))
 
 
 def board_in(data: bytes) -> str:

@@ -94,8 +94,7 @@ def _warnings(args: argparse.Namespace, project: Project | None) -> WarningOptio
 
 
 def _board(args: argparse.Namespace, project: Project | None) -> str | None:
-    """The board that is named; that of the project unless another one, a target or a device
-    is asked for."""
+    """The board that is named; that of the project unless another one, a target or a device is asked for."""
     board: str | None = getattr(args, "board", None)
     asked = board or any(getattr(args, name, None) for name in ("firmware", "target", "device"))
     return board if asked or project is None else project.board

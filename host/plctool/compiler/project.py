@@ -95,9 +95,9 @@ def _project(file: Path, table: Table) -> Project:
 def _board(table: Table) -> str | None:
     """A board that plctool knows, with its configuration."""
     if "board" not in table:
-        table.text("board")
+        table.text("board")  # so that it is among the keys that messages name
         return None
-    from plctool.image.board import known_boards
+    from plctool.image.board import known_boards  # not for each project: it reads ELF files, too
 
     return table.choice("board", {board.slug: board.slug for board in known_boards()})
 

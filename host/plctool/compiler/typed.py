@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, ClassVar
 from plctool.files import Pos as Pos
 from plctool.iec.areas import Area
 from plctool.iec.types import Keep, StructType, Type
+from plctool.image.c_functions import C_FUNCTIONS, VERSION
 
 if TYPE_CHECKING:
     from plctool.io.model import Description
@@ -584,6 +585,11 @@ class External:
     name: str
     signature: int
     version: int
+
+
+def runtime_function(name: str) -> External:
+    """One that plctool knows of the runtime."""
+    return External(name, C_FUNCTIONS[name].signature, VERSION)
 
 
 class TaskKind(Enum):

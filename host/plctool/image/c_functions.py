@@ -147,7 +147,7 @@ class CFunction:
 
 def interface_signature(text: str) -> int:
     """The signature id of a C function: CRC-32 of its interface text."""
-    return zlib.crc32(text.encode("ascii"))
+    return zlib.crc32(text.encode("latin-1", "replace"))
 
 
 def _functions() -> Iterator[CFunction]:

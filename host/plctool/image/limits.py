@@ -47,7 +47,7 @@ ROOM = {
 
 _OF_AREA = {Area.INPUT: "inputs", Area.OUTPUT: "outputs"}
 
-_LARGEST = 3
+MOST_SHOWN = 3  # names that a sentence has
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def _sentence(title: str, need: Need, limit: int) -> str:
     text = f"It needs {'at least ' if need.at_least else ''}{need.amount} {title}, the device has {limit}"
     if not need.parts:
         return f"{text}."
-    parts = need.parts[:_LARGEST]
+    parts = need.parts[:MOST_SHOWN]
     if all(amount == 1 for _, amount in need.parts):
         shown, kind = ", ".join(part for part, _ in parts), ""
     else:

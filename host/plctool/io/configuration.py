@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
+from plctool.image.file import Image
 
 NONE = int(lib.IO_CONFIG_NONE)
 NOWHERE = int(lib.IO_CONFIG_NOWHERE)
@@ -195,6 +196,14 @@ def _struct(kind: str, **values: int) -> bytes:
 # ---- reading -------------------------------------------------------------------------------------------------------
 
 
+def configuration_of_image(image: Image) -> Configuration | None:
+    """The inputs and outputs of an image, None if it has none. Raises UsageError for what is damaged."""
+    if image.io is None:
+        return None
+    offset, size = image.io
+    return parse_configuration(image.code[offset : offset + size])
+
+
 def parse_configuration(data: bytes) -> Configuration:
     """The tables of an image. Raises UsageError for bytes that are not one; nothing in them is trusted."""
     return _Reader(data).configuration()
@@ -227,6 +236,8 @@ class _Reader:
         return list(entries)
 
     def configuration(self) -> Configuration:
+        if any(c.parent != NONE and c.parent >= index for index, c in enumerate(self._connectors)):
+            raise _damaged("names a device or bus before that which it is on")
         return Configuration(
             tuple(map(self._connector, self._connectors)),
             tuple(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from plctool.errors import listed
 from plctool.image.board import Board, known_boards
 from plctool.image.c_functions import COMPILER_COMPONENTS, CFunction, find_c_function
 from plctool.image.file import Image
-from plctool.image.limits import Need, check_fit
-from plctool.io.room import DRIVER_OF, DRIVERS, IO_MANAGER, MODBUS, configuration_of_image, needs_of_io, required
+from plctool.image.limits import MOST_SHOWN, Need, check_fit
+from plctool.io.configuration import configuration_of_image
+from plctool.io.room import DRIVER_OF, DRIVERS, IO_MANAGER, MODBUS, needs_of_io, required
 
 
 def check_board(image: Image, needs: Mapping[str, Need], board: Board, advice: str) -> None:
@@ -52,10 +54,10 @@ def _functions(image: Image) -> Iterator[CFunction]:
 def _sentences(lacking: Mapping[str, Sequence[str]], board: Board) -> Iterator[str]:
     for component, users in lacking.items():
         others = [b.slug for b in known_boards() if b.name == board.name and component in b.components]
-        where = f"; {_list(others)} {'have' if len(others) > 1 else 'has'} it" if others else ""
-        yield f"It needs {component} for {_list(users)}, which the firmware does not have{where}."
+        where = f"; {listed(others)} {'have' if len(others) > 1 else 'has'} it" if others else ""
+        yield f"It needs {component} for {_shown(users)}, which the firmware does not have{where}."
 
 
-def _list(names: Sequence[str]) -> str:
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
+def _shown(names: Sequence[str]) -> str:
+    more = len(names) - MOST_SHOWN
+    return listed(names if more <= 0 else [*names[:MOST_SHOWN], f"{more} more"])

@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from plctool.core import ffi, lib
-from plctool.image.file import Image
 from plctool.image.limits import ROOM, Need
-from plctool.io.configuration import Configuration, ConnectorEntry, parse_configuration
+from plctool.io.configuration import Configuration, ConnectorEntry
 
 GPIO, MODBUS = "IoDrvGpio", "IoDrvModbus"
 DRIVERS = (GPIO, MODBUS, "IoDrvSim", "IoDrvSysfs")
@@ -28,14 +27,6 @@ DRIVER_OF = {
 _CLIENTS = (lib.MODBUS_ROLE_SERIAL_CLIENT, lib.MODBUS_ROLE_TCP_CLIENT)
 _TCP = (lib.MODBUS_ROLE_TCP_CLIENT, lib.MODBUS_ROLE_TCP_SERVER)
 _OF_BITS = (lib.MODBUS_READ_COILS, lib.MODBUS_READ_DISCRETE_INPUTS, lib.MODBUS_WRITE_COIL, lib.MODBUS_WRITE_COILS)
-
-
-def configuration_of_image(image: Image) -> Configuration | None:
-    """Its inputs and outputs; None without any."""
-    if image.io is None:
-        return None
-    offset, size = image.io
-    return parse_configuration(image.code[offset : offset + size])
 
 
 def needs_of_io(configuration: Configuration) -> dict[str, Need]:

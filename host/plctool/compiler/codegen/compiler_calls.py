@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from plctool.compiler.typed import External
-from plctool.image.c_functions import C_FUNCTIONS, COMPILER_COMPONENTS, VERSION
+from plctool.compiler.typed import runtime_function
+from plctool.image.c_functions import C_FUNCTIONS, COMPILER_COMPONENTS
 
 COMPILER_CALLS = {
-    function.name: External(function.name, function.signature, VERSION)
+    function.name: runtime_function(function.name)
     for function in C_FUNCTIONS.values()
     if function.component in COMPILER_COMPONENTS
 }

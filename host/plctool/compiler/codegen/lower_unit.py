@@ -12,13 +12,12 @@ from plctool.compiler.analysis import only_copies
 from plctool.compiler.codegen.closed import Closed
 from plctool.compiler.codegen.ir import Module, escape
 from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
-from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable
+from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable, runtime_function
 from plctool.core import ffi, lib
 from plctool.debug.bounds import BoundsCheck
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import Elementary, Kind, PointerType, StructType, Type, base_of
-from plctool.image.c_functions import C_FUNCTIONS, VERSION
 from plctool.image.targets import FASTEST, Target
 
 _ALWAYS = 'nounwind "no-builtins"'
@@ -89,7 +88,7 @@ def import_symbol(name: str) -> str:
     return f"import.{name}"
 
 
-RAISE = External("iecraise", C_FUNCTIONS["iecraise"].signature, VERSION)
+RAISE = runtime_function("iecraise")
 
 
 STUBS_REACH = 40  # slots; on Cortex-M0 there are 64, some of which are for compiler calls

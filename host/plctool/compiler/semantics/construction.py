@@ -6,7 +6,6 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping
 
 from plctool.compiler.kept import is_kept
@@ -34,7 +33,6 @@ from plctool.compiler.typed import (
     Const,
     Direction,
     Expr,
-    External,
     For,
     If,
     IndexPlace,
@@ -57,6 +55,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
     overlay,
+    runtime_function,
 )
 from plctool.compiler.typed_nodes import rewrite
 from plctool.iec.areas import Area
@@ -102,16 +101,13 @@ def construct(world: World) -> tuple[Pou | None, Pou | None]:
     return start if start.body else None, end if end.body else None
 
 
-_KEPT_TEXT = "ieckept(POINTER TO BYTE,UDINT):BOOL"
-
-
 def _kept_function() -> Pou:
     """The function of the runtime that tells whether a value in some memory was put back (CmpIecAbi.h)."""
     pos = Pos("", 1, 1)
     pou = Pou("ieckept", PouKind.FUNCTION, pos, result=Variable("ieckept", BOOL, Storage.LOCAL, pos))
     for name, t in (("address", RawPointerType(BYTE)), ("size", UDINT)):
         pou.parameters.append(Parameter(Variable(name, t, Storage.LOCAL, pos), Direction.INPUT))
-    pou.external = External("ieckept", zlib.crc32(_KEPT_TEXT.encode()), 0x00010000)
+    pou.external = runtime_function("ieckept")
     return pou
 
 

@@ -6,7 +6,6 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
-import zlib
 from dataclasses import replace
 
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
@@ -48,6 +47,7 @@ from plctool.iec.types import (
     StructType,
     Type,
 )  # fmt: skip
+from plctool.image.c_functions import interface_signature
 
 _VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")
 
@@ -183,7 +183,7 @@ class Functions:
             return External(name, 0, 0)
         major, minor = (int(part) for part in version.groups())
         text = interface_text(name.lower(), info.pou)
-        return External(name.lower(), zlib.crc32(text.encode("latin-1", "replace")), major << 16 | minor)
+        return External(name.lower(), interface_signature(text), major << 16 | minor)
 
 
 def interface_text(name: str, pou: Pou) -> str:
