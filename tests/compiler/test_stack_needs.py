@@ -8,7 +8,7 @@ import pytest
 
 from plctool.compiler import compile_sources
 from plctool.compiler.codegen.calls import branches
-from plctool.compiler.codegen.stack import deepest_calls
+from plctool.compiler.codegen.stack import CallGraph
 from plctool.errors import UsageError
 from plctool.image.c_functions import C_FUNCTIONS
 from plctool.image.targets import TARGETS, Machine, find_target
@@ -132,7 +132,7 @@ def x86_calls(chain: list[list[int]]) -> tuple[bytes, dict[int, tuple[int, int]]
 @pytest.mark.parametrize("length", [1, 2, 1500, 10_000])
 def test_chain_of_calls_may_be_long(length: int) -> None:
     code, frames = x86_calls([*([n + 1] for n in range(length - 1)), []])
-    chain = deepest_calls(code, Machine.X86_64, frames, [0])
+    chain = CallGraph(code, Machine.X86_64, frames).deepest([0])
     assert [offset for offset, _ in chain] == sorted(frames)
     assert sum(amount for _, amount in chain) == 16 * length
 
@@ -140,12 +140,12 @@ def test_chain_of_calls_may_be_long(length: int) -> None:
 def test_calls_that_meet_again_are_followed_once() -> None:
     length = 2000  # with 2 ** 1000 ways through them
     code, frames = x86_calls([[min(n + 1, length - 1), min(n + 2, length - 1)] for n in range(length - 1)] + [[]])
-    assert sum(amount for _, amount in deepest_calls(code, Machine.X86_64, frames, [0])) == 16 * length
+    assert sum(amount for _, amount in CallGraph(code, Machine.X86_64, frames).deepest([0])) == 16 * length
 
 
 def test_what_looks_like_a_recursion_has_an_end() -> None:
     code, frames = x86_calls([[1, 2], [0, 2], [1, 0]])
-    assert 16 < sum(amount for _, amount in deepest_calls(code, Machine.X86_64, frames, [0])) <= 48
+    assert 16 < sum(amount for _, amount in CallGraph(code, Machine.X86_64, frames).deepest([0])) <= 48
 
 
 def test_program_with_a_chain_of_1500_functions_is_built(tmp_path: Path) -> None:

@@ -1,12 +1,12 @@
 """A program whose calls fill the stack that its board has for them runs, whenever it is interrupted. Calls of C
-functions are counted with a reserve, which is left over."""
+functions are counted with a reserve, which is left over, or with what they take in the firmware that is there."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
-from environment import CONFIG, TARGET
+from environment import CONFIG, TARGET, firmware
 
 from plctool.compiler import compile_sources
 from plctool.device import Plc
@@ -43,15 +43,20 @@ END_RESOURCE END_CONFIGURATION
 """
 
 
-@pytest.mark.parametrize("calculation", ["1.0", OF_C], ids=["all of it", "with C functions"])
-def test_program_that_fills_the_stack_runs(board, tmp_path: Path, calculation: str) -> None:
+@pytest.mark.parametrize(
+    ("calculation", "measured"),
+    [("1.0", False), (OF_C, False), (OF_C, True)],
+    ids=["all of it", "with C functions", "with those of the firmware"],
+)
+def test_program_that_fills_the_stack_runs(board, tmp_path: Path, calculation: str, measured: bool) -> None:
     known = next(b for b in known_boards() if (b.target, b.config) == (TARGET, CONFIG))
     limit = known.limits["stack"]
+    options = {"firmware": firmware(CONFIG)} if measured else {"board": known.slug}
     source = tmp_path / "deep.st"
 
     def build(size: int):
         source.write_text(PROGRAM.format(last=size - 1, calculation=calculation))
-        return compile_sources([source], board=known.slug)
+        return compile_sources([source], **options)
 
     others = build(SAMPLE).needs["stack"].amount - SAMPLE
     built = build((limit - others) // 8 * 8)

@@ -141,6 +141,7 @@ def compile_sources(
     does not fit its device, InternalError when the compiler has a bug.
     """
     from plctool.compiler.build import build_program
+    from plctool.compiler.codegen.firmware_stacks import FirmwareStacks
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
     from plctool.compiler.diagnostics import render_all
     from plctool.compiler.fit import board_meant, check_program_fits
@@ -158,7 +159,9 @@ def compile_sources(
     known = None
     if board is not None or firmware is not None:
         known = board_of(board, None if firmware is None else read_firmware(firmware))
-    options = Options(find_target(_target(target, known, description)), number, parse_checks(checks), debug, size)
+    processor = find_target(_target(target, known, description))
+    stacks = None if firmware is None or not processor.stubs else FirmwareStacks(firmware, processor.machine)
+    options = Options(processor, number, parse_checks(checks), debug, size, stacks)
     if known is not None and known.target != options.target.name:
         raise UsageError(
             f"{known.title} has a {known.target}, not a {options.target.name}; leave the target out, or name a board "

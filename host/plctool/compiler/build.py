@@ -11,13 +11,13 @@ from plctool.compiler.codegen.emit import emit_objects
 from plctool.compiler.codegen.link import Linked, link
 from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.codegen.stack import Frames, deepest_calls
+from plctool.compiler.codegen.stack import CallGraph, Frames
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.io_configuration import assign_tasks, configuration_of, io_document
 from plctool.compiler.kept import kept_parts, kept_variables
 from plctool.compiler.nesting import room_for_nesting
-from plctool.compiler.typed import Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
+from plctool.compiler.typed import External, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
 from plctool.core import lib
 from plctool.debug.symbols import CodeUnit, KeptName, SymbolTable, symbol_path
 from plctool.debug.variables import Symbol, constant_symbol
@@ -99,7 +99,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
     built = build_image(image)
     symbols.image_crc = image_crc(built)
     sizes = code_sizes(symbols, len(linked.code))
-    return BuildResult(built, symbols, sizes, _needs(program, lowered, linked, image, len(built), sizes, target))
+    return BuildResult(built, symbols, sizes, _needs(program, lowered, linked, image, len(built), sizes, options))
 
 
 def _needs(
@@ -109,7 +109,7 @@ def _needs(
     image: Image,
     size: int,
     sizes: dict[str, int],
-    target: Target,
+    options: Options,
 ) -> dict[str, Need]:
     needs = needs_of_image(image, size)
     for area in program.area_sizes:
@@ -120,7 +120,8 @@ def _needs(
     for name in ("code", "image"):
         needs[name] = replace(needs[name], parts=tuple(sizes.items()))
     roots = [linked.symbols[name].offset for name in (*lowered.tasks, *lowered.functions.values())]
-    chain = deepest_calls(linked.code, target.machine, linked.frames | _frames_of_stubs(linked, target), roots)
+    stubs = _frames_of_stubs(linked, options)
+    chain = CallGraph(linked.code, options.target.machine, linked.frames | stubs).deepest(roots)
     names = {symbol.offset: name for name, symbol in linked.symbols.items()}
     names |= {offset: external.name for offset, external in linked.stubs.items()}
     names |= {linked.symbols[name].offset: pou.name for name, pou in lowered.pous.items() if name in linked.symbols}
@@ -128,24 +129,32 @@ def _needs(
     frames: Counter[str] = Counter()
     for offset, frame in chain:
         frames[names[offset]] += frame
-    at_least = program.may_recurse or _has_unknown(linked, target)
+    at_least = program.may_recurse or _has_unknown(linked, options)
     needs["stack"] = Need(frames.total(), largest((+frames).items()), deepest=True, at_least=at_least)
     return needs
 
 
-def _has_unknown(linked: Linked, target: Target) -> bool:
+def _has_unknown(linked: Linked, options: Options) -> bool:
     """Whether it calls C functions of which it is not known how much stack they take. Where there are no stubs, stacks
     are large."""
-    known = all(find_c_function(e.name, e.signature) for e in linked.stubs.values())
-    return target.stubs and not (known and len(linked.imports) == len(linked.stubs))
+    known = all(_stack_of(external, options) is not None for external in linked.stubs.values())
+    return options.target.stubs and not (known and len(linked.imports) == len(linked.stubs))
 
 
-def _frames_of_stubs(linked: Linked, target: Target) -> Frames:
+def _frames_of_stubs(linked: Linked, options: Options) -> Frames:
     """A stub takes what its C function takes."""
-    functions = {offset: find_c_function(e.name, e.signature) for offset, e in linked.stubs.items()}
-    return {
-        offset: (0, function.stack(target.machine)) for offset, function in functions.items() if function is not None
-    }
+    sizes = {offset: _stack_of(external, options) for offset, external in linked.stubs.items()}
+    return {offset: (0, size) for offset, size in sizes.items() if size is not None}
+
+
+def _stack_of(external: External, options: Options) -> int | None:
+    """Bytes that a call of a C function takes: in the firmware that is at hand, else in any of this repository. What
+    those of the runtime call by pointer is of no account."""
+    known = find_c_function(external.name, external.signature)
+    size = None
+    if options.firmware is not None:
+        size = options.firmware.of_function(external.signature, with_pointers=known is not None)
+    return known.stack(options.target.machine) if size is None and known is not None else size
 
 
 def _entry(linked: Linked, name: str, target: Target) -> int:

@@ -47,10 +47,10 @@ _FUNCTIONS = {
         modbus_get(DINT,UINT):WORD                          48    64
         modbus_free(DINT):BOOL                              32    48""",
     "CmpIntCalls": """
-        __divdi3(LINT,LINT):LINT                            80    32
-        __udivdi3(ULINT,ULINT):ULINT                        80    32
-        __moddi3(LINT,LINT):LINT                            80    32
-        __umoddi3(ULINT,ULINT):ULINT                        80    32
+        __divdi3(LINT,LINT):LINT                            80    64
+        __udivdi3(ULINT,ULINT):ULINT                        80    64
+        __moddi3(LINT,LINT):LINT                            80    64
+        __umoddi3(ULINT,ULINT):ULINT                        80    64
         __muldi3(LINT,LINT):LINT                            32    32
         __ashldi3(LINT,DINT):LINT                           32    32
         __ashrdi3(LINT,DINT):LINT                           32    32

@@ -92,6 +92,29 @@ def _whole(code: bytes) -> bytes:
     return code + bytes(-len(code) % 4)
 
 
+def calls_by_pointer(code: bytes, machine: Machine) -> bool:
+    """Whether code of a 32-bit processor, without data in it, calls or jumps to what a register or a constant in memory
+    says. On RISC-V a jump to one of many cases looks the same."""
+    is_riscv = machine is Machine.RISCV32
+    at = 0
+    while at + 2 <= len(code):
+        half, next_half = (int.from_bytes(code[i : i + 2], "little") for i in (at, at + 2))
+        if is_riscv:
+            is_long = half & 3 == 3
+            found = half & 0xE07F == 0x8002 and half not in _RISCV_OTHERS  # C.JR, C.JALR
+        else:
+            is_long = half >> 11 in (0x1D, 0x1E, 0x1F)
+            found = half & 0xFF07 == 0x4700 and half != 0x4770  # BX and BLX, but BX LR
+            found |= half & 0xFF7F == 0xF85F and next_half >> 12 == 15  # LDR PC, [PC, ...] of what the linker inserts
+        if found:
+            return True
+        at += 4 if is_long else 2
+    return False
+
+
+_RISCV_OTHERS = (0x8082, 0x8282, 0x9002)  # C.JR ra and t0, which return, and C.EBREAK
+
+
 _READ: dict[Machine, Callable[[bytes], Iterator[Branch]]] = {
     Machine.X86_64: _x86,
     Machine.THUMB: _thumb,

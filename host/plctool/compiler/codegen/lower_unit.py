@@ -10,6 +10,7 @@ from enum import Enum
 
 from plctool.compiler.analysis import only_copies
 from plctool.compiler.codegen.closed import Closed
+from plctool.compiler.codegen.firmware_stacks import FirmwareStacks
 from plctool.compiler.codegen.ir import Module, escape
 from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
 from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable, runtime_function
@@ -55,13 +56,14 @@ def parse_checks(text: str) -> frozenset[Check]:
 @dataclass(frozen=True)
 class Options:
     """How to compile. `debug`: keep the program closer to its source (no inlining across POUs); `size`: rather small
-    than fast."""
+    than fast; `firmware`: what is known of the C functions that it will call."""
 
     target: Target
     opt_level: int = 2
     checks: frozenset[Check] = ALL_CHECKS
     debug: bool = False
     size: bool = False
+    firmware: FirmwareStacks | None = None
 
     @property
     def watchable(self) -> bool:

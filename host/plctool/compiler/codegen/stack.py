@@ -7,7 +7,7 @@ as on processors of computers, whose stacks are large.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Set
 from typing import NamedTuple
 
 from plctool.compiler.codegen.calls import branches
@@ -15,25 +15,6 @@ from plctool.image.targets import Machine
 
 Frames = dict[int, tuple[int, int]]
 """Size of the code and of the frame of each function, by its offset in the block; in bytes."""
-
-_Calls = dict[int, dict[int, bool]]
-"""By caller: what it calls (true), or jumps to at its end."""
-
-
-def deepest_calls(code: bytes, machine: Machine, frames: Frames, roots: Iterable[int]) -> list[tuple[int, int]]:
-    """The chain of calls from one of `roots` that needs most: functions with the bytes of their frames."""
-    called = _calls(code, machine, frames)
-    deepest: dict[int, _Deepest] = {}
-    known = [root for root in roots if root in frames]
-    for root in known:
-        _measure(root, called, frames, deepest)
-    at = max(known, key=lambda root: deepest[root].amount, default=None)
-    chain: dict[int, int] = {}
-    while at is not None and at not in chain:
-        found = deepest[at]
-        chain[at] = frames[at][1] if found.keeps else 0
-        at = found.target
-    return list(chain.items())
 
 
 class _Deepest(NamedTuple):
@@ -45,40 +26,87 @@ class _Deepest(NamedTuple):
     keeps: bool = True
 
 
-def _measure(root: int, called: _Calls, frames: Frames, deepest: dict[int, _Deepest]) -> None:
-    """Adds to `deepest` a function and all that it leads to, however long the chain of calls is."""
-    path: list[tuple[int, Iterator[int]]] = []
+class CallGraph:
+    """The functions of a block of code, and which calls which. `entries`: where they are entered besides their
+    beginnings."""
 
-    def enter(function: int) -> None:
-        if function not in deepest:
-            deepest[function] = _Deepest(frames[function][1])  # the answer within what only looks like a recursion
-            path.append((function, iter(called.get(function, ()))))
+    def __init__(self, code: bytes, machine: Machine, frames: Frames, entries: Set[int] = frozenset()) -> None:
+        self._frames = frames
+        self._starts = sorted(frames)
+        self._called: dict[int, dict[int, bool]] = {}  # by caller: what it calls (true), or jumps to at its end
+        self._recursive: set[int] = set()
+        self._leaving: set[int] = set()
+        self._deepest: dict[int, _Deepest] = {}
+        for branch in branches(code, machine, frames.keys() | entries):
+            caller, target = self.function_at(branch.place), self.function_at(branch.target)
+            if caller is None:
+                continue
+            if target is None:
+                self._leaving.add(caller)
+            elif caller != target:
+                targets = self._called.setdefault(caller, {})
+                targets[target] = targets.get(target, False) or branch.returns
+            elif branch.returns:
+                self._recursive.add(caller)
 
-    enter(root)
-    while path:
-        function, targets = path[-1]
-        target = next(targets, None)
-        if target is not None:
-            enter(target)
-            continue
-        path.pop()
-        own = frames[function][1]
-        for target, returns in called.get(function, {}).items():
-            amount = deepest[target].amount + (own if returns else 0)
-            if amount > deepest[function].amount:
-                deepest[function] = _Deepest(amount, target, returns)
+    def leaves(self, function: int) -> bool:
+        """Whether it calls what is no function of the block."""
+        return function in self._leaving
 
+    def function_at(self, place: int) -> int | None:
+        """The function that an offset is in."""
+        at = bisect_right(self._starts, place) - 1
+        start = self._starts[at] if at >= 0 else place
+        inside = at >= 0 and place < start + max(self._frames[start][0], 1)
+        return start if inside else None
 
-def _calls(code: bytes, machine: Machine, frames: Frames) -> _Calls:
-    starts = sorted(frames)
-    found: _Calls = {}
-    for branch in branches(code, machine, frames.keys()):
-        caller = starts[bisect_right(starts, branch.place) - 1]
-        inside = caller <= branch.place < caller + frames[caller][0]
-        if inside and branch.target != caller:
-            targets = found.setdefault(caller, {})
-            targets[branch.target] = targets.get(branch.target, False) or branch.returns
-    return found
+    def below(self, root: int) -> dict[int, set[int]]:
+        """A function and all that it leads to, with what each of them calls."""
+        found: dict[int, set[int]] = {}
+        path = [root]
+        while path:
+            function = path.pop()
+            if function not in found:
+                itself = {function} & self._recursive
+                found[function] = itself | self._called.get(function, {}).keys()
+                path += found[function]
+        return found
+
+    def deepest(self, roots: Iterable[int]) -> list[tuple[int, int]]:
+        """The chain of calls from one of `roots` that needs most: functions with the bytes of their frames."""
+        known = [root for root in roots if root in self._frames]
+        for root in known:
+            self._measure(root)
+        at = max(known, key=lambda root: self._deepest[root].amount, default=None)
+        chain: dict[int, int] = {}
+        while at is not None and at not in chain:
+            found = self._deepest[at]
+            chain[at] = self._frames[at][1] if found.keeps else 0
+            at = found.target
+        return list(chain.items())
+
+    def _measure(self, root: int) -> None:
+        """A function and all that it leads to, however long the chain of calls is."""
+        path: list[tuple[int, Iterator[int]]] = []
+
+        def enter(function: int) -> None:
+            if function not in self._deepest:
+                self._deepest[function] = _Deepest(self._frames[function][1])  # what only looks like a recursion ends
+                path.append((function, iter(self._called.get(function, ()))))
+
+        enter(root)
+        while path:
+            function, targets = path[-1]
+            target = next(targets, None)
+            if target is not None:
+                enter(target)
+                continue
+            path.pop()
+            own = self._frames[function][1]
+            for target, returns in self._called.get(function, {}).items():
+                amount = self._deepest[target].amount + (own if returns else 0)
+                if amount > self._deepest[function].amount:
+                    self._deepest[function] = _Deepest(amount, target, returns)
 
 
 # ---- the frames -----------------------------------------------------------------------------------------------------
@@ -91,9 +119,10 @@ _SKIPPED = {0x00: "", 0x01: "a", 0x02: "1", 0x03: "2", 0x04: "4", 0x05: "uu", 0x
 block."""
 
 
-def read_frames(data: bytes, address_size: int) -> Frames:
-    """From a .debug_frame whose addresses are offsets in the block (DWARF 4, 6.4.1): the largest distance between the
-    stack pointer before the call and within the function. Functions that are no part of the block are left out."""
+def read_frames(data: bytes, address_size: int, block: int = 0) -> Frames:
+    """From a .debug_frame (DWARF 4, 6.4.1): the largest distance between the stack pointer before the call and within
+    the function. `block`: the address of the block. Functions that are no part of it, as they are before it, are left
+    out."""
     initial: dict[int, int] = {}
     frames: Frames = {}
     at = 0
@@ -105,6 +134,7 @@ def read_frames(data: bytes, address_size: int) -> Frames:
             initial[at] = _largest_frame(reader.after_head())
         else:
             begin, size = reader.fixed(address_size), reader.fixed(address_size)
+            begin = (begin - block) % (1 << 8 * address_size)
             if begin >> (8 * address_size - 1) == 0:
                 frames[begin] = (size, max(initial.get(cie, 0), _largest_frame(reader)))
         at += 4 + length
