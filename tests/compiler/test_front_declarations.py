@@ -418,3 +418,28 @@ def test_external_variable_may_be_one_of_the_same_namespace() -> None:
 def test_name_may_have_letters_of_any_language(name: str) -> None:
     text = f"PROGRAM Main VAR {name} : INT; END_VAR {name.upper()} := {name} + 1; END_PROGRAM"
     assert messages(text) == []
+
+
+# ---- C functions ----
+
+
+def external(name: str, inputs: str, version: str = "1.0") -> str:
+    attributes = f"{{attribute 'external' := 'adc'}} {{attribute 'version' := '{version}'}}"
+    return f"{attributes}\nFUNCTION {name} : DINT VAR_INPUT {inputs} END_VAR END_FUNCTION\n"
+
+
+@pytest.mark.parametrize("other", [external("Other", "a : REAL; b : DINT;"), external("Other", "a : DINT;", "1.1")])
+def test_c_function_is_declared_once_whether_it_is_called_or_not(other: str) -> None:
+    assert messages(external("One", "a : DINT;") + other + main("n : DINT;")) == [
+        "4:10: the C function adc is One already, with other parameters or another version: declare it once, and call "
+        "that one"
+    ]
+
+
+def test_c_function_may_have_two_names() -> None:
+    assert messages(external("One", "a : DINT;") + external("Same", "b : DINT;") + main("n : DINT;")) == []
+
+
+def test_c_function_of_the_program_may_have_the_name_of_one_of_a_library() -> None:
+    own = external("Own", "a : DINT;").replace("adc", "sin")
+    assert messages(own + main("n : DINT;"), library=external("Sine", "a : LREAL;").replace("adc", "sin")) == []

@@ -200,14 +200,11 @@ def test_what_an_unknown_c_function_takes_is_not_known(tmp_path: Path) -> None:
     assert compile_sources([tmp_path / "a.st"], target="cortex-m3").needs["stack"].at_least
 
 
-def test_a_c_function_is_declared_once(tmp_path: Path) -> None:
-    one, other = (
-        f"{{attribute 'external' := 'adc'}}\nFUNCTION {name} : DINT VAR_INPUT {given} END_VAR END_FUNCTION\n"
-        for name, given in (("One", "a : DINT;"), ("Other", "a : REAL; b : DINT;"))
-    )
-    text = f"{one}{other}PROGRAM Main VAR n : DINT; END_VAR n := One(n) + Other(1.0, n); END_PROGRAM"
+def test_a_c_function_is_not_called_together_with_that_of_the_library(tmp_path: Path) -> None:
+    own = "{attribute 'external' := 'sinf'}\nFUNCTION Own : DINT VAR_INPUT a : DINT; END_VAR END_FUNCTION\n"
+    text = f"{own}PROGRAM Main VAR n : DINT; r : REAL; END_VAR n := Own(n); r := SIN(r); END_PROGRAM"
     (tmp_path / "a.st").write_text(text)
-    with pytest.raises(UsageError, match="The C function adc is declared twice, with other parameters"):
+    with pytest.raises(UsageError, match="The C function sinf of the program has other parameters"):
         compile_sources([tmp_path / "a.st"], target="cortex-m3")
 
 

@@ -239,8 +239,8 @@ class Unit:
             self.imports.append(external)
         if self.imports[slot] != external:
             raise UsageError(
-                f"The C function {external.name} is declared twice, with other parameters or another version; it is "
-                "one function, declare it once.",
+                f"The C function {external.name} of the program has other parameters or another version than that of "
+                "the library, which is called too; give yours another name.",
                 "external",
             )
         return slot

@@ -60,6 +60,7 @@ class Functions:
         self._types = types
         self._units = units
         self._functions: dict[tuple[PouSymbol, tuple[tuple[str, Type], ...]], FunctionInfo] = {}
+        self._externals: dict[str, Pou] = {}  # of the program, not of libraries
         self._busy: set[PouSymbol] = set()
 
     def function(self, symbol: PouSymbol, bindings: dict[str, Type]) -> FunctionInfo | None:
@@ -88,7 +89,9 @@ class Functions:
         self.signature(info, decl, scope)
         external = decl.attributes.get("external")
         if external is not None:
-            pou.external = self._external(external, info, scope)
+            pou.external = self._external(external, info)
+            if not scope.library:
+                self._check_declared_once(pou.external, pou)
         else:
             self._world.bodies.add(scope, decl)
         return info
@@ -175,7 +178,7 @@ class Functions:
         wanted = isinstance(t, OpenArrayType) or "by_reference" in line.attributes or "by_reference" in attributes
         return wanted and isinstance(t, StringType | ArrayType | StructType)
 
-    def _external(self, name: str, info: FunctionInfo, scope: Scope) -> External:
+    def _external(self, name: str, info: FunctionInfo) -> External:
         """The C function: its interface text is `name(TYPE,&TYPE):RESULT`."""
         version = _VERSION.fullmatch(info.attributes.get("version", "1.0"))
         if version is None:
@@ -184,6 +187,16 @@ class Functions:
         major, minor = (int(part) for part in version.groups())
         text = interface_text(name.lower(), info.pou)
         return External(name.lower(), interface_signature(text), major << 16 | minor)
+
+    def _check_declared_once(self, external: External, pou: Pou) -> None:
+        """A device has one C function of a name."""
+        other = self._externals.setdefault(external.name, pou)
+        if other.external != external:
+            message = (
+                f"the C function {external.name} is {other.name} already, with other parameters or another version: "
+                "declare it once, and call that one"
+            )
+            self._world.diagnostics.error(pou.pos, "external", message)
 
 
 def interface_text(name: str, pou: Pou) -> str:
