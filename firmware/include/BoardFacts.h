@@ -26,6 +26,7 @@ typedef struct {
     RTS_UI32 sector_size;
     RTS_UI32 erased;              /* value of an erased byte */
     FILE_AREA file[FILE_COUNT];   /* where each FILE_* is in the flash */
+    FILE_AREA store;              /* FILE_CATALOG, two sectors, and FILE_STORE; no bytes without them */
     RTS_UI32 area[APP_AREA_CODE]; /* RAM of the areas data, retain, input, output, memory */
     RTS_UI32 code;                /* largest code segment; 0: what fits a slot */
     RTS_UI32 stack;               /* of a task, for its calls (without RTS_IEC_STACK_LOST); 0: not known */

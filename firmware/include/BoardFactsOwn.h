@@ -31,6 +31,8 @@ __attribute__((used, section("board_facts"), aligned(4))) static const BOARD_FAC
     .sector_size = BOARD_FLASH_SECTOR_SIZE,
     .erased = BOARD_FLASH_ERASED,
     .file = {FILE_MAP},
+    .store = {FILE_STORE_FILES > 0 ? BOARD_FLASH_SIZE - FILE_STORE_SIZE : 0,
+              FILE_STORE_FILES > 0 ? FILE_STORE_SIZE : 0},
     .area = {APP_DATA_SIZE, APP_RETAIN_SIZE, APP_INPUT_SIZE, APP_OUTPUT_SIZE, APP_MEMORY_SIZE},
     .code = APP_MAX_CODE_SIZE,
     .stack = RTS_IEC_STACK_SIZE - RTS_IEC_STACK_LOST,

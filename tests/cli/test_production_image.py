@@ -79,7 +79,8 @@ def test_bin_is_the_whole_flash_and_info_reads_it_back(tool: Any, scratch: Path,
     data = (scratch / "flash.bin").read_bytes()
     assert len(data) == SIZE
     assert data.startswith(image)
-    assert {piece["what"] for piece in document["pieces"]} == {"program", "empty slot", "commit log", "retain log"}
+    parts = ["program", "empty slot", "commit log", "retain log", "catalog of files"]
+    assert [piece["what"] for piece in document["pieces"]] == parts
     (program,) = tool("info", "flash.bin", "--json").json["programs"]
     described = tool("info", "app.cdl", "--json").json
     assert program["crc"] == described["crc"] == document["crc"]
@@ -109,6 +110,64 @@ def test_logs_of_a_used_device_are_overwritten(tool: Any, scratch: Path, for_m3:
         assert set(range(begin, begin + flash.files[file].size)) <= set(content.addresses())
     slot = FLASH + flash.files[lib.FILE_SLOT_B].offset
     assert all(content[address] == 0xFF for address in range(slot, slot + flash.sector_size))
+
+
+def test_files_of_a_used_device_are_forgotten(tool: Any, scratch: Path, for_m3: Path) -> None:
+    """A device that was tested has files and their catalog, which is a log."""
+    flash = next(board.flash for board in known_boards() if board.slug == "mps2-an385/full")
+    assert flash.store is not None and flash.store.offset + flash.store.size == flash.size
+    begin = FLASH + flash.store.offset
+    for name in ("flash.hex", "flash.bin"):
+        assert tool("image", "app.cdl", "--board", "mps2-an385/full", "-o", name).status == 0
+    content = IntelHex(str(scratch / "flash.hex"))
+    assert all(content[address] == 0xFF for address in range(begin, begin + 2 * flash.sector_size))
+    assert set(range(begin, begin + 2 * flash.sector_size)) <= set(content.addresses())
+    assert (scratch / "flash.bin").stat().st_size == flash.size
+
+
+DEEP = (
+    "PROGRAM Main VAR n : DINT; END_VAR VAR_TEMP t : ARRAY[0..1199] OF BYTE; END_VAR "
+    "MEMSET(ADR(t), DINT_TO_BYTE(n), SIZEOF(t)); n := n + t[n MOD 1200]; END_PROGRAM"
+)
+
+
+def test_a_program_that_fills_the_stack_is_refused(tool: Any, scratch: Path, build: Any) -> None:
+    """How much it needs is in its symbols; a C function that is not known makes that at least so much."""
+    build(DEEP, "--target", "cortex-m3")
+    command = ("image", "app.cdl", "--board", "mps2-an385/standard", "-o", "x.hex")
+    refused(tool(*command), "bytes of stack, the device has 944 (the deepest calls", "Main 12")
+    assert not (scratch / "x.hex").exists()
+    assert tool("image", "app.cdl", "--board", "mps2-an385/full", "-o", "x.hex", "--json").json["stack"]["bytes"] > 1200
+    own = "{attribute 'external' := 'own'} FUNCTION Own VAR_INPUT n : DINT; END_VAR END_FUNCTION "
+    build(own + "PROGRAM Main Own(1); END_PROGRAM", "--target", "cortex-m3")
+    assert "needs at least" in tool(*command).out
+
+
+def test_without_symbols_the_stack_is_said_not_to_be_known(
+    tool: Any, scratch: Path, build: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build(DEEP, "--target", "cortex-m3")
+    (scratch / "app.sym").unlink()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(scratch / "empty"))
+    done = tool("image", "app.cdl", "--board", "mps2-an385/standard", "-o", "x.hex")
+    assert done.status == 0 and "the symbols of the program are not found" in done.out
+
+
+def test_retain_variables_fit_a_half_of_their_log(tool: Any, scratch: Path, build: Any) -> None:
+    """However much RAM the firmware has for them."""
+    build(
+        "PROGRAM Main VAR RETAIN a : ARRAY[1..6000] OF BYTE; END_VAR END_PROGRAM",
+        "--target",
+        "cortex-m3",
+        "--no-limits",
+    )
+    known = next(board.flash for board in known_boards() if board.slug == "mps2-an385/standard")
+    files = [(part.offset, part.size) for part in known.files]
+    files[lib.FILE_RETAIN] = (files[lib.FILE_RETAIN][0], 10240)
+    areas = [16384, 8192, 64, 64, 64]
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard", area=areas, file=files)))
+    done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex")
+    refused(done, "It needs 6000 bytes of RETAIN variables, the device has 5100")
 
 
 def test_a_bin_without_firmware_erases_only_what_is_for_programs(scratch: Path, for_m3: Path) -> None:

@@ -12,6 +12,7 @@ from plctool.cli.image_documents import production
 from plctool.compiler import compile_sources
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
+from plctool.image.limits import Need
 from plctool.io.configuration import Configuration, ConnectorEntry, ParameterEntry
 from plctool.io.room import needs_of_io
 
@@ -170,6 +171,31 @@ def test_data_of_modbus_is_what_is_read_and_twice_what_is_written() -> None:
     assert needs["modbus_data"] == 3 + 200 + (6 + 2 * 20) + 2 * 2
     assert (needs["modbus_jobs"], needs["modbus_ranges"], needs["modbus_servers"]) == (3, 1, 1)
     assert needs["modbus_lines"] == 1 and "modbus_tcp" not in needs
+
+
+@pytest.mark.parametrize(
+    ("kinds", "needed"),
+    [("rrr", 3), ("rro", 2), ("orr", 3), ("oorooo", 3), ("ooo", 0), ("ror", 3), ("offr", 2)],
+)
+def test_optional_devices_count_if_a_required_one_comes_after_them(kinds: str, needed: int) -> None:
+    """r: required, o: optional, f: switched off."""
+    flags = {"r": lib.CF_ENABLE, "o": lib.CF_ENABLE | lib.CF_OPTIONAL, "f": 0}
+    line_of_all = ConnectorEntry("Line", "IoDrvModbus", lib.CT_MASTER, lib.CF_ENABLE)
+    devices = [ConnectorEntry("D", "IoDrvModbus", lib.CT_SLAVE, flags[kind], parent=0) for kind in kinds]
+    needs = needs_of_io(Configuration((line_of_all, *devices), ()))
+    assert needs.get("modbus_devices", Need(0)).amount == needed
+
+
+def test_devices_of_an_optional_line_are_optional() -> None:
+    optional = ConnectorEntry("Line", "IoDrvModbus", lib.CT_MASTER, lib.CF_ENABLE | lib.CF_OPTIONAL)
+    device_of_it = ConnectorEntry("D", "IoDrvModbus", lib.CT_SLAVE, lib.CF_ENABLE, parent=0)
+    assert needs_of_io(Configuration((optional, device_of_it), ())).keys() == {"connectors"}
+
+
+def test_optional_devices_of_a_program_take_the_room_of_those_after_them(refused: Any) -> None:
+    optional = line(*map(device, range(1, 6)), options="optional = true\n")
+    needed = line(*map(device, range(6, 11))).replace("COM2", "COM3")
+    assert "It needs 10 Modbus devices, the device has 8." in refused("mps2-an385/modbus", BITS, optional + needed)
 
 
 def test_more_devices_and_lines_than_the_firmware_has_room_for(refused: Any) -> None:

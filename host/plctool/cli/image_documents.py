@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 from plctool.cli.io_documents import Document, board_in
@@ -11,7 +12,9 @@ from plctool.files import read_image
 
 def production(image: Path, board: str | None, firmware: Path | None, output: Path) -> Document:
     """Writes what a programmer burns to `output`; "burn_at" is the address that a .bin belongs to, "burn_apart" the
-    firmware that cannot be in it. Raises UsageError when the parts do not go together."""
+    firmware that cannot be in it, "stack" what the program needs of it, if its symbols are found. Raises UsageError
+    when the parts do not go together."""
+    from plctool.debug.symbols import find_symbols
     from plctool.image.board import board_of, read_firmware
     from plctool.image.file import image_crc, parse_image, read_program
     from plctool.image.limits import needs_of_image
@@ -32,7 +35,10 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
     pieces = production_pieces(data, wanted, of_firmware)
     advice = "Make the program smaller, or use a firmware with more room."
     parsed = parse_image(data)
-    check_board(parsed, needs_of_image(parsed, len(data)), wanted, advice)
+    needs, stack = needs_of_image(parsed, len(data)), None
+    with suppress(UsageError):
+        stack = find_symbols(parsed.crc, image).stack
+    check_board(parsed, needs if stack is None else {**needs, "stack": stack}, wanted, advice)
     start = write_production(output, pieces, wanted)
     apart = None if firmware is None or wanted.flash.address is not None else str(firmware)
     return {
@@ -45,6 +51,7 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
         ],
         "burn_at": None if start is None else f"{start:08X}",
         "burn_apart": apart,
+        "stack": None if stack is None else {"bytes": stack.amount, "at_least": stack.at_least},
     }
 
 

@@ -230,6 +230,10 @@ def production_text(document: dict[str, Any]) -> str:
         lines.append(f"A .bin has no addresses: burn it at 0x{document['burn_at']}.")
     if document["burn_apart"]:
         lines.append(f"Programs have a memory of their own: burn {document['burn_apart']} into the processor as it is.")
+    if document["stack"] is None:
+        lines.append("Whether its stack is large enough is not known: the symbols of the program are not found.")
+    elif document["stack"]["at_least"]:
+        lines.append(f"The program needs at least {document['stack']['bytes']} bytes of stack; the sum is not known.")
     return "\n".join(lines)
 
 

@@ -99,7 +99,9 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
     built = build_image(image)
     symbols.image_crc = image_crc(built)
     sizes = code_sizes(symbols, len(linked.code))
-    return BuildResult(built, symbols, sizes, _needs(program, lowered, linked, image, len(built), sizes, options))
+    needs = _needs(program, lowered, linked, image, len(built), sizes, options)
+    symbols.stack = needs["stack"]
+    return BuildResult(built, symbols, sizes, needs)
 
 
 def _needs(

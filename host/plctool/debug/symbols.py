@@ -26,6 +26,7 @@ from plctool.files import write_atomically
 from plctool.iec.addresses import parse_address
 from plctool.iec.type_descriptions import DescribedTypes, describe
 from plctool.iec.types import ELEMENTARY, ArrayType, OpenArrayType, StructType
+from plctool.image.limits import Need
 from plctool.project import SYMBOL_SUFFIX
 
 if TYPE_CHECKING:
@@ -73,7 +74,8 @@ class SymbolTable:
     the next one. `aliases`: other names of variables. `classes`: the numbers by which instances show their class.
     `constants`: those that are not in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
     lose. `io`: devices and channels of inputs and outputs (`compiler/io_configuration.py`), empty for none. `bounds`:
-    what the code checks. `unkept`: variables of function blocks, by the name of the block, that live in registers."""
+    what the code checks. `unkept`: variables of function blocks, by the name of the block, that live in registers.
+    `stack`: what the deepest calls of a task need; None in a file of a version that did not say."""
 
     image_crc: int
     target: str
@@ -91,6 +93,7 @@ class SymbolTable:
     io: dict[str, Any] = field(default_factory=dict)
     bounds: list[BoundsCheck] = field(default_factory=list)
     unkept: dict[str, list[str]] = field(default_factory=dict)
+    stack: Need | None = None
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -258,6 +261,7 @@ class SymbolTable:
             "kept": [[k.name, k.type, k.persistent, k.size] for k in self.kept],
             "io": self.io,
             "bounds": [check.to_list() for check in self.bounds],
+            "stack": self.stack and {name: getattr(self.stack, name) for name in ("amount", "parts", "at_least")},
             "unkept": self.unkept,
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
@@ -291,6 +295,7 @@ class SymbolTable:
                 document.get("io", {}),
                 [BoundsCheck.from_list(entry) for entry in document.get("bounds", [])],
                 document.get("unkept", {}),
+                _read_need(document.get("stack")),
             )
         except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None
@@ -305,6 +310,12 @@ class SymbolTable:
             write_atomically(copy, text.encode())
         except (OSError, UsageError):
             return  # the cache only saves naming the file
+
+
+def _read_need(entry: dict[str, Any] | None) -> Need | None:
+    if entry is None:
+        return None
+    return Need(entry["amount"], tuple((name, amount) for name, amount in entry["parts"]), True, entry["at_least"])
 
 
 def _at_address(text: str) -> Symbol | None:

@@ -38,13 +38,23 @@ class Part:
 @dataclass(frozen=True)
 class Flash:
     """The flash that keeps programs. `address`: where it is in the memory of the processor; None if it is not memory.
-    `files`: by FILE_*."""
+    `files`: by FILE_*; `store`: the catalog, two sectors, and the files that tools keep there; None without."""
 
     address: int | None
     size: int
     sector_size: int
     erased: int
     files: tuple[Part, ...]
+    store: Part | None = None
+
+    def parts(self) -> tuple[Part, ...]:
+        """All that the runtime writes to."""
+        return self.files if self.store is None else (*self.files, self.store)
+
+    @property
+    def retained(self) -> int:
+        """Bytes of RETAIN variables that a half of their log has room for."""
+        return self.files[RETAIN].size // 2 - int(ffi.sizeof("FLASH_LOG_HEAD"))
 
 
 @dataclass(frozen=True)
@@ -126,7 +136,8 @@ def _all_facts() -> Iterator[Any]:
 def _board(facts: Any) -> Board:
     files = tuple(Part(int(f.offset), int(f.size)) for f in facts.file)
     address = int(facts.flash_address) if facts.has_address else None
-    flash = Flash(address, int(facts.flash_size), int(facts.sector_size), int(facts.erased), files)
+    store = Part(int(facts.store.offset), int(facts.store.size)) if facts.store.size else None
+    flash = Flash(address, int(facts.flash_size), int(facts.sector_size), int(facts.erased), files, store)
     slot = min(files[SLOT_A].size, files[SLOT_B].size) - ffi.sizeof("APP_SEAL")
     limits = {
         "tasks": int(facts.tasks),
@@ -136,6 +147,7 @@ def _board(facts: Any) -> Board:
         "image": slot,
     }
     limits |= {name: int(getattr(facts, name)) for name in ROOM}
+    limits["retain"] = min(limits["retain"], flash.retained)
     if facts.copies:
         limits["all_copies" if facts.copies_always else "copies"] = int(facts.copies)
     if facts.stack:

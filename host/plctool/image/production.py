@@ -4,8 +4,8 @@ Where programs have a memory of their own, such as a serial EEPROM, a file is wh
 are not those of the processor, so that the firmware is not in it, and only read for the facts of its board.
 
 It is what the device itself leaves after a download that was not started yet: the image and its seal in slot A, and a
-first commit record. What the programmer must not leave as it was is there as erased bytes: the logs, and the beginning
-of slot B.
+first commit record. What the programmer must not leave as it was is there as erased bytes: the logs, the catalog of
+files, and the beginning of slot B.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ _HEX_TYPE, _HEX_END = slice(7, 9), "01"  # where a line of a .hex says what it i
 _FIRST = 1  # number of the first seal, and of the first record
 _MOST_BIN = 64 * 1024 * 1024  # bytes; a file with more of them has mostly gaps
 _ALIGN = int(lib.FILE_ALIGN)
+_CATALOG_SECTORS = 2
 
 
 @dataclass(frozen=True)
@@ -75,9 +76,9 @@ def _check_apart(firmware: Firmware, flash: Flash, address: int) -> None:
 
 
 def _used(flash: Flash, address: int) -> list[tuple[int, int]]:
-    """Where programs and logs are: begin and end of each run of sectors."""
+    """Where programs, logs and files are: begin and end of each run of sectors."""
     runs: list[tuple[int, int]] = []
-    for file in sorted(flash.files, key=lambda file: file.offset):
+    for file in sorted(flash.parts(), key=lambda file: file.offset):
         begin, end = address + file.offset, address + file.offset + file.size
         if runs and runs[-1][1] == begin:
             begin = runs.pop()[0]
@@ -98,6 +99,9 @@ def _flash_pieces(image: bytes, board: Board) -> Iterator[Piece]:
     record = _commit_record(image, board)
     yield piece("commit log", COMMIT, record.ljust(flash.files[COMMIT].size, bytes([flash.erased])))
     yield piece("retain log", RETAIN, bytes([flash.erased]) * flash.files[RETAIN].size)
+    if flash.store is not None:
+        catalog = bytes([flash.erased]) * min(_CATALOG_SECTORS * flash.sector_size, flash.store.size)
+        yield Piece("catalog of files", Segment(base + flash.store.offset, catalog))
 
 
 def _seal(crc: int) -> bytes:

@@ -1,6 +1,7 @@
 """What the inputs and outputs of a program take of a firmware: drivers, and what these have room for.
 
-Optional devices do not count: the program runs without them.
+Drivers take devices in their order. So optional ones count where one that is required comes after them; of the others
+the program runs without those that find no room.
 """
 
 from __future__ import annotations
@@ -31,24 +32,41 @@ _OF_BITS = (lib.MODBUS_READ_COILS, lib.MODBUS_READ_DISCRETE_INPUTS, lib.MODBUS_W
 
 def needs_of_io(configuration: Configuration) -> dict[str, Need]:
     """What the drivers have to have room for, by the names of `ROOM`."""
-    found: Counter[str] = Counter(connectors=len(configuration.connectors))
-    for connector in required(configuration):
-        if connector.driver == GPIO:
-            found["gpio_groups"] += 1
-            found["events"] += sum(p.id - lib.GPIO_EVENT in range(lib.IO_GPIO_LINES) for p in connector.parameters)
-        elif connector.driver == MODBUS:
-            found += _of_line(connector) if connector.parent is None else _of_device(connector)
-    return {name: Need(amount) for name, amount in found.items()}
+    taken: Counter[str] = Counter()
+    needed: Counter[str] = Counter(connectors=len(configuration.connectors))
+    for connector, is_required in _used(configuration):
+        uses = _uses(connector)
+        taken += uses
+        if is_required:
+            needed |= Counter({name: taken[name] for name, amount in uses.items() if amount})
+    return {name: Need(amount) for name, amount in needed.items()}
 
 
 def required(configuration: Configuration) -> Iterator[ConnectorEntry]:
     """The connectors that the program does not run without."""
-    wanted: list[bool] = []
+    return (connector for connector, is_required in _used(configuration) if is_required)
+
+
+def _used(configuration: Configuration) -> Iterator[tuple[ConnectorEntry, bool]]:
+    """The connectors that are not switched off, and whether the program does not run without them."""
+    known: list[tuple[bool, bool]] = []
     for connector in configuration.connectors:
-        own = connector.flags & (lib.CF_ENABLE | lib.CF_OPTIONAL) == lib.CF_ENABLE
-        wanted.append(own and (connector.parent is None or wanted[connector.parent]))
-        if wanted[-1]:
-            yield connector
+        is_on, is_required = (True, True) if connector.parent is None else known[connector.parent]
+        is_on = is_on and bool(connector.flags & lib.CF_ENABLE)
+        is_required = is_required and is_on and not connector.flags & lib.CF_OPTIONAL
+        known.append((is_on, is_required))
+        if is_on:
+            yield connector, is_required
+
+
+def _uses(connector: ConnectorEntry) -> Counter[str]:
+    """What its driver takes for it."""
+    if connector.driver == GPIO:
+        events = sum(p.id - lib.GPIO_EVENT in range(lib.IO_GPIO_LINES) for p in connector.parameters)
+        return Counter(gpio_groups=1, events=events)
+    if connector.driver == MODBUS:
+        return _of_line(connector) if connector.parent is None else _of_device(connector)
+    return Counter()
 
 
 def _of_line(line: ConnectorEntry) -> Counter[str]:

@@ -13,10 +13,11 @@
 
 enum { UART_BAUD = 115200 };
 
-/* Empty when head == tail; positions run freely and are masked on use. */
-static struct {
-    volatile RTS_UI16 rx_head, rx_tail, tx_head, tx_tail;
-    volatile bool work;
+/* Empty when head == tail; positions run freely and are masked on use. A byte is stored before the head passes it: all
+ * of it is volatile, so that the compiler keeps that order for the interrupt. */
+static volatile struct {
+    RTS_UI16 rx_head, rx_tail, tx_head, tx_tail;
+    bool work;
     RTS_UI8 rx[BOARD_UART_RX_SIZE];
     RTS_UI8 tx[BOARD_UART_TX_SIZE];
 } line;
@@ -33,8 +34,10 @@ static void receive(void)
     if (SYSCOM_BYTE_TIMES)
         byte_ns = SysTimeGetNs();
     while (UartTake(&byte)) {
-        if ((RTS_UI16)(line.rx_head - line.rx_tail) < BOARD_UART_RX_SIZE)
-            line.rx[line.rx_head++ % BOARD_UART_RX_SIZE] = byte;
+        if ((RTS_UI16)(line.rx_head - line.rx_tail) < BOARD_UART_RX_SIZE) {
+            line.rx[line.rx_head % BOARD_UART_RX_SIZE] = byte;
+            line.rx_head++;
+        }
         line.work = true;
     }
 }
@@ -42,7 +45,8 @@ static void receive(void)
 static void transmit(void)
 {
     while (line.tx_head != line.tx_tail && UartHasRoom()) {
-        UartSend(line.tx[line.tx_tail++ % BOARD_UART_TX_SIZE]);
+        UartSend(line.tx[line.tx_tail % BOARD_UART_TX_SIZE]);
+        line.tx_tail++;
         line.work = true;
     }
 }
@@ -110,16 +114,20 @@ RTS_I64 SysComGetByteNs(RTS_UI32 index)
 RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 count = 0;
-    while (index == 0 && count < size && line.rx_head != line.rx_tail)
-        data[count++] = line.rx[line.rx_tail++ % BOARD_UART_RX_SIZE];
+    while (index == 0 && count < size && line.rx_head != line.rx_tail) {
+        data[count++] = line.rx[line.rx_tail % BOARD_UART_RX_SIZE];
+        line.rx_tail++;
+    }
     return count;
 }
 
 RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 count = 0;
-    while (index == 0 && count < size && (RTS_UI16)(line.tx_head - line.tx_tail) < BOARD_UART_TX_SIZE)
-        line.tx[line.tx_head++ % BOARD_UART_TX_SIZE] = data[count++];
+    while (index == 0 && count < size && (RTS_UI16)(line.tx_head - line.tx_tail) < BOARD_UART_TX_SIZE) {
+        line.tx[line.tx_head % BOARD_UART_TX_SIZE] = data[count++];
+        line.tx_head++;
+    }
     RTS_UI32 mask = CpuMask();
     transmit(); /* the interrupt comes only after bytes have left */
     CpuRestore(mask);

@@ -11,7 +11,7 @@
 /* To be called by the UART's interrupt, after what it does not clear by itself has been cleared. */
 void OneUartInterrupt(void);
 
-/* ---- what the board writes; all but UartStart and UartStop with interrupts masked ---- */
+/* ---- what the board writes; all but UartStart, UartStop and UartIsOn with interrupts masked ---- */
 
 /* Forgets what is in the FIFOs, and sends and receives from now on, with an interrupt for a received byte and for room to
  * send. False when it cannot run like that. */

@@ -36,7 +36,11 @@
 /* 1: IEC code may write its areas and its stack only, and meets an exception elsewhere, if the chip can protect memory
  * (SysExcept.c). 0: it may write all RAM and each peripheral. */
 #ifndef RTS_IEC_UNPRIVILEGED
+#ifdef __ARM_ARCH_6M__ /* the handler of gates is for Armv7-M (cortexm/SysExcept.c) */
+#define RTS_IEC_UNPRIVILEGED 0
+#else
 #define RTS_IEC_UNPRIVILEGED 1
+#endif
 #endif
 
 /* Stack of the application code of one task, bytes. RTS_IEC_UNPRIVILEGED 1: a power of 2; 0: a multiple of 32, which are

@@ -36,6 +36,7 @@ enum { TIMER_ONE_SHOT = 1, TIMER_TIME_OUT = 1, WATCHDOG_INTEN_RESEN = 3, STATUS_
 /* Where nothing is there is a bus fault; not in QEMU, which swallows writes. Below the RAM a large frame would pass all
  * stacks unnoticed; the upper half of the addresses is where wild pointers lead. */
 enum { MPU_BELOW_RAM = MPU_BOARD, MPU_UPPER_HALF = MPU_BOARD + 1 };
+RTS_STATIC_ASSERT(MPU_UPPER_HALF < 8, the_mpu_has_two_regions_left);
 
 /* 200 MHz of the PLL, from the crystal of 8 MHz, divided by 4. */
 static void start_clock(void)

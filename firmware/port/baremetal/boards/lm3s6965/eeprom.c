@@ -36,14 +36,17 @@ enum { RUN = 1, START = 2, STOP = 4, ACK = 8 }; /* written to MCS */
 enum { BUSY = 1, ERROR = 2 };                   /* read from it */
 enum { CHIP_WRITE = 0x50 << 1, CHIP_READ = CHIP_WRITE | 1, PAGE_SIZE = 128 };
 enum { SECTOR_SIZE = BOARD_FLASH_SECTOR_SIZE, PROGRAM_SIZE = 4, ERASED = BOARD_FLASH_ERASED };
-enum { BUSY_TRIES = 1000 }; /* a page takes 5 ms, a refused address 25 us */
+enum { BUSY_TRIES = 1000 };   /* a page takes 5 ms, a refused address 25 us */
+enum { STEP_TRIES = 100000 }; /* some 10 ms, a byte takes 25 us: a bus whose clock is held low is never ready */
 
 static bool step(RTS_UI32 what)
 {
+    RTS_UI32 tries = STEP_TRIES;
+
     I2C_MCS = what;
-    while ((I2C_MCS & BUSY) != 0)
+    while ((I2C_MCS & BUSY) != 0 && --tries != 0)
         ;
-    return (I2C_MCS & ERROR) == 0;
+    return tries != 0 && (I2C_MCS & ERROR) == 0;
 }
 
 /* Sends the address of a byte. While it writes a page the chip answers to nothing. */

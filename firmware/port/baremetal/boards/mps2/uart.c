@@ -26,8 +26,9 @@ typedef struct {
 
 typedef struct {
     RING rx, tx;
-    RTS_UI8 rx_data[BOARD_UART_RX_SIZE];
-    RTS_UI8 tx_data[BOARD_UART_TX_SIZE];
+    volatile RTS_UI8
+        rx_data[BOARD_UART_RX_SIZE]; /* as the positions, so that a byte is stored before the head passes it */
+    volatile RTS_UI8 tx_data[BOARD_UART_TX_SIZE];
 } LINE;
 
 RTS_STATIC_ASSERT((BOARD_UART_RX_SIZE & (BOARD_UART_RX_SIZE - 1)) == 0, rx_size_is_a_power_of_two);

@@ -32,27 +32,28 @@
 #define GPIOA_BSRR REG32(0x40020018u)
 
 enum { CR_HSEON = 1 << 16, CR_HSERDY = 1 << 17, CR_PLLON = 1 << 24, CR_PLLRDY = 1 << 25 };
-/* 25 MHz / 25 * 336 / 2 = 168 MHz; / 7 = 48 MHz. */
-enum { PLL_168MHZ = 25 | 336 << 6 | 0 << 16 | 1 << 22 | 7 << 24 };
+/* 1 MHz * 336 / 2 = 168 MHz; / 7 = 48 MHz: from the crystal of 25 MHz, or the oscillator of 16 MHz in the chip. */
+enum { PLL_168MHZ = 336 << 6 | 0 << 16 | 7 << 24, PLL_OF_CRYSTAL = 25 | 1 << 22, PLL_OF_CHIP = 16 };
 enum { CFGR_APB1_42MHZ_APB2_84MHZ = 5 << 10 | 4 << 13, CFGR_PLL = 2, CFGR_ON_PLL = 2 << 2 };
 enum { ACR_5_WAIT_STATES_AND_CACHES = 5 | 7 << 8 };
 enum { CSR_WATCHDOG = 1 << 29, CSR_FORGET = 1 << 24 };
-enum { CR1_ENABLE = 1, CR1_URS = 1 << 2, CR1_ONE_PULSE = 1 << 3, DIER_UPDATE = 1, EGR_UPDATE = 1 };
+enum { CR1_ENABLE = 1, CR1_ONE_PULSE = 1 << 3, DIER_UPDATE = 1, EGR_UPDATE = 1 };
 enum { TIMER_CLOCK_MHZ = 84 };
 enum { LAMP_PIN = 10 };
-enum { CLOCK_TRIES = 100000 }; /* some 10 ms: a crystal that does not start leaves the chip with its internal clock */
+enum { CLOCK_TRIES = 100000 }; /* some 10 ms */
 
-static void wait_for(volatile RTS_UI32 *word, RTS_UI32 bits, RTS_UI32 value)
+static bool wait_for(volatile RTS_UI32 *word, RTS_UI32 bits, RTS_UI32 value)
 {
     for (RTS_UI32 i = 0; i < CLOCK_TRIES && (*word & bits) != value; i++)
         ;
+    return (*word & bits) == value;
 }
 
+/* Without the crystal the rate is the same, within 1 % at room temperature. */
 static void start_clock(void)
 {
     RCC_CR |= CR_HSEON;
-    wait_for(&RCC_CR, CR_HSERDY, CR_HSERDY);
-    RCC_PLLCFGR = PLL_168MHZ;
+    RCC_PLLCFGR = PLL_168MHZ | (wait_for(&RCC_CR, CR_HSERDY, CR_HSERDY) ? PLL_OF_CRYSTAL : PLL_OF_CHIP);
     RCC_CR |= CR_PLLON;
     wait_for(&RCC_CR, CR_PLLRDY, CR_PLLRDY);
     FLASH_ACR = ACR_5_WAIT_STATES_AND_CACHES;
@@ -64,6 +65,7 @@ static void start_timers(void)
 {
     enum { APB1_TIM2 = 1 << 0, APB1_TIM5 = 1 << 3 };
     RCC_APB1ENR |= APB1_TIM2 | APB1_TIM5;
+    (void)RCC_APB1ENR; /* a device may miss a write right after it is switched on (errata sheet of the chip) */
     TIM_PSC(TIM2) = TIMER_CLOCK_MHZ - 1;
     TIM_ARR(TIM2) = 0xFFFFFFFFu;
     TIM_EGR(TIM2) = EGR_UPDATE;
@@ -90,14 +92,17 @@ RTS_UI32 BoardMicroseconds(void)
 }
 
 /* When it ends is set last, while it counts: QEMU forgets a time that is over before the timer is on. If what was set
- * before ends it in between, the alarm is early. */
+ * before ends it in between, the alarm is early. If the counter has passed the new end by then, it is now. */
 void BoardAlarmSet(RTS_UI32 ns)
 {
     enum { STEP_NS = 125, TICKS_OF_TWO_STEPS = 2 * STEP_NS * TIMER_CLOCK_MHZ / 1000 };
-    TIM_CR1(TIM5) = CR1_URS;
+    RTS_UI32 end = ns / STEP_NS * TICKS_OF_TWO_STEPS / 2 + 1;
+    TIM_CR1(TIM5) = 0;
     TIM_CNT(TIM5) = 0;
-    TIM_CR1(TIM5) = CR1_ENABLE | CR1_URS | CR1_ONE_PULSE;
-    TIM_ARR(TIM5) = ns / STEP_NS * TICKS_OF_TWO_STEPS / 2 + 1;
+    TIM_CR1(TIM5) = CR1_ENABLE | CR1_ONE_PULSE;
+    TIM_ARR(TIM5) = end;
+    if (TIM_CNT(TIM5) > end)
+        TIM_EGR(TIM5) = EGR_UPDATE;
 }
 
 void AlarmIrq(void)

@@ -36,15 +36,18 @@ void UartInit(void)
     enum { AHB1_GPIOA_GPIOB = 3, APB2_USART1 = 1 << 4, TX_PIN = 9, RX_PIN = 7 };
     RCC_AHB1ENR |= AHB1_GPIOA_GPIOB;
     RCC_APB2ENR |= APB2_USART1;
+    (void)RCC_APB2ENR; /* as in start_timers of board.c */
     give_pin(GPIOA, TX_PIN);
     give_pin(GPIOB, RX_PIN);
     IrqEnable(IRQ_USART1, LEVEL_DEVICE);
 }
 
-/* Room to send interrupts as long as there is some: each byte that is sent asks for the next interrupt. */
+/* Room to send interrupts as long as there is some: each byte that is sent asks for the next interrupt, and a received
+ * byte in between does not take that back. */
 void UartIrq(void)
 {
-    USART_CR1 &= ~(RTS_UI32)CR1_IRQ_ROOM;
+    if (UartHasRoom())
+        USART_CR1 &= ~(RTS_UI32)CR1_IRQ_ROOM;
     OneUartInterrupt();
 }
 
