@@ -34,6 +34,7 @@ class Effects:
     def __init__(self) -> None:
         self._local: dict[Pou, bool] = {}
         self._addressed: dict[Pou, set[Variable]] = {}
+        self._renewing: dict[Pou, bool] = {}
 
     def is_local(self, pou: Pou) -> bool:
         """Whether a call touches nothing but the callee's own variables and its arguments."""
@@ -54,6 +55,14 @@ class Effects:
         if isinstance(node, FbCall):
             return node.dispatch is None and self.is_local(node.block)
         return not isinstance(node, DerefPlace | SelfPlace)
+
+    def renews_in_outs(self, pou: Pou) -> bool:
+        """Whether a block gives its base other VAR_IN_OUTs than it was called with: SUPER^(io := x)."""
+        known = self._renewing.get(pou)
+        if known is None:
+            calls = (node for node in walk(pou.body) if isinstance(node, FbCall) and node.in_outs)
+            known = self._renewing[pou] = any(isinstance(call.instance, SelfPlace) for call in calls)
+        return known
 
     def owns_loop_variable(self, loop: For, pou: Pou) -> Variable | None:
         """The FOR variable when nothing but the loop itself can write it while the loop runs."""

@@ -12,7 +12,7 @@ from plctool.compiler.codegen import (  # noqa: F401  their rules
 from plctool.compiler.codegen.lower_blocks import take_inputs
 from plctool.compiler.codegen.lower_frame import NO_CAPACITY, Body, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise
-from plctool.compiler.codegen.lower_string import copy_string
+from plctool.compiler.codegen.lower_string import copy_string, empty_string
 from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import (
     CONTEXT,
@@ -25,8 +25,8 @@ from plctool.compiler.codegen.signatures import (
     result_in_memory,
     returned_variable,
 )
-from plctool.compiler.typed import Pou, PouKind, Variable, VarPlace
-from plctool.iec.types import StringType, is_scalar
+from plctool.compiler.typed import Direction, Pou, PouKind, Variable, VarPlace
+from plctool.iec.types import OpenArrayType, StringType, is_scalar
 
 
 def write_body(frame: Body) -> None:
@@ -35,6 +35,7 @@ def write_body(frame: Body) -> None:
     assert pou is not None
     if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
         _take_parameters(frame, pou)
+        _begin_outputs(frame, pou)
     for var in frame.unit.transient.get(pou, ()):
         frame.locals[var] = _stack_memory(frame, var)
     take_inputs(frame, pou)
@@ -77,6 +78,21 @@ def _stack_memory(frame: Body, var: Variable) -> Ref:
     if is_scalar(t):
         return frame.scalar(t)
     return Ref(frame.fn.alloca(t.size, t.align), 0, t, direct=True, capacity=string_capacity(t))
+
+
+def _begin_outputs(frame: Body, pou: Pou) -> None:
+    """Outputs start at their initial values, as locals do, but for those of any length (ARRAY[*]). Inputs have been
+    taken, also from the same variables."""
+    for parameter in pou.parameters:
+        var = parameter.variable
+        if parameter.direction is not Direction.OUTPUT or pou.no_init or isinstance(var.type, OpenArrayType):
+            continue
+        ref = frame.locals[var]
+        if isinstance(var.type, StringType):
+            empty_string(frame, ref)
+        else:
+            frame.clear(ref)
+        initialise(frame, ref, var.initial)
 
 
 def _take_parameters(frame: Body, pou: Pou) -> None:

@@ -14,10 +14,11 @@ from plctool.compiler.codegen.lengths import (
 from plctool.compiler.codegen.lower_arith import convert, is_bool, to_bool
 from plctool.compiler.codegen.lower_frame import Body, Frame, Ref
 from plctool.compiler.codegen.lower_places import materialised
-from plctool.compiler.codegen.lower_string import append_string, move_characters
+from plctool.compiler.codegen.lower_string import append_string, copy_string, move_characters
 from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import CONTEXT, parameter_types, returned_type, returned_variable
 from plctool.compiler.typed import (
+    AssignedValue,
     Call,
     Const,
     Direction,
@@ -29,7 +30,8 @@ from plctool.compiler.typed import (
     Pou,
     VarPlace,
 )
-from plctool.iec.types import BOOL, StringType, is_scalar
+from plctool.compiler.typed_nodes import walk
+from plctool.iec.types import BOOL, OpenArrayType, StringType, is_scalar
 
 _LONGEST = 32_767  # characters that LEN gives
 
@@ -57,8 +59,8 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
         arguments.append(f"ptr {frame.address(result)}")
         arguments += [f"i32 {_result_capacity(frame, pou, result)}"] if pou.cuts_result else []
     given = [
-        _operand(frame, pou, parameter, argument, write_back)
-        for parameter, argument in zip(pou.parameters, e.args, strict=True)
+        _operand(frame, pou, parameter, argument, write_back, lasting=may_write(frame, *e.args[n:]))
+        for n, (parameter, argument) in enumerate(zip(pou.parameters, e.args, strict=True), 1)
     ]
     if takes_lengths(pou) and all(frame.length(ref) for ref in given if isinstance(ref, Ref)):
         form = Form.MEASURED
@@ -165,9 +167,15 @@ def _call_instruction(
 
 
 def _operand(
-    frame: Frame, pou: Pou, parameter: Parameter, argument: Expr | Place | None, write_back: list[tuple[Ref, Ref]]
+    frame: Frame,
+    pou: Pou,
+    parameter: Parameter,
+    argument: Expr | Place | None,
+    write_back: list[tuple[Ref, Ref]],
+    *,
+    lasting: bool,
 ) -> Operand:
-    """What carries one argument."""
+    """What carries one argument. `lasting`: an argument after it may change what it was made of."""
     t = parameter.variable.type
     if argument is None:  # an output that is not used
         ref = frame.temporary(t)
@@ -175,6 +183,8 @@ def _operand(
         if is_scalar(t) and not parameter.by_reference:
             return frame.value(argument)
         ref = _aligned(frame, materialised(frame, argument))
+        if lasting and isinstance(argument, Load):
+            ref = copied(frame, ref)
     else:
         ref = frame.ref(argument)
         if parameter.direction is Direction.INPUT and is_scalar(t) and not parameter.by_reference:
@@ -190,7 +200,35 @@ def _operand(
             if parameter.direction is not Direction.INPUT:
                 write_back.append((temporary, ref))
             ref = temporary
+        if lasting and parameter.direction is Direction.INPUT:
+            ref = copied(frame, ref)
     return ref
+
+
+def may_write(frame: Frame, *nodes: Expr | Place | None) -> bool:
+    """Whether something may change variables when it is worked out, other than those of what it calls."""
+    return any(_writes(frame, part) for node in nodes if node is not None for part in walk(node))
+
+
+def _writes(frame: Frame, node: object) -> bool:
+    if not isinstance(node, Call):
+        return isinstance(node, AssignedValue)
+    return node.instance is not None or not _leaves_strings(frame, node)
+
+
+def copied(frame: Frame, ref: Ref) -> Ref:
+    """A copy of what is not a scalar, if it is known how large it is."""
+    if is_scalar(ref.type) or isinstance(ref.type, OpenArrayType):
+        return ref
+    if not isinstance(ref.type, StringType):
+        copy = frame.temporary(ref.type)
+        frame.copy(copy, ref, ref.type.size)
+    elif ref.capacity.constant is not None:
+        copy = frame.temporary(StringType(ref.capacity.constant, ref.type.wide))
+        copy_string(frame, copy, ref)
+    else:
+        copy = ref
+    return copy
 
 
 def _values(frame: Frame, operand: Operand, form: Form) -> list[Value]:

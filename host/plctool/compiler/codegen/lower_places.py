@@ -10,6 +10,7 @@ from plctool.compiler.codegen.lower_frame import (
     ACCESS_VIOLATION,
     ARRAY_BOUNDS,
     REFS,
+    Body,
     Frame,
     Ref,
     rule,
@@ -25,6 +26,7 @@ from plctool.compiler.typed import (
     IndexPlace,
     MemberPlace,
     Pos,
+    Pou,
     PouKind,
     SelfPlace,
     Storage,
@@ -51,10 +53,15 @@ def variable(frame: Frame, place: VarPlace) -> Ref:
         tag = frame.unit.member_tag(frame.pou.instance, var.offset)
         return Ref(SELF, var.offset, t, tag, True, string_capacity(t))
     if var.storage is Storage.REFERENCE and var not in frame.locals:
-        if frame.pou is not None and frame.pou.kind is PouKind.METHOD:
+        if frame.pou is not None and (frame.pou.kind is PouKind.METHOD or _may_change(frame, frame.pou)):
             return _unsure_reference(frame, var, place.pos)
         frame.locals[var] = _stored_reference(frame, var)
     return frame.locals[var]
+
+
+def _may_change(frame: Frame, pou: Pou) -> bool:
+    """Whether a VAR_IN_OUT may be another variable later in the body of a block."""
+    return isinstance(frame, Body) and frame.effects.renews_in_outs(pou)
 
 
 def _stored_reference(frame: Frame, var: Variable) -> Ref:

@@ -190,7 +190,8 @@ def intrinsic(op: Intrinsic, values: list[Value], t: Type) -> Value | None:
         return values[2] if values[0] else values[1]
     if op is Intrinsic.MUX:
         assert isinstance(values[0], int)
-        return values[1 + min(max(values[0], 0), len(values) - 2)]
+        others = len(values) - 2
+        return values[1 + (values[0] if 0 <= values[0] < others else others)]
     numbers = [v for v in values if not isinstance(v, str)]
     if not isinstance(base, Elementary) or len(numbers) < len(values):
         return None

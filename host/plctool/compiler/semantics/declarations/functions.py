@@ -169,7 +169,8 @@ class Functions:
                 if not scope.declare(symbol, offset):
                     continue
                 storage = Storage.REFERENCE if by_reference else Storage.LOCAL
-                symbol.variable = Variable(name, t, storage, symbol.pos)
+                initial = default if direction is Direction.OUTPUT else None
+                symbol.variable = Variable(name, t, storage, symbol.pos, initial=initial)
                 info.parameters.append((symbol, direction))
                 info.pou.parameters.append(Parameter(symbol.variable, direction, by_reference))
 

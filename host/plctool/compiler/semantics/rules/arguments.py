@@ -37,8 +37,11 @@ from plctool.compiler.typed import (
     Load,
     Parameter,
     Place,
+    Pou,
+    PouKind,
     ScalarInit,
     ValuePlace,
+    Variable,
     VarPlace,
 )
 from plctool.compiler.typed_nodes import is_unaligned
@@ -279,9 +282,12 @@ def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
         e = e if takes_array(t, e.type) else c.coerce(e, t)
         return e if may_copy(c, e, node.pos) else error_value(c.pos(node.pos))
     place = referenced_place(c, node, t.target, name, output=False)
-    if place is not None and is_unaligned(place):
+    if place is None:
+        return error_value(c.pos(node.pos))
+    if is_unaligned(place):
         return c.error(node.pos, "type", packed(place, "a reference"))
-    return error_value(c.pos(node.pos)) if place is None else refer(place, t)
+    short = too_short(c, place, t.target)
+    return c.error(node.pos, "type", f"{t} may write so many characters: {short}") if short else refer(place, t)
 
 
 def _is_slip(c: Checker, node: ast.Expr, t: Type, name: str) -> bool:
@@ -294,6 +300,22 @@ def _is_slip(c: Checker, node: ast.Expr, t: Type, name: str) -> bool:
     ):
         return False
     return node.left.name.casefold() == name.casefold()
+
+
+def too_short(c: Checker, place: Place, t: Type) -> str:
+    """Why a string cannot be written as one of the type `t` by what keeps its address; "" if it can."""
+    if not isinstance(place.type, StringType) or not isinstance(t, StringType):
+        return ""
+    if isinstance(place, VarPlace) and _has_any_length(c.scope.pou, place.var):
+        return f"how long the variable of the caller is, is not known; copy it to a variable of type {t}"
+    return f"{place.type} is too short" if place.type.length < t.length else ""
+
+
+def _has_any_length(pou: Pou | None, variable: Variable) -> bool:
+    """Whether a string is passed to a function by its address, with its length."""
+    if pou is None or pou.kind not in (PouKind.FUNCTION, PouKind.METHOD):
+        return False
+    return any(parameter.by_reference and parameter.variable is variable for parameter in pou.parameters)
 
 
 def packed(place: Place, what: str) -> str:

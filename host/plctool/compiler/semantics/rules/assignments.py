@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from plctool.compiler.semantics.checker import Checker, checks, checks_statement
 from plctool.compiler.semantics.conversions import error_value
+from plctool.compiler.semantics.once import calls, kept_value
 from plctool.compiler.semantics.rules.arguments import input_value, parameter_names
 from plctool.compiler.semantics.rules.builtin import attempt
 from plctool.compiler.semantics.rules.call_statements import enabled, has_enable
@@ -36,12 +37,15 @@ def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
         if has_enable(node.value, declared):
             return enabled(c, node.value, declared, lambda plain: assignment(c, replace(node, value=plain)))
     result: list[Statement] = []
-    source: ast.Expr = node.value
-    for target in reversed(node.targets):
-        statement = _assign_one(c, target, source, c.pos(node.pos))
+    source, known = node.value, None
+    for number, target in enumerate(reversed(node.targets), 1):
+        statement = _assign_one(c, target, source, c.pos(node.pos), known)
+        source, known = target, None
+        if isinstance(statement, Assign) and number < len(node.targets) and calls(statement.target):
+            first, known = kept_value(c, statement.value)
+            statement = replace(statement, value=first)
         if statement is not None:
             result.append(statement)
-        source = target
     return result
 
 
@@ -63,7 +67,10 @@ def assigned_value(c: Checker, node: ast.Assigned, expected: Type | None) -> Exp
     return AssignedValue(assignment, t, pos)
 
 
-def _assign_one(c: Checker, target: ast.Expr, source: ast.Expr, pos: Pos) -> Statement | None:
+def _assign_one(
+    c: Checker, target: ast.Expr, source: ast.Expr, pos: Pos, known: Expr | None = None
+) -> Statement | None:
+    """`known`: the value of `source`, if it is not to be worked out again."""
     bound = assigned_property(c, target)
     if bound is not None:
         return assign_property(c, bound, target, source, pos)
@@ -71,7 +78,7 @@ def _assign_one(c: Checker, target: ast.Expr, source: ast.Expr, pos: Pos) -> Sta
     if place is None:
         c.expr(source)
         return None
-    value = c.coerce(c.expr(source, place.type), place.type)
+    value = c.coerce(c.expr(source, place.type) if known is None else known, place.type)
     if value.type is ERROR:
         return None
     if isinstance(place.type, OpenArrayType):

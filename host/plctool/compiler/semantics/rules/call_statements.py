@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from plctool.compiler.semantics.checker import Checker, checks_statement
 from plctool.compiler.semantics.conversions import elementary, load, place_of, same_type, whole
 from plctool.compiler.semantics.generics import handed_bounds
+from plctool.compiler.semantics.once import kept_place
 from plctool.compiler.semantics.rules.arguments import (
     bind,
     input_value,
@@ -19,6 +20,7 @@ from plctool.compiler.semantics.rules.arguments import (
     parameter_names,
     referenced_place,
     split_enable,
+    too_short,
 )
 from plctool.compiler.semantics.rules.calls import body_dispatch, call, called_variable
 from plctool.compiler.semantics.rules.members import bound_member, called_program, is_called_by_name, variable_value
@@ -45,8 +47,8 @@ from plctool.compiler.typed import (
     UnaryOp,
     Variable,
 )
-from plctool.compiler.typed_nodes import is_unaligned
-from plctool.iec.types import BOOL, StringType, StructType
+from plctool.compiler.typed_nodes import is_unaligned, walk
+from plctool.iec.types import BOOL, StructType
 
 # ---- instances and programs ----
 
@@ -58,7 +60,7 @@ class _Arguments:
     inputs: list[tuple[Variable, Expr]] = field(default_factory=list)
     in_outs: list[tuple[Variable, Place]] = field(default_factory=list)
     outputs: list[tuple[Variable, Place]] = field(default_factory=list)
-    after: list[Statement] = field(default_factory=list)  # outputs that need a conversion
+    after: list[Assign] = field(default_factory=list)  # outputs that need a conversion
 
 
 def program_call(c: Checker, call: ast.Call, program: ProgramInfo) -> list[Statement]:
@@ -143,13 +145,18 @@ def block_call(c: Checker, call: ast.Call, instance: Expr) -> list[Statement]:
     handed = _block_arguments(c, block, bound, call, place)
     if handed is None:
         return []
-    statement = FbCall(block.pou, place, handed.inputs, handed.in_outs, handed.outputs, pos)
+    before, named = kept_place(c, place) if handed.after else ([], place)
+    for taken in handed.after:
+        for part in walk(taken.value):
+            if isinstance(part, MemberPlace) and part.base is place:
+                part.base = named
+    statement = FbCall(block.pou, named, handed.inputs, handed.in_outs, handed.outputs, pos)
     statement.dispatch = body_dispatch(c, block, place)
     if not isinstance(place, DerefPlace):
         c.world.calls.add(c.scope.pou, block.pou, pos)
     if isinstance(place, DerefPlace) or statement.dispatch is not None:
         c.world.dispatches.note_other_call(c.scope.pou, block.pou, statement.dispatch, pos)
-    return [statement, *handed.after]
+    return [*before, statement, *handed.after]
 
 
 def _block_arguments(
@@ -189,10 +196,9 @@ def _block_in_out(
     if place is not None and is_unaligned(place):
         c.error(argument.pos, "type", packed(place, f"the VAR_IN_OUT {name} of an instance"))
         return None
-    if place is None or not isinstance(place.type, StringType) or not isinstance(variable.type, StringType):
-        return place
-    if place.type.length < variable.type.length:
-        c.error(argument.pos, "type", f"the VAR_IN_OUT {name} is {variable.type}, {place.type} is too short")
+    short = "" if place is None else too_short(c, place, variable.type)
+    if short:
+        c.error(argument.pos, "type", f"the VAR_IN_OUT {name} is {variable.type}, {short}")
         return None
     return place
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, error_value, is_untyped, load, settle
+from plctool.compiler.semantics.once import calls, kept_value
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.rules.literals import common_of, untyped_bits
 from plctool.compiler.semantics.rules.operators import fold_unary, operate
@@ -132,8 +132,12 @@ def _pair(c: Checker, f: Applied) -> Expr:
 
 def _chain(c: Checker, f: Applied) -> Expr:
     """`GT(a, b, c)` is `a > b AND b > c`."""
-    result = operate(c, _CHAINS[f.name], f.args[0], f.args[1], f.node.pos)
-    for left, right in pairwise(f.args[1:]):
+    inner = [(e, e) for e in f.args[1:-1]]
+    if any(map(calls, f.args)):
+        inner = [kept_value(c, settle(e)) for e, _ in inner]
+    rights, lefts = ([*(pair[n] for pair in inner), f.args[-1]] for n in (0, 1))
+    result = operate(c, _CHAINS[f.name], f.args[0], rights[0], f.node.pos)
+    for left, right in zip(lefts, rights[1:], strict=False):
         more = operate(c, _CHAINS[f.name], left, right, f.node.pos)
         result = operate(c, BinaryOp.AND, result, more, f.node.pos)
     return result
