@@ -7,8 +7,6 @@
 #include "BareMetal.h"
 #include "SysFlash.h"
 
-RTS_STATIC_ASSERT(APP_MAX_CODE_SIZE == 0, the_size_is_for_code_in_ram);
-
 const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
 {
     const SYS_FLASH *flash = SysFlashGet();

@@ -11,7 +11,9 @@
 #define APP_MAX_TASKS 4
 #define APP_MAX_IMPORTS 64
 #define APP_DATA_SIZE 16384
-#define APP_MAX_CODE_SIZE 8192 /* CodeInRam.c */
+#ifndef APP_MAX_CODE_SIZE
+#define APP_MAX_CODE_SIZE 8192 /* CodeInRam.c; 0 with CodeInPlace.c */
+#endif
 #define APP_RETAIN_SIZE 2048
 #define APP_MEMORY_SIZE 1024
 #define APP_UNPACK_SIZE 8192
