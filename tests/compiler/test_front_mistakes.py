@@ -17,6 +17,7 @@ VARIABLES = (
     "a, b : INT; x, y : BOOL; r : REAL; s : STRING; t : TIME; tm : TON; arr : ARRAY[1..9] OF INT; v : Valve; "
     "p : POINTER TO INT;"
 )
+TASKS = "tasks and what they run stand in CONFIGURATION C RESOURCE R ON PLC ... END_RESOURCE END_CONFIGURATION"
 BODY = 14  # the line where a case stands
 DECLARE = "variables are declared in VAR ... END_VAR before the statements: c : INT;"
 CHOICE = "a choice is written CASE a OF 1: ...; ELSE ...; END_CASE"
@@ -267,3 +268,41 @@ def test_mistakes_that_leave_a_sentence_open_are_said_first(body: str, said: str
 )
 def test_more_mistakes_in_a_declaration_say_what_to_write(line: str, said: str) -> None:
     assert in_declaration(line) == [said]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "TASK Cyc(INTERVAL := T#10ms);\nPROGRAM P1 WITH Cyc : Main;\n",
+            ["tasks and what they run stand in CONFIGURATION C RESOURCE R ON PLC ... END_RESOURCE END_CONFIGURATION"]
+            * 2,
+        ),
+        ("TEST counts\n", ["the name of a test is a text: TEST 'counts'"]),
+        (
+            "PROGRAM P VAR n : INT; END_VAR\nTRY\nn := 1;\nCATCH e\nn := 2;\nEND_TRY\nEND_PROGRAM\n",
+            ["exceptions are caught by __TRY ... __CATCH(e) ... __ENDTRY"] * 3,
+        ),
+        (
+            "TYPE T : STRUCT x : INT; END_STRUCT END_TYPE\nPROGRAM P VAR p : T := {x := 1}; END_VAR END_PROGRAM",
+            ["the members of a structure are written in parentheses: (x := 1)"],
+        ),
+        (
+            "CONFIGURATION C RESOURCE R ON D TASK E(EVENT := door); END_RESOURCE END_CONFIGURATION",
+            ["EVENT is the name of an external event, in quotes: 'door'"],
+        ),
+    ],
+)
+def test_mistakes_outside_of_bodies_say_what_to_write(text: str, said: list[str]) -> None:
+    assert [message.split(": ", 1)[1] for message in messages(text)][: len(said)] == said
+
+
+def test_mistakes_with_types_say_what_to_write() -> None:
+    types = "INTERFACE I_M END_INTERFACE\nFUNCTION_BLOCK M IMPLEMENTS I_M END_FUNCTION_BLOCK\n"
+    body = "PROGRAM P VAR m : M; i : I_M; n : INT; t : TIME; s : STRING; END_VAR\n"
+    body += "i := ADR(m);\nt := n;\nIF s[0] = 'a' THEN n := 1; END_IF\nEND_PROGRAM"
+    assert [message.split(": ", 1)[1] for message in messages(types + body)] == [
+        "POINTER TO M does not fit I_M; assign the instance itself, without ADR",
+        "INT does not fit TIME; multiply a duration, such as T#1s, by it, or write INT_TO_TIME(...)",
+        "= cannot compare BYTE with STRING[1]; a character of a string is a number here: write 16#61 for 'a'",
+    ]

@@ -10,11 +10,13 @@ from plctool.project import IMAGE_SUFFIX
 
 _LATER = {
     "force": "use write, which a program may overwrite",
+    "debug": "there are no breakpoints; watch shows variables, run --trace records them",
+    "online": "flash replaces the program, and keeps RETAIN variables",
     "unforce": "there is nothing to unforce",
 }
 _OTHER_NAMES = {
-    "compile": "build", "make": "build", "simulate": "run", "download": "flash", "upload": "flash", "monitor": "watch",
-    "init": "new", "create": "new",
+    "compile": "build", "make": "build", "simulate": "run", "download": "flash", "monitor": "watch",
+    "upload": "flash, or source get", "init": "new", "create": "new",
 }  # fmt: skip
 """What commands are called elsewhere."""
 

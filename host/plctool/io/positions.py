@@ -30,7 +30,7 @@ _TOO_LARGE = "a number has at most 64 bits"
 _MAX_DEPTH = 100  # brackets within each other: what reads them calls itself
 _LEAST, _LARGEST = -(1 << 63), (1 << 64) - 1
 _HINTS = {
-    "Invalid value": '; write true, false, a number, or a text in quotes: "Main.start"',
+    "Invalid value": '; write true, false, a number, or a text in quotes, such as "Main.start" or "main.st"',
     "Cannot overwrite": ": there is one of this name already",
     "Cannot declare": "; of several tables each has two brackets: [[sim]]",
 }  # by what tomllib says

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
@@ -22,6 +23,7 @@ SLOW_PATIENCE = 30.0  # for what may erase much of it or run initialisation code
 _OPEN_PATIENCE = 5.0
 _AGAIN_PATIENCE = 1.5  # the same for a device that has been silent for too long just before [s]
 _BUSY_PATIENCE = 1.5  # in less a device notices that a tool has vanished which held a channel [s]
+_PORT_OF_HOST = re.compile(r"[\w.-]+:\d+$")
 _BUSY_PAUSE = 0.25  # between two requests for a channel [s]
 _AT_ONCE = 16  # packages sent before the next look at the input
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
@@ -40,9 +42,8 @@ def patience_factor() -> float:
 
 def no_answer(name: str) -> ChannelLost:
     """The error of a link on which no device answers."""
-    return ChannelLost(
-        f"No device answers on {name}; check that it is on, the cable, and the baud rate or address.", "no-answer"
-    )
+    what = "and that it is a controller" if _PORT_OF_HOST.search(name) else "the cable, and the baud rate or address"
+    return ChannelLost(f"No device answers on {name}; check that it is on, {what}.", "no-answer")
 
 
 def _node_texts(nodes: Iterable[names.Node]) -> str:

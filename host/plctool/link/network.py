@@ -27,7 +27,8 @@ def find_host(host: str) -> str:
     try:
         return socket.gethostbyname(host)
     except (OSError, UnicodeError):
-        raise LinkError(f"The host {host} is unknown; check its name, or write its address.", "open") from None
+        advice = f"write --port {host}" if host.startswith("/dev/") else "check its name, or write its address"
+        raise LinkError(f"The host {host} is unknown; {advice}.", "open") from None
 
 
 def own_address(connected: socket.socket) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import math
 import os
+import re
 import time
 from collections import deque
 from contextlib import suppress
@@ -98,11 +99,14 @@ def open_port(url: str, baud: int, parity: str = "N") -> Any:
     except ValueError as error:
         raise LinkError(f"Cannot open {url}: {error}.", "open") from error
     except OSError as error:
-        raise LinkError(f"Cannot open {url}: {_advice(error)}", "open") from error
+        raise LinkError(f"Cannot open {url}: {_advice(error, url)}", "open") from error
 
 
-def _advice(error: OSError) -> str:
+def _advice(error: OSError, url: str) -> str:
     """What is wrong with the port and what to do about it, as the end of a sentence."""
+    address = re.search(r"[\w.-]+:\d+$", url)
+    if _errno(error) == errno.ENOENT and address is not None:
+        return f"there is no such port; if it is an address, write --tcp {address[0]}."
     advice = {
         errno.ENOENT: "there is no such port; check the name and that the adapter is plugged in.",
         errno.EACCES: "permission denied; add yourself to the port's group (often dialout) and log in again.",

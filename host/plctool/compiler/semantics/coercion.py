@@ -130,8 +130,12 @@ class Coercion:
         return self._mismatch(e, target)
 
     def _needs(self, e: Expr, source: str, target: str) -> Expr:
+        base = elementary(e.type)
+        of_unit = ""
+        if target in ("TIME", "LTIME") and base is not None and base.kind is Kind.INT:
+            of_unit = f"multiply a duration, such as {'T' if target == 'TIME' else 'LTIME'}#1s, by it, or "
         compared = ", or compare it: <> 0" if target == "BOOL" and not isinstance(e.type, StringType) else ""
-        message = f"{e.type} does not fit {target}; write {source}_TO_{target}(...){compared}"
+        message = f"{e.type} does not fit {target}; {of_unit}write {source}_TO_{target}(...){compared}"
         return self._error(e.pos, "type", message)
 
     # ---- by kind ----
@@ -278,6 +282,9 @@ class Coercion:
         if not isinstance(source, StructType) or (
             isinstance(e.type, PointerType) and not isinstance(e.type, InterfaceType)
         ):
+            if isinstance(e, AddressOf) and isinstance(source, StructType):
+                message = f"{e.type} does not fit {target}; assign the instance itself, without ADR"
+                return self._error(e.pos, "type", message)
             return self._mismatch(e, target)
         if not source.conforms(target.target):
             what = "extend" if isinstance(e.type, InterfaceType) else "implement"

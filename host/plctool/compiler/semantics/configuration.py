@@ -143,6 +143,10 @@ class _Reader:
             self.task.event = event
 
     def _event(self, node: ast.Expr) -> None:
+        if isinstance(node, ast.Name) and self._checker.scope.lookup(node.name) is None:
+            message = f"EVENT is the name of an external event, in quotes: '{node.name}'"
+            self._checker.error(node.pos, "unknown", message)
+            return
         e = self._checker.constant(node)
         if e is None:
             return

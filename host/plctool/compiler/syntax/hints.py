@@ -21,6 +21,8 @@ _TYPE_FIRST = rf"(?:^|;|\bVAR)[ \t]*(?P<here>{_TYPE}[ \t]+(?P<name>[A-Za-z_]\w*)
 _UNIT = rf"[ \t]*(?P<unit>{slips.UNITS})\b"
 _IN_VARIABLES = "a variable is declared with its name first: {name} : {type};"
 _IN_BODY = slips.DECLARED
+_TASKS = "tasks and what they run stand in CONFIGURATION C RESOURCE R ON PLC ... END_RESOURCE END_CONFIGURATION"
+_TRY = "exceptions are caught by __TRY ... __CATCH(e) ... __ENDTRY"
 _CHOICE = "a choice is written CASE a OF 1: ...; ELSE ...; END_CASE"
 _CONSTANT = "constants are declared in VAR CONSTANT ... END_VAR"
 _POINTER = "a pointer is declared POINTER TO {name}"
@@ -69,6 +71,8 @@ def _array(match: re.Match[str], element: str = "") -> str:
 
 def _list(match: re.Match[str]) -> str:
     values = ", ".join(part.strip() for part in match["values"].split(","))
+    if ":=" in values:
+        return f"the members of a structure are written in parentheses: ({values})"
     return f"the values of an array are written in brackets: [{values}]"
 
 
@@ -87,6 +91,10 @@ def _located(match: re.Match[str]) -> str:
 
 
 _HINTS = (
+    _Hint(rf"^\s*PROGRAM\s+{_NAME}\s+(?P<here>WITH\s+{_NAME}\s*:\s*{_NAME})", _TASKS, "here",
+          ends=True),
+    _Hint(rf"^\s*TEST\s+(?P<here>(?P<name>{_NAME}))", "the name of a test is a text: TEST '{name}'", "here"),
+    _Hint(r"(?:^|;)[ \t]*(?P<here>(?:TRY|CATCH|FINALLY|END_?TRY)\b[^;]*)", _TRY, "here", "body"),
     _Hint(r"(?P<here><-)", "an assignment is written :=, not <-", "here"),
     _Hint(r":=[^;]*?(?P<here>\bIF\b[^;]*\bELSE\b)", slips.CHOICE, "here", "body"),
     _Hint(r":=[^;]*?(?P<here>\bIF\s*\()", slips.CHOICE, "here", "body", ends=True),
@@ -253,6 +261,7 @@ _HINTS = (
     _Hint(r"&\s*(?P<name>[A-Za-z_]\w*)", "the address of {name} is written ADR({name})"),
     _Hint(r"(?P<name>\w+)\s*:(?!=)\s*(?P<type>\w+(?:\s*\[[^\]]*\])?\s+)AT\s+(?P<place>%[\w.*]+)", _located),
     _Hint(r"\b(?P<word>REFERENCE|POINTER)_TO\s+\w+\s*", "{word}_TO is written {word} TO"),
+    _Hint(rf"^\s*(?P<here>TASK\s+{_NAME}\s*\([^)]*\)\s*)", _TASKS, "here"),
     _Hint(r"(?:^|;)[ \t]*(?P<here>--.*)", "a comment is written // or (* *)", "here"),
 )  # fmt: skip
 

@@ -29,11 +29,13 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Unary, UnaryOp
 from plctool.iec.types import (
     BOOL,
+    BYTE,
     DT,
     LREAL,
     LTIME,
     TIME,
     TOD,
+    WORD,
     ArrayType,
     Elementary,
     EnumType,
@@ -256,6 +258,14 @@ def _duration_hint(left: Expr, right: Expr) -> str:
     return next((f"; a duration is written T#{number}ms" for number in numbers), "")
 
 
+def _character_hint(left: Expr, right: Expr) -> str:
+    """What to write when a character of a string is compared with a text."""
+    for e, other in ((left, right), (right, left)):
+        if isinstance(e, Const) and isinstance(e.value, str) and len(e.value) == 1 and other.type in (BYTE, WORD):
+            return f"; a character of a string is a number here: write 16#{ord(e.value):02X} for '{e.value}'"
+    return ""
+
+
 def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr:
     if is_untyped(left) is not is_untyped(right):
         _report_decided(c, op, left, right, offset)
@@ -282,7 +292,7 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
         elif NULL_TYPE in (left.type, right.type) and (is_referred(left) or is_referred(right)):
             hint = "; whether a reference refers to something is __ISVALIDREF(reference)"
         else:
-            hint = _duration_hint(left, right)
+            hint = _duration_hint(left, right) or _character_hint(left, right)
         return c.error(offset, "type", f"{op.value} cannot compare {left.type} with {right.type}{hint}")
     if isinstance(t, StringType):
         return _build(c, op, c.coerce(left, t), c.coerce(right, t), BOOL, offset)
