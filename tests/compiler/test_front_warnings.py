@@ -340,3 +340,23 @@ def test_pragma_in_a_comment_or_string_does_nothing() -> None:
         "a : INT; s : STRING := '{warning disable unused}'; (* {warning disable unused} *)\nb : INT;", "s := '';"
     )
     assert len(warned(text, "unused")) == 2
+
+
+@pytest.mark.parametrize(
+    ("comparison", "said"),
+    [
+        ("w > i", "WORD and INT are compared as INT: large ones of WORD count as negative; convert one of them"),
+        ("i = w", "INT and WORD are compared as INT: large ones of WORD count as negative; convert one of them"),
+        ("dw < i", "DWORD and INT are compared as DWORD: negative ones count as large; convert one of them"),
+        ("ul > l", "ULINT and LINT are compared as LINT: large ones of ULINT count as negative; convert one of them"),
+        ("w > d", None),
+        ("u > i", None),
+        ("w > 5", None),
+        ("dw > INT#5", None),
+        ("w > u", None),
+    ],
+)
+def test_signs_that_a_comparison_loses(comparison: str, said: str | None) -> None:
+    variables = "w : WORD; i : INT; d : DINT; dw : DWORD; ul : ULINT; l : LINT; u : UINT; x : BOOL;"
+    found = warned(main(variables, f"x := {comparison};"), "sign")
+    assert [message.split(": ", 1)[1] for message in found] == [said] * (said is not None)

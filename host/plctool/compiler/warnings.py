@@ -44,6 +44,7 @@ WARNINGS = {
     "result": "a function or method never assigns its result",
     "shared": "several tasks write one variable, or variables in one byte of %M",
     "shared-output": "two tasks write the same bit of an output",
+    "sign": "bits or a number without sign are compared with a number that has one, in a type too small for both",
     "statement": "a statement reads a variable and does nothing with it",
     "task": "a program is called that a task runs as well",
     "truncated": "a string is longer than the STRING it goes to",

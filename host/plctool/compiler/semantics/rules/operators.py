@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from plctool.compiler.ranges import type_range
 from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import (
@@ -299,7 +300,30 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
     if t in _UNTYPED:
         return _build(c, op, left, right, BOOL, offset)
     t = base_of(t)
+    _report_sign(c, left, right, t, offset)
     return _build(c, op, _as_operand(c, left, t), _as_operand(c, right, t), BOOL, offset)
+
+
+def _report_sign(c: Checker, left: Expr, right: Expr, t: Type, offset: int) -> None:
+    """Warns where bits, or a number without sign, and a number with one are compared in a type that has not all values
+    of both."""
+    common = elementary(t)
+    for e, other in ((left, right), (right, left)):
+        signed, unsigned = elementary(e.type), elementary(other.type)
+        if common is None or signed is None or unsigned is None or signed.kind is not Kind.INT or not signed.signed:
+            continue
+        if unsigned.kind is not Kind.BIT and (unsigned.kind is not Kind.INT or unsigned.signed):
+            continue
+        lost = other if common.kind is Kind.INT and common.signed else e
+        if (lost is other and common.bits > unsigned.bits) or (isinstance(lost, Const) and _fits(lost, common)):
+            continue
+        what = f"large ones of {other.type} count as negative" if lost is other else "negative ones count as large"
+        c.warning(offset, "sign", f"{left.type} and {right.type} are compared as {common}: {what}; convert one of them")
+
+
+def _fits(e: Const, t: Elementary) -> bool:
+    limits = type_range(t)
+    return isinstance(e.value, int) and limits is not None and limits[0] <= e.value <= limits[1]
 
 
 def _report_number(c: Checker, left: Expr, right: Expr, offset: int) -> None:
