@@ -90,8 +90,9 @@ class Model:
             self._assign(x, str(t(y).find(literal) + 1 if literal else 0))
 
         def changes() -> None:  # a string whose length is known, perhaps
+            before = t(x)
             self._assign(y, "changed")
-            self._assign(x, (t(x) + "*")[:LONGEST_RESULT])
+            self._assign(x, (before + "*")[:LONGEST_RESULT])
 
         def marked() -> None:
             self._assign(x, ("-" + t("b"))[:80])
