@@ -24,10 +24,10 @@ typedef struct {
     volatile RTS_UI16 head, tail;
 } RING;
 
+/* The data is volatile as the positions are, so that a byte is stored before the head passes it. */
 typedef struct {
     RING rx, tx;
-    volatile RTS_UI8
-        rx_data[BOARD_UART_RX_SIZE]; /* as the positions, so that a byte is stored before the head passes it */
+    volatile RTS_UI8 rx_data[BOARD_UART_RX_SIZE];
     volatile RTS_UI8 tx_data[BOARD_UART_TX_SIZE];
 } LINE;
 
