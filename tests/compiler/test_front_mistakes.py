@@ -306,3 +306,15 @@ def test_mistakes_with_types_say_what_to_write() -> None:
         "INT does not fit TIME; multiply a duration, such as T#1s, by it, or write INT_TO_TIME(...)",
         "= cannot compare BYTE with STRING[1]; a character of a string is a number here: write 16#61 for 'a'",
     ]
+
+
+@pytest.mark.parametrize("task", ["INTERVAL = T#10ms", "INTERVAL := T#10ms, PRIORITY 1", "INTERVAL := 10 ms"])
+def test_mistakes_of_a_task_in_its_place_are_not_about_its_place(task: str) -> None:
+    text = f"PROGRAM P END_PROGRAM CONFIGURATION C RESOURCE R ON D\nTASK T({task});\nPROGRAM P1 WITH T : P;\n"
+    assert TASKS not in " ".join(messages(f"{text}END_RESOURCE END_CONFIGURATION"))
+
+
+@pytest.mark.parametrize("statement", ["try := 1 2;", "catch := n x;", "try 5;", "catch.x y;"])
+def test_variables_with_the_names_of_keywords_elsewhere_are_no_exceptions(statement: str) -> None:
+    found = messages(f"PROGRAM P VAR n, x, try, catch : INT; END_VAR\n{statement}\nEND_PROGRAM")
+    assert found and "__TRY" not in " ".join(found)

@@ -94,7 +94,8 @@ _HINTS = (
     _Hint(rf"^\s*PROGRAM\s+{_NAME}\s+(?P<here>WITH\s+{_NAME}\s*:\s*{_NAME})", _TASKS, "here",
           ends=True),
     _Hint(rf"^\s*TEST\s+(?P<here>(?P<name>{_NAME}))", "the name of a test is a text: TEST '{name}'", "here"),
-    _Hint(r"(?:^|;)[ \t]*(?P<here>(?:TRY|CATCH|FINALLY|END_?TRY)\b[^;]*)", _TRY, "here", "body"),
+    _Hint(r"(?:^|;)[ \t]*(?P<here>(?:TRY|CATCH|FINALLY|END_?TRY)\b(?!\s*(?:[-+:.,\[(^]|\d))[^;]*)", _TRY, "here",
+          "body"),
     _Hint(r"(?P<here><-)", "an assignment is written :=, not <-", "here"),
     _Hint(r":=[^;]*?(?P<here>\bIF\b[^;]*\bELSE\b)", slips.CHOICE, "here", "body"),
     _Hint(r":=[^;]*?(?P<here>\bIF\s*\()", slips.CHOICE, "here", "body", ends=True),
@@ -261,7 +262,7 @@ _HINTS = (
     _Hint(r"&\s*(?P<name>[A-Za-z_]\w*)", "the address of {name} is written ADR({name})"),
     _Hint(r"(?P<name>\w+)\s*:(?!=)\s*(?P<type>\w+(?:\s*\[[^\]]*\])?\s+)AT\s+(?P<place>%[\w.*]+)", _located),
     _Hint(r"\b(?P<word>REFERENCE|POINTER)_TO\s+\w+\s*", "{word}_TO is written {word} TO"),
-    _Hint(rf"^\s*(?P<here>TASK\s+{_NAME}\s*\([^)]*\)\s*)", _TASKS, "here"),
+    _Hint(rf"^\s*(?P<here>TASK)\s+{_NAME}\s*\(", _TASKS, "here"),
     _Hint(r"(?:^|;)[ \t]*(?P<here>--.*)", "a comment is written // or (* *)", "here"),
 )  # fmt: skip
 
