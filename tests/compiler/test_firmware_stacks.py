@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -120,6 +122,18 @@ def test_a_damaged_file_is_refused_or_nothing_is_known(target: str, tmp_path: Pa
             FirmwareStacks(program, find_target(target).machine).of_function(SIGNATURES["deep"])
         except UsageError as error:
             assert "cannot be read" in str(error)
+
+
+def test_changed_bytes_are_refused_or_do_no_harm(target: str, tmp_path: Path) -> None:
+    program = linked(tmp_path, target, "-g")
+    whole, random = program.read_bytes(), Random(7)
+    for _ in range(100):
+        data = bytearray(whole)
+        for at in (random.randrange(64), random.randrange(len(data)), len(data) - 1 - random.randrange(1000)):
+            data[at] = random.randrange(256)
+        program.write_bytes(data)
+        with suppress(UsageError):
+            FirmwareStacks(program, find_target(target).machine).of_function(SIGNATURES["deep"])
 
 
 # ---- a program that calls one ----------------------------------------------------------------------------------------

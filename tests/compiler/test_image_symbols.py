@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,7 @@ from plctool.iec.types import (
     SubrangeType,
     Type,
 )
+from plctool.image.limits import Need
 
 
 def point() -> StructType:
@@ -358,3 +360,23 @@ def test_symbols_of_another_image_are_refused(tmp_path: Path, monkeypatch: pytes
 )
 def test_code_offsets_become_lines(offset: int, expected: SourceLine | None) -> None:
     assert table().address_to_line(offset) == expected
+
+
+# ---- the stack -------------------------------------------------------------------------------------------------------
+
+
+def test_stack_goes_through_the_file() -> None:
+    symbols = table()
+    symbols.stack = Need(96, (("Main", 64), ("F", 32)), deepest=True, at_least=True)
+    assert SymbolTable.from_json(symbols.to_json()).stack == symbols.stack
+    assert SymbolTable.from_json(table().to_json()).stack is None
+
+
+@pytest.mark.parametrize(
+    "stack",
+    [5, "many", {}, {"amount": "x", "parts": [], "at_least": False}, {"amount": 1, "parts": [1], "at_least": 0}],
+)
+def test_a_damaged_stack_is_refused(stack: object) -> None:
+    document = json.loads(table().to_json()) | {"stack": stack}
+    with pytest.raises(UsageError, match="cannot be read; build again"):
+        SymbolTable.from_json(json.dumps(document))

@@ -122,7 +122,9 @@ def _needs(
     for name in ("code", "image"):
         needs[name] = replace(needs[name], parts=tuple(sizes.items()))
     roots = [linked.symbols[name].offset for name in (*lowered.tasks, *lowered.functions.values())]
-    stubs = _frames_of_stubs(linked, options)
+    # A stub takes what its C function takes.
+    of_c = {offset: _stack_of(external, options) for offset, external in linked.stubs.items()}
+    stubs: Frames = {offset: (0, size) for offset, size in of_c.items() if size is not None}
     chain = CallGraph(linked.code, options.target.machine, linked.frames | stubs).deepest(roots)
     names = {symbol.offset: name for name, symbol in linked.symbols.items()}
     names |= {offset: external.name for offset, external in linked.stubs.items()}
@@ -131,22 +133,11 @@ def _needs(
     frames: Counter[str] = Counter()
     for offset, frame in chain:
         frames[names[offset]] += frame
-    at_least = program.may_recurse or _has_unknown(linked, options)
+    # Where there are no stubs, stacks are large.
+    are_known = not options.target.stubs or len(stubs) == len(linked.imports)
+    at_least = program.may_recurse or not are_known
     needs["stack"] = Need(frames.total(), largest((+frames).items()), deepest=True, at_least=at_least)
     return needs
-
-
-def _has_unknown(linked: Linked, options: Options) -> bool:
-    """Whether it calls C functions of which it is not known how much stack they take. Where there are no stubs, stacks
-    are large."""
-    known = all(_stack_of(external, options) is not None for external in linked.stubs.values())
-    return options.target.stubs and not (known and len(linked.imports) == len(linked.stubs))
-
-
-def _frames_of_stubs(linked: Linked, options: Options) -> Frames:
-    """A stub takes what its C function takes."""
-    sizes = {offset: _stack_of(external, options) for offset, external in linked.stubs.items()}
-    return {offset: (0, size) for offset, size in sizes.items() if size is not None}
 
 
 def _stack_of(external: External, options: Options) -> int | None:

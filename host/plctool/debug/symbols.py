@@ -315,7 +315,8 @@ class SymbolTable:
 def _read_need(entry: dict[str, Any] | None) -> Need | None:
     if entry is None:
         return None
-    return Need(entry["amount"], tuple((name, amount) for name, amount in entry["parts"]), True, entry["at_least"])
+    parts = tuple((str(name), int(amount)) for name, amount in entry["parts"])
+    return Need(int(entry["amount"]), parts, True, bool(entry["at_least"]))
 
 
 def _at_address(text: str) -> Symbol | None:
