@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from plctool.compiler.codegen.ir import Value, number
 from plctool.compiler.codegen.lengths import (
     is_appending,
@@ -59,7 +61,7 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
         arguments.append(f"ptr {frame.address(result)}")
         arguments += [f"i32 {_result_capacity(frame, pou, result)}"] if pou.cuts_result else []
     given = [
-        _operand(frame, pou, parameter, argument, write_back, lasting=may_write(frame, *e.args[n:]))
+        _operand(frame, pou, parameter, argument, write_back, e.args[n:])
         for n, (parameter, argument) in enumerate(zip(pou.parameters, e.args, strict=True), 1)
     ]
     if takes_lengths(pou) and all(frame.length(ref) for ref in given if isinstance(ref, Ref)):
@@ -172,10 +174,9 @@ def _operand(
     parameter: Parameter,
     argument: Expr | Place | None,
     write_back: list[tuple[Ref, Ref]],
-    *,
-    lasting: bool,
+    later: Sequence[Expr | Place | None],
 ) -> Operand:
-    """What carries one argument. `lasting`: an argument after it may change what it was made of."""
+    """What carries one argument. What it is made of may be changed by those that come `later`."""
     t = parameter.variable.type
     if argument is None:  # an output that is not used
         ref = frame.temporary(t)
@@ -183,8 +184,8 @@ def _operand(
         if is_scalar(t) and not parameter.by_reference:
             return frame.value(argument)
         ref = _aligned(frame, materialised(frame, argument))
-        if lasting and isinstance(argument, Load):
-            ref = copied(frame, ref)
+        if isinstance(argument, Load):
+            ref = lasting(frame, ref, *later)
     else:
         ref = frame.ref(argument)
         if parameter.direction is Direction.INPUT and is_scalar(t) and not parameter.by_reference:
@@ -200,35 +201,33 @@ def _operand(
             if parameter.direction is not Direction.INPUT:
                 write_back.append((temporary, ref))
             ref = temporary
-        if lasting and parameter.direction is Direction.INPUT:
-            ref = copied(frame, ref)
+        if parameter.direction is Direction.INPUT:
+            ref = lasting(frame, ref, *later)
     return ref
 
 
-def may_write(frame: Frame, *nodes: Expr | Place | None) -> bool:
-    """Whether something may change variables when it is worked out, other than those of what it calls."""
-    return any(_writes(frame, part) for node in nodes if node is not None for part in walk(node))
-
-
-def _writes(frame: Frame, node: object) -> bool:
-    if not isinstance(node, Call):
-        return isinstance(node, AssignedValue)
-    return node.instance is not None or not _leaves_strings(frame, node)
-
-
-def copied(frame: Frame, ref: Ref) -> Ref:
-    """A copy of what is not a scalar, if it is known how large it is."""
-    if is_scalar(ref.type) or isinstance(ref.type, OpenArrayType):
+def lasting(frame: Frame, ref: Ref, *later: Expr | Place | None) -> Ref:
+    """A string, array or structure as it is now: a copy, if what is worked out later may write variables and it is
+    known how large it is."""
+    parts = (part for node in later if node is not None for part in walk(node))
+    if is_scalar(ref.type) or isinstance(ref.type, OpenArrayType) or not any(_writes(frame, part) for part in parts):
         return ref
     if not isinstance(ref.type, StringType):
         copy = frame.temporary(ref.type)
         frame.copy(copy, ref, ref.type.size)
-    elif ref.capacity.constant is not None:
-        copy = frame.temporary(StringType(ref.capacity.constant, ref.type.wide))
-        copy_string(frame, copy, ref)
-    else:
-        copy = ref
+        return copy
+    if ref.capacity.constant is None:
+        return ref
+    copy = frame.temporary(StringType(ref.capacity.constant, ref.type.wide))
+    copy_string(frame, copy, ref)
     return copy
+
+
+def _writes(frame: Frame, node: object) -> bool:
+    """Whether it may change variables that are not its own."""
+    if not isinstance(node, Call):
+        return isinstance(node, AssignedValue)
+    return node.instance is not None or not _leaves_strings(frame, node)
 
 
 def _values(frame: Frame, operand: Operand, form: Form) -> list[Value]:

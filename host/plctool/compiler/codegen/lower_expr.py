@@ -23,7 +23,7 @@ from plctool.compiler.codegen.lower_arith import (
     square_root,
     unary,
 )
-from plctool.compiler.codegen.lower_calls import call_function, copied, may_write
+from plctool.compiler.codegen.lower_calls import call_function, lasting
 from plctool.compiler.codegen.lower_frame import (
     AGGREGATES,
     ARRAY_BOUNDS,
@@ -205,8 +205,8 @@ def _compared_strings(frame: Frame, e: Binary) -> Value:
                     return compare_strings(frame, e.op, ref, frame.aggregate(literal))
                 return equal if e.op is BinaryOp.EQ else frame.fn.value(f"xor i1 {equal}, true")
     left = frame.aggregate(e.left)
-    if isinstance(e.left, Load) and may_write(frame, e.right):
-        left = copied(frame, left)
+    if isinstance(e.left, Load):
+        left = lasting(frame, left, e.right)
     return compare_strings(frame, e.op, left, frame.aggregate(e.right))
 
 
