@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 from plctool.compiler.codegen import (  # noqa: F401  their rules
     lower_exceptions,
     lower_expr,
@@ -12,7 +15,7 @@ from plctool.compiler.codegen import (  # noqa: F401  their rules
 from plctool.compiler.codegen.lower_blocks import take_inputs
 from plctool.compiler.codegen.lower_frame import NO_CAPACITY, Body, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise
-from plctool.compiler.codegen.lower_string import copy_string, empty_string
+from plctool.compiler.codegen.lower_string import copy_string
 from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import (
     CONTEXT,
@@ -50,6 +53,7 @@ def write_body(frame: Body) -> None:
         initialise(frame, frame.locals[var], var.initial)
     frame.statements(pou.body)
     fn.begin(frame.on_return)
+    _give_outputs(frame, pou)
     returned = returned_variable(pou, frame.unit.closed.get(pou))
     if returned is None:
         fn.terminate("ret void")
@@ -80,19 +84,33 @@ def _stack_memory(frame: Body, var: Variable) -> Ref:
     return Ref(frame.fn.alloca(t.size, t.align), 0, t, direct=True, capacity=string_capacity(t))
 
 
+def _own_outputs(pou: Pou) -> Iterator[tuple[int, Variable]]:
+    """The outputs of a function that are variables of its own until it returns, with their numbers: so they start at
+    their initial values, whatever else the caller's variables are, and an exception leaves those alone. Others are of
+    any length (ARRAY[*]), or of the library."""
+    if pou.kind in (PouKind.FUNCTION, PouKind.METHOD) and not pou.no_init:
+        for number, parameter in enumerate(pou.parameters):
+            is_open = isinstance(parameter.variable.type, OpenArrayType)
+            if parameter.direction is Direction.OUTPUT and not is_open:
+                yield number, parameter.variable
+
+
 def _begin_outputs(frame: Body, pou: Pou) -> None:
-    """Outputs start at their initial values, as locals do, but for those of any length (ARRAY[*]). Inputs have been
-    taken, also from the same variables."""
-    for parameter in pou.parameters:
-        var = parameter.variable
-        if parameter.direction is not Direction.OUTPUT or pou.no_init or isinstance(var.type, OpenArrayType):
-            continue
-        ref = frame.locals[var]
-        if isinstance(var.type, StringType):
-            empty_string(frame, ref)
-        else:
-            frame.clear(ref)
+    for _, var in _own_outputs(pou):
+        ref = frame.locals[var] = _stack_memory(frame, var)
+        frame.clear(ref)
         initialise(frame, ref, var.initial)
+
+
+def _give_outputs(frame: Body, pou: Pou) -> None:
+    for number, var in _own_outputs(pou):
+        given, own = Ref(parameter_value(number), 0, var.type), frame.locals[var]
+        if is_scalar(var.type):
+            frame.store(given, frame.load(own))
+        elif isinstance(var.type, StringType):
+            copy_string(frame, replace(given, capacity=parameter_capacity(number)), own)
+        else:
+            frame.copy(given, own, var.type.size)
 
 
 def _take_parameters(frame: Body, pou: Pou) -> None:

@@ -80,11 +80,6 @@ def copy_literal(frame: Frame, target: Ref, text: str) -> None:
     frame.note_length(target, _length_of(text), lengths)
 
 
-def empty_string(frame: Frame, target: Ref) -> None:
-    """target := ''."""
-    _terminate(frame, target, 0)
-
-
 def literal_text(frame: Frame, text: str, *, wide: bool) -> Ref:
     """A constant string in the image."""
     t = StringType(len(text), wide)
