@@ -8,7 +8,8 @@ from plctool.compiler.codegen.lower_expr import truth
 from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, STATEMENTS, Body, rule
 from plctool.compiler.codegen.lower_unit import Check, value_type
 from plctool.compiler.ranges import type_range, value_range
-from plctool.compiler.typed import BinaryOp, For, Repeat, Statement, Variable, While
+from plctool.compiler.typed import BinaryOp, Convert, For, Load, Repeat, Statement, Variable, While
+from plctool.iec.types import SubrangeType
 
 
 @rule(STATEMENTS, While)
@@ -62,6 +63,7 @@ def for_loop(frame: Body, s: For) -> None:
     with_range = loop.limits()
     if var is not None and with_range is not None:
         frame.ranges[var] = with_range
+    _check_subrange(frame, s)
     _loop_body(frame, s.body, following, end)
     fn.begin(following)
     frame.at(s.pos)
@@ -74,6 +76,13 @@ def for_loop(frame: Body, s: For) -> None:
     if var is not None:
         frame.shadows.pop(var, None)
         frame.ranges.pop(var, None)
+
+
+def _check_subrange(frame: Body, s: For) -> None:
+    """Each iteration has a value of the subrange that the variable may be of."""
+    t = s.var.type
+    if isinstance(t, SubrangeType):
+        frame.value(Convert(Load(s.var, t.base, s.pos), t, s.pos, check=(t.low, t.high)))
 
 
 def _stop_and_step(frame: Body, s: For) -> tuple[Value, Value]:

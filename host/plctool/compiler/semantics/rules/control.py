@@ -37,7 +37,7 @@ from plctool.compiler.typed import (
     While,
 )
 from plctool.compiler.typed_nodes import root_of, walk, written_places
-from plctool.iec.types import BOOL, EnumType, StringType, Type, is_scalar
+from plctool.iec.types import BOOL, EnumType, StringType, SubrangeType, Type, is_scalar
 
 # ---- statements in sequence ----
 
@@ -263,12 +263,15 @@ def for_statement(c: Checker, node: ast.For) -> list[Statement]:
         c.warning(node.var.pos, "enum", f"the loop counts {place.type} as a number, past its last value")
     target = t if place is not None and t is not None else ERROR
     pos = c.pos(node.pos)
-    start, stop = c.value(node.start, target), c.value(node.stop, target)
+    start = c.value(node.start, target if place is None else place.type)
+    stop = c.value(node.stop, target)
     step: Expr = Const(1, target, pos) if node.step is None else _step_value(c, node.step, target)
     if isinstance(step, Const) and step.value == 0 and step.type is not ERROR:
         c.error(node.pos if node.step is None else node.step.pos, "range", "a FOR loop with a step of zero never ends")
         place = None
     _report_never_run(c, node, start, stop, step)
+    if place is not None and isinstance(place.type, SubrangeType):
+        _report_left_subrange(c, node, place.type, start, stop, step)
     body = _loop_body(c, node.body)
     if place is None or ERROR in (start.type, stop.type, step.type):
         return []
@@ -289,6 +292,18 @@ def _report_never_run(c: Checker, node: ast.For, start: Expr, stop: Expr, step: 
         )
     elif by < 0 and first < last:
         c.warning(node.pos, "unreachable", f"this loop never runs: to count up from {first} to {last}, write BY {-by}")
+
+
+def _report_left_subrange(c: Checker, node: ast.For, t: SubrangeType, start: Expr, stop: Expr, step: Expr) -> None:
+    """An end that is outside, when the loop comes to it for certain."""
+    first, last, by = (
+        e.value if isinstance(e, Const) and isinstance(e.value, int) else None for e in (start, stop, step)
+    )
+    if first is None or last is None or not by:
+        return
+    reached = range(first, last + (1 if by > 0 else -1), by)
+    if reached and not t.low <= reached[-1] <= t.high:
+        c.error(node.stop.pos, "range", f"the loop counts to {reached[-1]}, outside of {t.name} ({t.low}..{t.high})")
 
 
 def _report_changes(c: Checker, node: ast.For, limits: Expr | list[Expr], body: list[Statement]) -> None:
