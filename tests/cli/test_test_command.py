@@ -313,6 +313,11 @@ def test_a_file_has_one_setup_and_one_teardown(tool: Tool, keyword: str) -> None
     assert f"there is a {keyword} in this file already" in done.err
 
 
+def test_tests_of_a_file_have_different_names(tool: Tool) -> None:
+    done = diagnoses(tool, "TEST 'a' END_TEST TEST 'b' END_TEST TEST 'a' END_TEST")
+    assert "1:37: error: there is a TEST 'a' in this file already" in done.err
+
+
 def test_asserts_are_for_tests_only(tool: Tool) -> None:
     done = tool("check", str(write("PROGRAM Main ASSERT_EQ(1, 1); END_PROGRAM")))
     assert done.status == 2

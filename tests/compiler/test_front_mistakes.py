@@ -291,6 +291,32 @@ def test_more_mistakes_in_a_declaration_say_what_to_write(line: str, said: str) 
             "CONFIGURATION C RESOURCE R ON D TASK E(EVENT := door); END_RESOURCE END_CONFIGURATION",
             ["EVENT is the name of an external event, in quotes: 'door'"],
         ),
+        (
+            "PROGRAM P\n{IF defined(fast)}\n{ELSEIF defined(slow)}\n{ENDIF}\nEND_PROGRAM",
+            ["{ELSEIF} is written {ELSIF}", "{ENDIF} is written {END_IF}"],
+        ),
+        (
+            "FUNCTION_BLOCK M\nPROPERTY Speed : INT\nget { return _speed; }\nSET{ _speed = value; }\nEND_PROPERTY\n"
+            "END_FUNCTION_BLOCK",
+            [f"what a property does is written {word} ... END_{word}, without braces" for word in ("GET", "SET")],
+        ),
+        (
+            "PROGRAM P VAR n : INT; END_VAR\nINITIAL_STEP a:\n  n := 1;\nEND_STEP\nSTEP b: n := 1;\nEND_STEP\n"
+            "TRANSITION FROM a TO b := TRUE; END_TRANSITION\nEND_PROGRAM",
+            ["a step names actions: write this into ACTION A: ... END_ACTION, and A; into the step"] * 2,
+        ),
+        (
+            "PROGRAM P VAR s : STRING; END_VAR\ns := 'can't';\nEND_PROGRAM",
+            ["a quote within a string is written $'", "this string is not closed before the end of the line"],
+        ),
+        (
+            "PROGRAM P VAR n : INT; END_VAR\nconut := n;\nEND_PROGRAM",
+            ["unknown name conut"],
+        ),
+        (
+            "FUNCTION Scale : INT\nScal := 1;\nEND_FUNCTION",
+            ["unknown name Scal; did you mean Scale?"],
+        ),
     ],
 )
 def test_mistakes_outside_of_bodies_say_what_to_write(text: str, said: list[str]) -> None:

@@ -108,6 +108,7 @@ def test_case_that_misses_values_of_an_enumeration_names_them(body: str, missing
         "CASE e OF Red: ; ELSE i := 1; END_CASE;",
         "CASE e OF Red: ; ELSE END_CASE;",
         "CASE i OF 1: ; END_CASE;",
+        "CASE e OF Red: ; Gren: ; Blue: ; END_CASE;",  # Green is not missed, it is misspelt
     ],
 )
 def test_case_with_all_values_or_an_else_is_no_warning(body: str) -> None:

@@ -374,15 +374,19 @@ def test_no_name_is_in_two_tables() -> None:
                 )
             ],
         ),
-        (
-            '{attribute "hide"}',
-            [
-                (
-                    "warning",
-                    "no-effect",
-                    "this attribute has no effect: it is written {attribute 'name'} or {attribute 'name' := 'text'}",
-                )
-            ],
+        *(
+            (
+                pragma,
+                [
+                    (
+                        "warning",
+                        "no-effect",
+                        "this attribute has no effect: it is written {attribute 'name'} or "
+                        "{attribute 'name' := 'text'}",
+                    )
+                ],
+            )
+            for pragma in ('{attribute "hide"}', "{attribut 'hide'}", "{atribute 'hide'}")
         ),
     ],
 )

@@ -181,6 +181,12 @@ class TestProgram:
 
     def _test(self, decl: ast.TestDecl, file: _File) -> None:
         number, pos = len(self._suite.cases), decl.source.pos(decl.pos)
+        if any(case.name == decl.name and case.pos.file == pos.file for case in self._suite.cases):
+            self._world.scope(decl.source).error(
+                decl.pos,
+                "duplicate",
+                f"there is a TEST '{decl.name}' in this file already; give each a name of its own",
+            )
         faults = faults_of(decl, self._world.io.description, self._world.diagnostics)
         self._suite.cases.append(TestCase(decl.name, pos, faults))
         scope = self._begin(decl, file, f"TEST_{number}")

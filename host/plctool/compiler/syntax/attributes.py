@@ -102,7 +102,7 @@ _NO_INIT = ("noinit", "no-init", "no_init")  # goes with instance-path: the init
 _TEXT_PRAGMA = re.compile(r"\{\s*(error|warning)\s+'([^']*)'\s*\}", re.IGNORECASE)
 _IN_C = re.compile(r"\{\s*external\b[^{}]*\}", re.IGNORECASE)
 _FLAG = re.compile(r"\{\s*flag\b[^{}]*\bnoinit\b[^{}]*\}", re.IGNORECASE)
-_ATTRIBUTE = re.compile(r"\{\s*attribute\b", re.IGNORECASE)
+_ATTRIBUTE = re.compile(r"\{\s*(?:attribute\b|at+r?i\w*\s*')", re.IGNORECASE)
 
 
 class Reports(Protocol):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from plctool.compiler.syntax.plain_text import NAME, plain_text, without_structures
 
 _DIRECTIVE = re.compile(r"\{\s*(define|undefine|IF|ELSIF|ELSE|END_IF)\b(.*)\}", re.IGNORECASE | re.DOTALL)
+_MISSPELT = re.compile(r"\{\s*(END\s?IF|FI|ELSE\s?IF|ELIF)\b(.*)\}", re.IGNORECASE | re.DOTALL)
 _BEGINS = re.compile(r"\{\s*(?:define|undefine|IF)\b", re.IGNORECASE)
 _DEFINE = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:'.*')?\s*", re.DOTALL)
 _TOKEN = re.compile(
@@ -88,6 +89,11 @@ class Conditions:
 
     def take(self, pragma: str, pos: int) -> bool:
         """Follows a pragma; False when it is none of these."""
+        misspelt = _MISSPELT.fullmatch(pragma)
+        if misspelt is not None:
+            right = "ELSIF" if misspelt[1].upper().startswith("EL") else "END_IF"
+            self._report(pos, "pragma", f"{{{misspelt[1]}}} is written {{{right}}}")
+            pragma = f"{{{right}{misspelt[2]}}}"
         match = _DIRECTIVE.fullmatch(pragma)
         if match is None:
             return False

@@ -230,6 +230,9 @@ _HINTS = (
     _Hint(r"\b(?:IF|ELSIF|WHILE|UNTIL)\b[^;]*?(?P<here>:=)", "a comparison is written =; := assigns", "here"),
     _Hint(r"[^'\s(,=](?P<here>'(?='))", slips.QUOTE, "here"),
     _Hint(r"\\(?P<here>'[ \t]*)", slips.QUOTE, "here", ends=True),
+    _Hint(r"'[^'\n]*'(?P<here>[A-Za-z][^'\n]*)'", slips.QUOTE, "here", ends=True),
+    _Hint(rf"(?:\b|_)STEP\s+{_NAME}\s*:\s*(?P<here>(?P<name>{_NAME})\s*:=)",
+          "a step names actions: write this into ACTION A: ... END_ACTION, and A; into the step", "here"),
     _Hint(rf"(?P<here>\b(?:__)?NEW\s+(?P<name>{_NAME})\s*(?:\([^;)]*\))?)",
           "an instance is taken from its pool by __NEW({name})", "here", "body"),
     _Hint(rf"(?P<here>\b(?P<word>__DELETE|DELETE)\s+(?P<name>{_VALUE})\s*)", "what __NEW gave is given back by "

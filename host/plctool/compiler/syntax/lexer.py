@@ -107,6 +107,7 @@ _DURATION = re.compile(rf"\d+(?:{slips.UNITS})", re.IGNORECASE)
 _WITH_COMMA = re.compile(r"\w#(?P<number>\d+),$")
 _MODIFIED = re.compile(r"\s+(METHOD|PROPERTY|FUNCTION_BLOCK|FUNCTION|CLASS|PROGRAM|INTERFACE)\s+(\w+)", re.IGNORECASE)
 _STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quotes
+_ACCESSOR = re.compile(r"\b(GET|SET)\s*\Z", re.IGNORECASE)
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
 _NAMED_ARGUMENT = re.compile(r"\s*\(\s*[A-Za-z_]\w*\s*(?::=|=>)", re.ASCII)
 _PART_FOLLOWS = re.compile(r"\s*[:.,^\[]")
@@ -252,6 +253,9 @@ class Lexer:
         message = "code in C cannot be compiled; put it into an EXTERNAL function"
         if self.text[:pos].rstrip()[-4:].upper().endswith((")", "THEN", "ELSE", "DO")):
             message = "there are no { } around statements; write IF x THEN ... END_IF"
+        elif accessor := _ACCESSOR.search(self.text[:pos]):
+            word = accessor[1].upper()
+            message = f"what a property does is written {word} ... END_{word}, without braces"
         self._report(pos, "pragma", message)
 
     def _slip(self, text: str, pos: int) -> Token:

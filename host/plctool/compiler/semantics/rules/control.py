@@ -185,14 +185,15 @@ def case_statement(c: Checker, node: ast.Case) -> list[Statement]:
         message = f"CASE needs an integer or an enumeration, not {selector.type}{hint}"
         selector = c.error(node.selector.pos, "type", message)
     seen = _Labels()
-    branches = []
+    branches, all_known = [], True
     for labels, body in node.branches:
         ranges = [r for label in labels if (r := _label_range(c, label, selector.type, seen)) is not None]
+        all_known = all_known and len(ranges) == len(labels)
         branches.append((ranges, check_body(c, body)))
     otherwise = check_body(c, node.otherwise)
     if selector.type is ERROR:
         return []
-    if isinstance(selector.type, EnumType) and not node.has_else:
+    if isinstance(selector.type, EnumType) and not node.has_else and all_known:
         _report_missing(c, selector.type, seen, node)
     return [Case(selector, branches, otherwise, c.pos(node.pos))]
 

@@ -188,8 +188,8 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
     if c.world.io.is_device_without_name(node.name):
         message = f'unknown name {node.name}; write name = "{node.name}" into the table of the device'
         return c.error(node.pos, "unknown", f"{message}, which makes it a variable")
-    names = [*(s for s in c.scope.names), *c.world.names.visible_names()]
-    hint = known_name_like(node.name, {_written(c, n) for n in names} - {""})
+    others = set(c.world.names.visible_names()) - set(c.world.names.function_names())  # no call, so no function
+    hint = known_name_like(node.name, ({_written(c, n) for n in c.scope.names} | others) - {""})
     if not hint and (address := _ADDRESS.fullmatch(node.name)):
         area = {"E": "I", "A": "Q"}.get(address[1].upper(), address[1])
         message = f"unknown name {node.name}; an address begins with %: %{area}{address[2]}"
