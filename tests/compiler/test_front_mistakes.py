@@ -314,6 +314,10 @@ def test_more_mistakes_in_a_declaration_say_what_to_write(line: str, said: str) 
             ["unknown name conut"],
         ),
         (
+            "VAR_GLOBAL speed : INT; END_VAR PROGRAM P VAR n : INT; END_VAR\nn := GVL.speed;\nEND_PROGRAM",
+            ["unknown name GVL; a list of VAR_GLOBAL has the name of its file: f"],
+        ),
+        (
             "FUNCTION Scale : INT\nScal := 1;\nEND_FUNCTION",
             ["unknown name Scal; did you mean Scale?"],
         ),

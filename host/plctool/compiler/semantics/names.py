@@ -350,6 +350,10 @@ class Names:
         types = [s for s in self._units.values() if isinstance(s, TypeSymbol) and s.decl.qualified]
         return found + [f"{t.decl.name}.{v}" for t in types for v in enum_names(t) if v.casefold() == key]
 
+    def list_names(self) -> list[str]:
+        """Names of the lists of global variables."""
+        return [s.name for s in self._lists.values()]
+
     def program_variables(self, name: str) -> list[str]:
         """What a name is in the PROGRAMs that have a variable of it, with the instance in front."""
         found = []
@@ -364,7 +368,7 @@ class Names:
         values = [name for s in self._units.values() if isinstance(s, TypeSymbol) for name in enum_names(s)]
         units = [s.decl.name for s in self._units.values()]
         named = [s.name for s in self._globals.values()]
-        named += [s.name for s in self._lists.values()] + [instance.name for instance in self.planned.values()]
+        named += self.list_names() + [instance.name for instance in self.planned.values()]
         return units + named + values + self.imported.known + self.library.names()
 
     def type_names(self) -> list[str]:

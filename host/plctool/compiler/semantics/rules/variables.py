@@ -84,6 +84,8 @@ def _flag_symbol(cls: ClassInfo | None, action: str) -> VarSymbol | None:
 
 _OWN = ("THIS", "SUPER")
 _ADDRESS = re.compile(r"([IQMEA])([XBWDL]?\d+)", re.IGNORECASE)
+_GLOBAL_LIST = re.compile(r"G_?VL\w*|GLOBALS?|\w*_GVL", re.IGNORECASE)
+_FEW = 3  # lists that are named
 _DATA_BLOCK = re.compile(r"DB\d+", re.IGNORECASE)
 _DURATION = re.compile(r"T_?(\d+(?:ms|us|ns|s|m|h|d))", re.IGNORECASE)
 
@@ -194,6 +196,9 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
         area = {"E": "I", "A": "Q"}.get(address[1].upper(), address[1])
         message = f"unknown name {node.name}; an address begins with %: %{area}{address[2]}"
         return c.error(node.pos, "unknown", message)
+    if not hint and _GLOBAL_LIST.fullmatch(node.name) and (lists := c.world.names.list_names()[:_FEW]):
+        message = f"unknown name {node.name}; a list of VAR_GLOBAL has the name of its file: {' or '.join(lists)}"
+        return c.missing(node.pos, node.name, message)
     if not hint and _DATA_BLOCK.fullmatch(node.name):
         message = f"unknown name {node.name}; there are no data blocks: declare a variable in VAR_GLOBAL"
         return c.error(node.pos, "unknown", message)
