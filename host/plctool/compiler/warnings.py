@@ -26,6 +26,7 @@ WARNINGS = {
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration or is compared with one",
     "escape": "a string ends with \\n, \\r or \\t, which are two characters each",
     "for-bound": "a FOR changes its end or step in its body, but both are computed once, at its start",
+    "index": "a FOR goes past the end of an array in an iteration that comes for certain, which stops the program",
     "integer-division": "an integer division drops its fraction before the result becomes a REAL",
     "io": "something in a description of inputs and outputs is probably not meant",
     "kept": "a variable is RETAIN or PERSISTENT, but what it holds is an address, which is not kept",

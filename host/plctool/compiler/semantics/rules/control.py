@@ -13,6 +13,7 @@ from plctool.compiler.semantics.checker import Checker, checks_statement
 from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary, is_untyped
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.labels import Labels
+from plctool.compiler.semantics.loop_bounds import passed_bounds
 from plctool.compiler.semantics.pitfalls import has_exit
 from plctool.compiler.semantics.rules.jumps import note_loops, report_leaving, report_repeated
 from plctool.compiler.semantics.rules.places import changeable_place
@@ -278,7 +279,10 @@ def for_statement(c: Checker, node: ast.For) -> list[Statement]:
         return []
     if not c.dialect.limits_each_turn:
         _report_changes(c, node, stop if node.step is None else [stop, step], body)
-    return [_noted(c, For(place, start, stop, step, body, pos, c.dialect.limits_each_turn))]
+    loop = For(place, start, stop, step, body, pos, c.dialect.limits_each_turn)
+    for at, message in passed_bounds(loop):
+        c.world.diagnostics.warning(at, "index", message)
+    return [_noted(c, loop)]
 
 
 def _report_never_run(c: Checker, node: ast.For, start: Expr, stop: Expr, step: Expr) -> None:
