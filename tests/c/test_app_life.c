@@ -112,6 +112,19 @@ static void origin_reset_deletes_the_application_and_its_boot_project(void)
     CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
 }
 
+static void origin_reset_ends_a_download_of_another_client(void)
+{
+    APP_BYTES second;
+
+    start_with_counter(1);
+    build_counter(&second, 2);
+    CHECK_EQUAL(AppDownloadBegin(second.size, image_crc(&second)), ERR_OK);
+    CHECK_EQUAL(AppDownloadWrite(0, second.bytes, 100), ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    CHECK_EQUAL(AppDownloadWrite(100, second.bytes + 100, 100), ERR_INVALID_SEQUENCE);
+    CHECK_EQUAL(download(&second), ERR_OK);
+}
+
 static void the_boot_project_runs_after_power_on(void)
 {
     start_with_counter(1);
@@ -459,6 +472,7 @@ int main(void)
     RUN(warm_reset_keeps_retain_and_clears_the_rest);
     RUN(cold_reset_clears_retain_too);
     RUN(origin_reset_deletes_the_application_and_its_boot_project);
+    RUN(origin_reset_ends_a_download_of_another_client);
     RUN(the_boot_project_runs_after_power_on);
     RUN(a_second_download_replaces_the_first);
     RUN(the_old_application_runs_on_while_a_new_one_arrives);

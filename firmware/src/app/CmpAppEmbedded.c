@@ -76,6 +76,7 @@ static RTS_RESULT reset_origin(void)
 
     if (result != ERR_OK)
         return result;
+    AppDownloadAbort(); /* of another client: its slot is wiped, too */
     AppUnload();
     AppAreasClear();
     AppCommitWipe(FILE_SLOT_A);

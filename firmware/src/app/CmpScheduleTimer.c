@@ -27,6 +27,8 @@ static struct {
     RTS_I64 since_ns[APP_MAX_TASKS + 1]; /* by guard: when what its cycle is charged with began */
 } schedule;
 
+static RTS_UI32 serials[APP_MAX_TASKS + 1]; /* of the cycles that were seen last, where SCHED_PROCESSOR_TIME */
+
 enum { NS_PER_US = 1000 };
 
 /* ---- tasks in timers ---- */
@@ -142,6 +144,8 @@ RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *cons
     RTS_UI32 i;
 
     delete_timers();
+    if (SCHED_PROCESSOR_TIME)
+        memset(serials, 0, sizeof serials); /* cycles of other tasks have the same numbers; none has 0 */
     TriggerCreate(tasks, count, areas, schedule.timer);
     for (i = 0; i < count && result == ERR_OK; i++)
         result = add_task(&tasks[i]);
@@ -257,33 +261,33 @@ static void check_time(RTS_I64 now_ns)
 }
 
 /* Where the port knows the processor time of each task: what it had used when a check first saw the cycle counts. */
-static void check_used_time(RTS_UI32 index, const IEC_GUARD *guard)
+static void check_used_time(RTS_UI32 place, const IEC_GUARD *guard)
 {
-    static RTS_UI32 serials[APP_MAX_TASKS + 1];
     RTS_I64 used_ns = SysExceptGetUsedNs(guard->arg);
 
     if (used_ns < 0)
         return; /* its cycle is over */
-    if (serials[index] != guard->serial)
-        schedule.since_ns[index] = used_ns;
-    serials[index] = guard->serial;
-    if (used_ns - schedule.since_ns[index] > guard->limit_ns)
+    if (serials[place] != guard->serial)
+        schedule.since_ns[place] = used_ns;
+    serials[place] = guard->serial;
+    if (used_ns - schedule.since_ns[place] > guard->limit_ns)
         SysExceptBreak(guard->arg, RTSEXCPT_WATCHDOG);
 }
 
 static void check_each(RTS_I64 now_ns)
 {
+    RTS_UI32 count = IecTaskGetCount();
     IEC_GUARD guard;
     RTS_UI32 i;
 
     look_for_stop(now_ns);
-    for (i = 0; i <= IecTaskGetCount(); i++) {
+    for (i = 0; i <= count; i++) {
         if (!IecTaskReadGuard(i, &guard))
             continue;
         if (holds_up_stop(&guard, now_ns))
             SysExceptBreak(guard.arg, RTSEXCPT_STOP_TIMEOUT);
         else if (SCHED_PROCESSOR_TIME)
-            check_used_time(i, &guard);
+            check_used_time(i < count ? i : APP_MAX_TASKS, &guard); /* the place of the initialisation does not move */
     }
 }
 

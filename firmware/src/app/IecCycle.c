@@ -174,7 +174,12 @@ static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
 {
     RTS_UI32 elapsed = saturate(elapsed_ns);
     RTS_UI32 late = saturate(late_ns);
+    RTS_UI32 cycles = task->cycles + 1;
 
+    if (cycles == 0) { /* both begin anew, or the average were wrong from now on */
+        task->sum_ns = 0;
+        cycles = 1;
+    }
     task->last_ns = elapsed;
     task->sum_ns += elapsed;
     if (elapsed < task->min_ns)
@@ -183,7 +188,7 @@ static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
         task->max_ns = elapsed;
     if (late > task->jitter_ns)
         task->jitter_ns = late;
-    SysAtomicStore(&task->cycles, task->cycles + 1);
+    SysAtomicStore(&task->cycles, cycles);
 }
 
 /* What SysTimeGetNs does not give: how long this context had the processor. It costs more. */

@@ -119,11 +119,15 @@ RTS_UI32 TriggerGetLost(RTS_UI32 task)
 
 void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas, const RTS_HANDLE *task_timers)
 {
-    memset(&triggers, 0, sizeof triggers);
-    triggers.tasks = tasks;
-    triggers.areas = areas;
-    triggers.count = count;
+    SysAtomicStore(&triggers.count, 0); /* an external event that comes meanwhile is for no task */
+    triggers.watched = 0;
+    memset(triggers.list, 0, sizeof triggers.list);
+    if (count > 0) {
+        triggers.tasks = tasks;
+        triggers.areas = areas;
+    }
     timers = task_timers;
+    SysAtomicStore(&triggers.count, count);
 }
 
 const CDL_TASK *TriggerGetTask(RTS_UI32 task)
@@ -208,7 +212,7 @@ RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event)
 
     if (!is_event(event))
         return ERR_INVALID_HANDLE;
-    for (i = 0; i < triggers.count; i++) {
+    for (i = 0; i < SysAtomicLoad(&triggers.count); i++) {
         const CDL_TASK *task = &triggers.tasks[i];
         if (task->kind == KIND_EXTERNAL && task->event_offset == events[event]) {
             (void)SysAtomicAdd(&triggers.list[i].changes, 2);

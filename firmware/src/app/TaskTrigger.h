@@ -11,7 +11,8 @@
 
 /* Replaces all triggers by those of `count` tasks; nothing has happened yet. Records and areas (base addresses by
  * APP_AREA_*) stay valid until the next call, as do the timers of the tasks, which an event triggers on ports with
- * SCHED_EVENTS_IN_TIMERS (NULL: there are none). From main, while no task runs. */
+ * SCHED_EVENTS_IN_TIMERS (NULL: there are none). The memory of the records is readable for good: an external event may
+ * come at any time, on another core as well. From main, while no task runs. */
 void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas, const RTS_HANDLE *timers);
 
 const CDL_TASK *TriggerGetTask(RTS_UI32 task);

@@ -121,9 +121,10 @@ static RTS_UI32 render_log(LOG_PART *part, RTS_UI32 last)
 
     while (LogGetEntry(handle + 1, &entry) == ERR_OK && entry.handle > handle && (last == 0 || entry.handle <= last)) {
         handle = entry.handle;
+        RTS_I64 time_ms = entry.time_ns / 1000000; /* more than 32 bits after 49 days */
         add_line(part, line,
-                 (RTS_UI32)CMUtlsnprintf(line, sizeof(line), "%u ms %s: %s\n", (unsigned)(entry.time_ns / 1000000),
-                                         CMGetComponentName(entry.component), entry.text));
+                 (RTS_UI32)CMUtlsnprintf(line, sizeof(line), "%u s %u ms %s: %s\n", (unsigned)(time_ms / 1000),
+                                         (unsigned)(time_ms % 1000), CMGetComponentName(entry.component), entry.text));
     }
     return handle;
 }
