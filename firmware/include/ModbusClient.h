@@ -103,6 +103,10 @@ static inline bool ModbusClientIsAsking(const MODBUS_CALL *call)
 
 void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns);
 
+/* Has what its devices were not yet written come first, before the client is given up. False when there is no more of it:
+ * devices that are lost, and jobs that were refused, do not count. */
+bool ModbusClientHurryWrites(MODBUS_CLIENT *client);
+
 /* When the client has to be polled next if nothing arrives before, INT64_MAX: not at all. One that waits for its link:
  * now. For ports that need not poll all the time. */
 RTS_I64 ModbusClientGetDueNs(const MODBUS_CLIENT *client, RTS_I64 now_ns);

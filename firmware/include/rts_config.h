@@ -479,6 +479,11 @@
 #define MODBUS_RETRY_ALONE_MS 1000
 #endif
 
+/* How long main waits until devices that reply have their last outputs, when a program is replaced or ends [ms]. */
+#ifndef MODBUS_LAST_WRITES_MS
+#define MODBUS_LAST_WRITES_MS 500
+#endif
+
 /* How long a connection to a Modbus device may take, and how often it is tried [ms]. */
 #ifndef MODBUS_CONNECT_MS
 #define MODBUS_CONNECT_MS 5000

@@ -21,6 +21,7 @@
 #define IO_SIM_TAKES_ALL 1
 #define IO_GPIO_GROUPS 2
 #define MODBUS_MAX_CALLS 16
+#define MODBUS_LAST_WRITES_MS 0 /* its time does not go on by itself */
 #define NETSERVER_MESSAGE_SIZE 16384
 #define COM_PACKET_SIZE 2048
 #define COMM_PASSWORD 1

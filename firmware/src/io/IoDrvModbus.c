@@ -44,11 +44,31 @@ MODBUS_SETUP *IoDrvModbusGetSetup(void)
 
 /* ---- configuration ---- */
 
+/* Devices get what their outputs have become, the safe state, before nobody writes to them any more. */
+static void write_last_outputs(void)
+{
+    RTS_I64 now_ns = SysTimeGetNs();
+    RTS_I64 end_ns = now_ns + (RTS_I64)MODBUS_LAST_WRITES_MS * 1000000;
+    bool found = true;
+
+    for (; found && now_ns < end_ns; now_ns = SysTimeGetNs()) {
+        found = false;
+        for (RTS_UI32 i = 0; i < setup.client_count; i++) {
+            found = ModbusClientHurryWrites(&setup.clients[i].client) || found;
+            ModbusClientPoll(&setup.clients[i].client, now_ns);
+        }
+        if (found && !RTS_ONE_CORE)
+            SysTimePause();
+    }
+}
+
 /* What is asked for is set up when it is known what is copied. */
 static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
 {
     RTS_UNUSED(connectors);
     RTS_UNUSED(count);
+    if (is_running)
+        write_last_outputs();
     is_running = false;
     ModbusCallsBegin(NULL, NULL);
     ModbusScanEnd();

@@ -134,6 +134,41 @@ static void choose(MODBUS_CLIENT *client, RTS_I64 now_ns)
     choose_call(client, earliest_ns, now_ns);
 }
 
+/* ---- the last writes ---- */
+
+static bool is_unwritten(const MODBUS_DEVICE *device, const MODBUS_JOB_STATE *state)
+{
+    bool refused = device->failures == 0 && !state->good && state->done_ns != 0;
+
+    return state->job->write_count != 0 && state->has_out && has_changed(state) && !refused;
+}
+
+static bool hurry_device(const MODBUS_DEVICE *device)
+{
+    bool found = false;
+
+    for (RTS_UI32 i = 0; i < device->job_count; i++) {
+        MODBUS_JOB_STATE *state = &device->jobs[i];
+        if (!is_unwritten(device, state))
+            continue;
+        state->due_ns = 0;
+        state->done_ns = 0;
+        found = true;
+    }
+    return found;
+}
+
+bool ModbusClientHurryWrites(MODBUS_CLIENT *client)
+{
+    bool found = client->device != NULL && client->job != NULL && client->job->job->write_count != 0;
+
+    for (RTS_UI32 i = 0; i < client->device_count; i++) {
+        if (!ModbusDeviceIsLost(&client->devices[i]) && hurry_device(&client->devices[i]))
+            found = true;
+    }
+    return found;
+}
+
 /* ---- requests ---- */
 
 /* From the order of the wire to that of memory, or back. */
