@@ -6,7 +6,7 @@
 #include "../../firmware/src/app/IecCycle.c"
 #include "app_device.h"
 
-static void the_average_begins_anew_when_the_count_does(void)
+static void the_average_starts_again_when_the_count_does(void)
 {
     IEC_TASK_INFO info;
 
@@ -24,6 +24,6 @@ static void the_average_begins_anew_when_the_count_does(void)
 
 int main(void)
 {
-    RUN(the_average_begins_anew_when_the_count_does);
+    RUN(the_average_starts_again_when_the_count_does);
     return test_result();
 }

@@ -176,7 +176,7 @@ static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
     RTS_UI32 late = saturate(late_ns);
     RTS_UI32 cycles = task->cycles + 1;
 
-    if (cycles == 0) { /* both begin anew, or the average were wrong from now on */
+    if (cycles == 0) { /* both start again, or the average would be wrong from now on */
         task->sum_ns = 0;
         cycles = 1;
     }

@@ -44,7 +44,7 @@ MODBUS_SETUP *IoDrvModbusGetSetup(void)
 
 /* ---- configuration ---- */
 
-/* Devices get what their outputs have become, the safe state, before nobody writes to them any more. */
+/* Devices get what their outputs have become, the safe state, before the lines are closed. */
 static void write_last_outputs(void)
 {
     RTS_I64 now_ns = SysTimeGetNs();
