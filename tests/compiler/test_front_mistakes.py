@@ -318,6 +318,11 @@ def test_more_mistakes_in_a_declaration_say_what_to_write(line: str, said: str) 
             ["unknown name GVL; a list of VAR_GLOBAL has the name of its file: f"],
         ),
         (
+            "FUNCTION_BLOCK B VAR_INPUT n : UDINT := SIZEOF(buf); END_VAR\nVAR buf : INT; END_VAR\nbuf := 1;\n"
+            "END_FUNCTION_BLOCK",
+            ["buf is declared below; move that line up"],
+        ),
+        (
             "FUNCTION Scale : INT\nScal := 1;\nEND_FUNCTION",
             ["unknown name Scal; did you mean Scale?"],
         ),

@@ -288,8 +288,8 @@ class Intrinsic(Enum):
     SHR = "SHR"
     ROL = "ROL"  # count modulo the width
     ROR = "ROR"
-    MUX = "MUX"  # (k, in0, in1, ...): all evaluated; k clamped to the last
-    SELECT = "SEL"  # (g, in0, in1)
+    MUX = "MUX"  # (k, in0, in1, ...): the chosen one alone is evaluated; any k that is no index chooses the last
+    SELECT = "SEL"  # (g, in0, in1): the chosen one alone is evaluated
     MIN = "MIN"  # two operands of one scalar type
     MAX = "MAX"
     TIME = "TIME"  # () -> TIME of this cycle [ms]

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import TypeVar
+
 from plctool.compiler.codegen.ir import FALSE, TRUE, Value
 from plctool.compiler.codegen.lower_arith import (
     COMPARISONS,
@@ -45,16 +49,22 @@ from plctool.compiler.typed import (
     Call,
     Const,
     Convert,
+    DerefPlace,
     Expr,
+    IndexPlace,
     Intrinsic,
     IntrinsicCall,
     Load,
+    Node,
+    Storage,
     Unary,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import walk
 from plctool.iec.types import UDINT, StringType, Type
 from plctool.image.targets import FASTEST
 
+T = TypeVar("T")
 _SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 
 
@@ -252,6 +262,10 @@ def intrinsic(frame: Frame, e: IntrinsicCall) -> Value:
     if op is Intrinsic.STRING_SIZE:
         return convert(frame, frame.aggregate(e.args[0]).capacity, UDINT, t)
     first = e.args[0].type
+    if op in (Intrinsic.SELECT, Intrinsic.MUX) and not all(_may_be_idle(arg) for arg in e.args[1:]):
+        return _phi(frame, value_type(t), _each_way(frame, e, frame.value))
+    if _is_lazy(e):
+        return _phi(frame, value_type(t), _each_way(frame, e, frame.value))
     if op is Intrinsic.SELECT:
         choice, no, yes = truth(frame, e.args[0]), frame.value(e.args[1]), frame.value(e.args[2])
         return select(frame, choice, yes, no, t)
@@ -290,12 +304,17 @@ def _exchange(frame: Frame, address: Value, old: Value, new: Value) -> Value:
 def _choose(frame: Frame, selector: Value, selector_type: Type, values: list[Value], text: str) -> Value:
     """MUX: the last value for every selector that is not the index of another one."""
     result = values[-1]
-    limits = type_range(selector_type)
-    assert limits is not None
-    for index in reversed(range(min(len(values) - 1, limits[1] + 1))):
-        hit = frame.fn.value(f"icmp eq {value_type(selector_type)} {selector}, {index}")
+    for index, hit in reversed(list(enumerate(_hits(frame, selector, selector_type, len(values))))):
         result = frame.fn.value(f"select i1 {hit}, {text} {values[index]}, {text} {result}")
     return result
+
+
+def _hits(frame: Frame, selector: Value, selector_type: Type, count: int) -> list[Value]:
+    """Whether the selector of a MUX is each index but the last one of its `count` inputs, as far as it can be."""
+    limits = type_range(selector_type)
+    assert limits is not None
+    text = value_type(selector_type)
+    return [frame.fn.value(f"icmp eq {text} {selector}, {index}") for index in range(min(count - 1, limits[1] + 1))]
 
 
 @rule(AGGREGATES, Const)
@@ -327,18 +346,82 @@ def called_aggregate(frame: Frame, e: Call) -> Ref:
 @rule(AGGREGATES, IntrinsicCall)
 def selected(frame: Frame, e: IntrinsicCall) -> Ref:
     """SEL and MUX choose an address."""
+    if _is_lazy(e):
+        ways = _each_way(frame, e, partial(_address_and_capacity, frame))
+        pointer = _phi(frame, "ptr", [(address, block) for (address, _), block in ways])
+        capacities = [capacity for (_, capacity), _ in ways]
+        if any(c != capacities[0] for c in capacities):
+            capacity = _phi(frame, "i32", [(capacity, block) for (_, capacity), block in ways])
+            return Ref(pointer, 0, e.type, capacity=capacity)
+        return Ref(pointer, 0, e.type, capacity=capacities[0])
     choice = truth(frame, e.args[0]) if e.intrinsic is Intrinsic.SELECT else frame.value(e.args[0])
-    refs = [frame.aggregate(arg) for arg in e.args[1:]]
-    pointers = [frame.address(ref) for ref in refs]
-    capacities = [ref.capacity for ref in refs]
-    pointer = _pick(frame, e, choice, pointers, "ptr")
-    capacity = capacities[0]
-    if any(c != capacity for c in capacities):
-        capacity = _pick(frame, e, choice, capacities, "i32")
+    pairs = [_address_and_capacity(frame, arg) for arg in e.args[1:]]
+    pointer = _pick(frame, e, choice, [address for address, _ in pairs], "ptr")
+    capacity = pairs[0][1]
+    if any(c != capacity for _, c in pairs):
+        capacity = _pick(frame, e, choice, [c for _, c in pairs], "i32")
     return Ref(pointer, 0, e.type, capacity=capacity)
+
+
+def _address_and_capacity(frame: Frame, e: Expr) -> tuple[Value, Value]:
+    ref = frame.aggregate(e)
+    return frame.address(ref), ref.capacity
 
 
 def _pick(frame: Frame, e: IntrinsicCall, choice: Value, values: list[Value], text: str) -> Value:
     if e.intrinsic is Intrinsic.SELECT:
         return frame.fn.value(f"select i1 {choice}, {text} {values[1]}, {text} {values[0]}")
     return _choose(frame, choice, e.args[0].type, values, text)
+
+
+# ---- inputs of SEL and MUX that are worked out only when they are chosen ----
+
+
+def _is_lazy(e: IntrinsicCall) -> bool:
+    return e.intrinsic in (Intrinsic.SELECT, Intrinsic.MUX) and not all(_may_be_idle(arg) for arg in e.args[1:])
+
+
+def _may_be_idle(e: Expr) -> bool:
+    """Whether it is all the same if it is worked out and not used: it cannot fail, and does nothing else."""
+    return not any(_does_more(node) for node in walk(e))
+
+
+def _does_more(node: Node) -> bool:
+    """Whether what this node does, without its parts, may fail or change something."""
+    if isinstance(node, Binary):
+        divides = node.op in (BinaryOp.DIV, BinaryOp.MOD) and value_type(node.type) not in REALS
+        return divides and not known_integer(node.right)
+    if isinstance(node, IndexPlace):
+        return not all(isinstance(index, Const) for index in node.indices)
+    if isinstance(node, VarPlace):
+        return node.var.storage is Storage.REFERENCE
+    if isinstance(node, Convert):
+        return node.check is not None
+    if isinstance(node, IntrinsicCall):
+        return node.intrinsic is Intrinsic.EXCHANGE
+    return isinstance(node, Call | AssignedValue | DerefPlace)
+
+
+def _each_way(frame: Frame, e: IntrinsicCall, work: Callable[[Expr], T]) -> list[tuple[T, str]]:
+    """What `work` makes of each input, and the block it does so in, which is run only when the input is chosen."""
+    fn = frame.fn
+    if e.intrinsic is Intrinsic.SELECT:
+        tests, inputs = [truth(frame, e.args[0])], [e.args[2], e.args[1]]
+    else:
+        inputs = e.args[1:]
+        tests = _hits(frame, frame.value(e.args[0]), e.args[0].type, len(inputs))
+    end, ways = fn.label("chosen"), list[tuple[T, str]]()
+    for test, arg in zip(tests, inputs, strict=False):
+        this, others = fn.label("choice"), fn.label("others")
+        fn.branch_if(test, this, others)
+        fn.begin_detached(this)
+        ways.append((work(arg), fn.block))
+        fn.branch(end)
+        fn.begin_detached(others)
+    ways.append((work(inputs[-1]), fn.block))
+    fn.begin(end)
+    return ways
+
+
+def _phi(frame: Frame, text: str, ways: list[tuple[Value, str]]) -> Value:
+    return frame.fn.value(f"phi {text} " + ", ".join(f"[ {value}, %{block} ]" for value, block in ways))

@@ -201,7 +201,8 @@ def intrinsic(op: Intrinsic, values: list[Value], t: Type) -> Value | None:
     if op is Intrinsic.SQRT:
         return rounded(math.sqrt(numbers[0]), base) if numbers[0] >= 0 else None
     if op in (Intrinsic.MIN, Intrinsic.MAX):
-        return min(numbers) if op is Intrinsic.MIN else max(numbers)
+        left, right = numbers  # of two zeros, or with NaN, the right one, as at run time
+        return left if (left < right if op is Intrinsic.MIN else left > right) else right
     value, count = numbers
     assert isinstance(value, int) and isinstance(count, int)
     return _shifted(op, value, count, base)

@@ -22,6 +22,8 @@ from plctool.compiler.typed import (
     For,
     If,
     IndexPlace,
+    Intrinsic,
+    IntrinsicCall,
     Jump,
     Load,
     Node,
@@ -34,8 +36,6 @@ from plctool.compiler.typed import (
 )
 from plctool.compiler.typed_nodes import root_of, walk, written_places
 from plctool.iec.types import ArrayType, OpenArrayType
-
-_PERHAPS = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 
 
 def passed_bounds(loop: For) -> Iterator[tuple[Pos, str]]:
@@ -82,10 +82,17 @@ def _certain_nodes(body: list[Statement]) -> Iterator[Node]:
             found = list(walk(statement))
         elif isinstance(statement, If):
             found = list(walk(statement.branches[0][0]))
-        if not any(isinstance(node, Binary) and node.op in _PERHAPS for node in found):
+        if not any(_is_partial(node) for node in found):
             yield from found
         if has_exit([statement], (Continue,)) or _may_be_left([statement]):
             return
+
+
+def _is_partial(node: Node) -> bool:
+    """Whether not all that it is made of may be evaluated."""
+    if isinstance(node, Binary):
+        return node.op in (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
+    return isinstance(node, IntrinsicCall) and node.intrinsic in (Intrinsic.SELECT, Intrinsic.MUX)
 
 
 def _index_at(index: Expr, variable: Variable, value: int) -> int | None:

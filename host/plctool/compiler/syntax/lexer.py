@@ -110,6 +110,7 @@ _STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quote
 _ACCESSOR = re.compile(r"\b(GET|SET)\s*\Z", re.IGNORECASE)
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
 _NAMED_ARGUMENT = re.compile(r"\s*\(\s*[A-Za-z_]\w*\s*(?::=|=>)", re.ASCII)
+_VALUE_FOLLOWS = re.compile(r"\s*(?::=|=>|[.^\[])")
 _PART_FOLLOWS = re.compile(r"\s*[:.,^\[]")
 _NAME = re.compile(r"\s+[^\W\d]")
 _ADDRESS = re.compile(r"\s*%")
@@ -333,6 +334,11 @@ def modified(token: Token, text: str) -> tuple[str, str] | None:
     """Keyword and name of a unit whose modifier stands before it, as in `PUBLIC METHOD m`."""
     match = _MODIFIED.match(text, token.end)
     return None if match is None else (match[1].upper(), match[2])
+
+
+def has_parts(token: Token, text: str) -> bool:
+    """Whether NULL is a name, as a value or a part of it follows."""
+    return _VALUE_FOLLOWS.match(text, token.end) is not None
 
 
 def is_operator_function(token: Token, text: str) -> bool:

@@ -23,6 +23,7 @@ from plctool.compiler.syntax.lexer import (
     Report,
     Token,
     begins_unit,
+    has_parts,
     is_followed_by_name,
     is_operator_function,
     meant,
@@ -88,7 +89,7 @@ def _machine() -> tuple[Builder, Callable[[], Parser]]:
     return builder, lambda: Parser(tables, reducers, gotos)
 
 
-_AMBIGUOUS = SOFT | {"OP", "NOT"}
+_AMBIGUOUS = SOFT | {"OP", "NOT", "NULL"}
 
 
 def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None:
@@ -106,6 +107,8 @@ def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None
         is_name = recovery.skipping or not (token.text.startswith("_") or is_followed_by_name(token, text))
         if not is_name:
             recovery.refuse(token)
+    elif kind == "NULL":
+        is_name = has_parts(token, text)
     elif kind == "NOT":
         is_name = is_operator_function(token, text)
     elif kind == "OP":

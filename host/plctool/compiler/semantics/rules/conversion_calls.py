@@ -9,6 +9,7 @@ import re
 from difflib import get_close_matches
 
 from plctool.compiler.semantics import arithmetic
+from plctool.compiler.semantics.arithmetic import as_number
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import (
     BITS,
@@ -151,7 +152,7 @@ def _by_types(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Ex
     target = _conversion_type(c, match["target"])
     if target is None or (match["source"] and source is None):
         return None
-    e = settle(_operand(c, name, node, source))
+    e = as_number(settle(_operand(c, name, node, source)))
     if e.type is ERROR:
         return e
     if match["how"] == "TRUNC":

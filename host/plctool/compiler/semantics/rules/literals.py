@@ -34,6 +34,7 @@ from plctool.iec.types import (
     TIME,
     TOD,
     WCHAR,
+    EnumType,
     Kind,
     PointerType,
     StringType,
@@ -66,7 +67,8 @@ def literal_value(c: Checker, node: ast.Literal, expected: Type | None) -> Expr:
     if kind is ast.LiteralKind.DATE:
         return _date(c, node, pos)
     if kind is ast.LiteralKind.NULL:
-        return Const(0, NULL_TYPE, pos)
+        named = c.scope.lookup("NULL") is not None or (isinstance(expected, EnumType) and expected.has("NULL"))
+        return c.expr(ast.Name(node.pos, "NULL"), expected) if named else Const(0, NULL_TYPE, pos)
     if kind is ast.LiteralKind.BAD:
         return error_value(pos)
     return _typed_literal(c, node, pos)

@@ -27,15 +27,17 @@ from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.rules.literals import match_literals, untyped_bits
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Unary, UnaryOp
+from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, Unary, UnaryOp
 from plctool.iec.types import (
     BOOL,
     BYTE,
     DT,
+    LINT,
     LREAL,
     LTIME,
     TIME,
     TOD,
+    ULINT,
     WORD,
     ArrayType,
     Elementary,
@@ -245,9 +247,22 @@ def _duration_arithmetic(c: Checker, op: BinaryOp, left: Expr, right: Expr, offs
             product = _build(c, op, convert(convert(left, number), LREAL), c.coerce(right, LREAL), LREAL, offset)
             return convert(convert(product, number), x)
         if y.bits > x.bits or (y.bits == x.bits and not y.signed):
+            if op is BinaryOp.DIV:
+                quotient = _build(c, op, convert(left, LINT), _divisor(right, y), LINT, offset)
+                return convert(quotient, x)
             right = convert(right, number)
         return _build(c, op, left, convert(convert(right, number), x), x, offset)
     return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
+
+
+def _divisor(e: Expr, t: Elementary) -> Expr:
+    """A number of up to 64 bits as LINT. What is larger than all of them gives 0, as the largest one does."""
+    most = (1 << 63) - 1  # of LINT
+    if t.bits < 64 or t.signed:
+        return convert(e, LINT)
+    if isinstance(e, Const) and isinstance(e.value, int):
+        return Const(min(e.value, most), LINT, e.pos)
+    return convert(IntrinsicCall(Intrinsic.MIN, [convert(e, ULINT), Const(most, ULINT, e.pos)], ULINT, e.pos), LINT)
 
 
 def _duration_hint(left: Expr, right: Expr) -> str:

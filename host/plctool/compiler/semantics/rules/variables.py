@@ -183,7 +183,7 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
     if duration is not None:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; a duration is written T#{duration[1].lower()}")
     inside = c.world.names.program_variables(node.name)
-    if c.scope.pou is not None and f"{c.scope.pou.name}.{node.name}".casefold() in (s.casefold() for s in inside):
+    if _is_declared_below(c, node, inside):
         return c.error(node.pos, "unknown", f"{node.name} is declared below; move that line up")
     if inside:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(inside)}")
@@ -205,6 +205,17 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
     if node.name and not hint:
         return c.missing(node.pos, node.name, f"unknown name {node.name}")
     return c.error(node.pos, "unknown", f"unknown name {node.name}{hint}" if node.name else "a name is missing")
+
+
+def _is_declared_below(c: Checker, node: ast.Name, of_programs: list[str]) -> bool:
+    """Whether the unit around declares the name after its use. `of_programs`: those of programs, with the instance."""
+    if c.scope.pou is None:
+        return False
+    unit = c.scope.lookup(c.scope.pou.name)
+    if not isinstance(unit, PouSymbol):
+        return f"{c.scope.pou.name}.{node.name}".casefold() in map(str.casefold, of_programs)
+    names = [entry for block in unit.decl.blocks for line in block.decls for entry in line.names]
+    return any(pos > node.pos and name.casefold() == node.name.casefold() for pos, name in names)
 
 
 def _written(c: Checker, key: str) -> str:
