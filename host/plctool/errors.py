@@ -67,11 +67,11 @@ def counted(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
-def did_you_mean(name: str, candidates: Iterable[str]) -> str:
-    """`; did you mean X?` for the candidate most like `name`, else nothing."""
+def did_you_mean(name: str, candidates: Iterable[str], likeness: float = 0.7) -> str:
+    """`; did you mean X?` for the candidate most like `name`, else nothing. `likeness`: at least, 1 is the same."""
     from difflib import get_close_matches
 
     # Of names that differ in case only the last in this order, whatever the order of the candidates.
     by_key = {key: c for c in sorted(candidates) if (key := c.casefold()) != name.casefold()}
-    close = get_close_matches(name.casefold(), list(by_key), n=1, cutoff=0.7)
+    close = get_close_matches(name.casefold(), list(by_key), n=1, cutoff=likeness)
     return f"; did you mean {by_key[close[0]]}?" if close else ""

@@ -102,9 +102,9 @@ def library_of(name: str) -> str:
     return next(found, "")
 
 
-def known_name_like(name: str, candidates: Iterable[str]) -> str:
+def known_name_like(name: str, candidates: Iterable[str], likeness: float = 0.7) -> str:
     """`; did you mean X?` for an unknown name; nothing for one that a library has, which is missing, not misspelt."""
-    return "" if library_of(name) else did_you_mean(name, candidates)
+    return "" if library_of(name) else did_you_mean(name, candidates, likeness)
 
 
 def table(uses: Sequence[Use]) -> list[str]:

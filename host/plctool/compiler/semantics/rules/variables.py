@@ -85,6 +85,7 @@ def _flag_symbol(cls: ClassInfo | None, action: str) -> VarSymbol | None:
 _OWN = ("THIS", "SUPER")
 _ADDRESS = re.compile(r"([IQMEA])([XBWDL]?\d+)", re.IGNORECASE)
 _GLOBAL_LIST = re.compile(r"G_?VL\w*|GLOBALS?|\w*_GVL", re.IGNORECASE)
+_LIKE_A_FUNCTION = 0.8  # a name that is not called
 _FEW = 3  # lists that are named
 _DATA_BLOCK = re.compile(r"DB\d+", re.IGNORECASE)
 _DURATION = re.compile(r"T_?(\d+(?:ms|us|ns|s|m|h|d))", re.IGNORECASE)
@@ -190,8 +191,10 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
     if c.world.io.is_device_without_name(node.name):
         message = f'unknown name {node.name}; write name = "{node.name}" into the table of the device'
         return c.error(node.pos, "unknown", f"{message}, which makes it a variable")
-    others = set(c.world.names.visible_names()) - set(c.world.names.function_names())  # no call, so no function
+    functions = set(c.world.names.function_names())
+    others = set(c.world.names.visible_names()) - functions
     hint = known_name_like(node.name, ({_written(c, n) for n in c.scope.names} | others) - {""})
+    hint = hint or known_name_like(node.name, functions, _LIKE_A_FUNCTION)
     if not hint and (address := _ADDRESS.fullmatch(node.name)):
         area = {"E": "I", "A": "Q"}.get(address[1].upper(), address[1])
         message = f"unknown name {node.name}; an address begins with %: %{area}{address[2]}"
