@@ -4,13 +4,17 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * The threads of the driver are real, the cycles of the program are on virtual time: a test lets cycles pass until the
- * other side has done its part.
+ * other side has done its part. The linker leads what the threads write, and the wait for their end, here (--wrap): a
+ * slow device is one whose writes wait until the test lets them go on. So it does with the lock, which the simulator,
+ * without other threads, does not need.
  */
 #define _GNU_SOURCE
 #include "../../firmware/port/linux/SysfsFiles.h"
+#include "SysAtomic.h"
 #include "io_driver.h"
 
 #include <ftw.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
@@ -94,6 +98,56 @@ static void make_tree(void)
     put(CHIP "pwm1/enable", "0\n");
 }
 
+static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+
+RTS_UI32 __wrap_SysLockEnter(void);
+RTS_UI32 __wrap_SysLockEnter(void)
+{
+    CHECK_EQUAL(pthread_mutex_lock(&mutex), 0);
+    return 0;
+}
+
+void __wrap_SysLockLeave(RTS_UI32 before);
+void __wrap_SysLockLeave(RTS_UI32 before)
+{
+    RTS_UNUSED(before);
+    CHECK_EQUAL(pthread_mutex_unlock(&mutex), 0);
+}
+
+/* ---- a slow device ---- */
+
+static struct {
+    RTS_UI32 is_slow;
+    RTS_UI32 waiting; /* writes that have begun */
+    RTS_UI32 both;    /* there were two at a time */
+    RTS_UI32 fails;   /* so many next writes */
+} bus;
+
+bool __real_SysfsWrite(const SYSFS_SETUP *setup, RTS_UI32 n, const char *folder, RTS_UI32 value);
+bool __wrap_SysfsWrite(const SYSFS_SETUP *setup, RTS_UI32 n, const char *folder, RTS_UI32 value);
+bool __wrap_SysfsWrite(const SYSFS_SETUP *setup, RTS_UI32 n, const char *folder, RTS_UI32 value)
+{
+    if (SysAtomicAdd(&bus.waiting, 1) > 0)
+        SysAtomicStore(&bus.both, 1);
+    while (SysAtomicLoad(&bus.is_slow) != 0)
+        (void)nanosleep(&(struct timespec){0, 1000000}, NULL);
+    (void)SysAtomicAdd(&bus.waiting, (RTS_UI32)-1);
+    if (SysAtomicLoad(&bus.fails) > 0) {
+        (void)SysAtomicAdd(&bus.fails, (RTS_UI32)-1);
+        return false;
+    }
+    return __real_SysfsWrite(setup, n, folder, value);
+}
+
+/* The runtime waits for the threads only at its end. */
+int __real_pthread_clockjoin_np(pthread_t thread, void **result, clockid_t clock, const struct timespec *until);
+int __wrap_pthread_clockjoin_np(pthread_t thread, void **result, clockid_t clock, const struct timespec *until);
+int __wrap_pthread_clockjoin_np(pthread_t thread, void **result, clockid_t clock, const struct timespec *until)
+{
+    SysAtomicStore(&bus.is_slow, 0);
+    return __real_pthread_clockjoin_np(thread, result, clock, until);
+}
+
 static RTS_UI32 bits_of(float number)
 {
     RTS_UI32 bits;
@@ -135,16 +189,22 @@ static void begin_iio(const char *device, const char *second, RTS_UI16 on_error)
     io_add_channel(&io, 0, IO_MAP_OUTPUTS, 0, SYSFS_VALUE + 2, 0, 0, 32)->flags = IO_ZERO;
 }
 
-/* PWM: %QD0, a copy of %ID0, which nothing drives, to output 1 of the chip. */
-static void begin_pwm(const char *output)
+/* PWM: %QD0, a copy of %ID0, which nothing drives, to an output of the chip. */
+static void add_pwm(const char *output, RTS_UI16 on_stop)
 {
-    begin_kernel();
     add_device("Heater", "pwmchip0", SYSFS_PWM);
     io_add_text_parameter(&io, SYSFS_CHANNEL + 0, output);
     io_add_parameter(&io, SYSFS_OPTIONS + 0, 8, SYSFS_OPTION_OUT | SYSFS_OPTION_REAL);
     io_add_parameter(&io, SYSFS_PERIOD + 0, 32, 1000000);
     add_copying_task("Main", 10000, 0);
-    io_add_channel(&io, 0, IO_MAP_OUTPUTS, 0, SYSFS_VALUE + 0, 0, 0, 32)->flags = IO_ZERO;
+    io_add_channel(&io, 0, IO_MAP_OUTPUTS, (RTS_UI16)(io.head.connectors - 1), SYSFS_VALUE + 0, 0, 0, 32)->flags =
+        on_stop;
+}
+
+static void begin_pwm(const char *output)
+{
+    begin_kernel();
+    add_pwm(output, IO_ZERO);
 }
 
 static void end_kernel(void)
@@ -334,6 +394,160 @@ static void an_output_that_is_not_exported_yet_is(void)
     end_kernel();
 }
 
+/* ---- the end of a set-up ---- */
+
+static void main_pass(void)
+{
+    CHECK_EQUAL(IoDrvSysfs_Hook(CH_COMM_CYCLE), ERR_OK);
+}
+
+/* A program that has one output at 50 %; the device is in the middle of writing 60 %. */
+static void start_slow_write(void)
+{
+    memset(&bus, 0, sizeof bus);
+    start_io();
+    set_input(bits_of(50));
+    AWAIT(get(CHIP "pwm1/duty_cycle") == 500000);
+    SysAtomicStore(&bus.is_slow, 1);
+    set_input(bits_of(60));
+    AWAIT(SysAtomicLoad(&bus.waiting) == 1);
+}
+
+static void begin_slow_write(RTS_UI16 on_stop)
+{
+    begin_kernel();
+    add_pwm("pwm1", on_stop);
+    start_slow_write();
+}
+
+static void go_on(void)
+{
+    SysAtomicStore(&bus.is_slow, 0);
+}
+
+static void begin_other_program(void)
+{
+    spec_init(&spec);
+    spec.areas[APP_AREA_INPUT] = 32;
+    spec.areas[APP_AREA_OUTPUT] = 32;
+    io_init(&io);
+}
+
+static void a_reset_to_origin_switches_an_output_off(void)
+{
+    begin_slow_write(IO_ZERO);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    main_pass();
+    go_on();
+    AWAIT(get(CHIP "pwm1/duty_cycle") == 0);
+    end_kernel();
+}
+
+static void a_program_without_the_output_switches_it_off(void)
+{
+    APP_BYTES other;
+
+    begin_slow_write(IO_ZERO);
+    build_counter(&other, 7);
+    CHECK_EQUAL(download(&other), ERR_OK);
+    main_pass();
+    go_on();
+    AWAIT(get(CHIP "pwm1/duty_cycle") == 0);
+    end_kernel();
+}
+
+static void a_program_with_another_output_of_the_device_switches_it_off(void)
+{
+    begin_slow_write(IO_ZERO);
+    make_folder(CHIP "pwm0");
+    put(CHIP "pwm0/period", "0\n");
+    put(CHIP "pwm0/duty_cycle", "0\n");
+    put(CHIP "pwm0/enable", "0\n");
+    begin_other_program();
+    add_pwm("pwm0", IO_ZERO);
+    start_io();
+    set_input(bits_of(25));
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    go_on();
+    AWAIT(get(CHIP "pwm1/duty_cycle") == 0);
+    AWAIT(get(CHIP "pwm0/duty_cycle") == 250000);
+    end_kernel();
+}
+
+static void an_output_that_holds_keeps_the_last_value_of_the_program(void)
+{
+    begin_slow_write(IO_HOLD);
+    set_input(bits_of(70));
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    main_pass();
+    go_on();
+    AWAIT(get(CHIP "pwm1/duty_cycle") == 700000);
+    end_kernel();
+    CHECK_EQUAL(get(CHIP "pwm1/duty_cycle"), 700000);
+}
+
+static void a_device_gets_to_the_program_that_is_the_last_one(void)
+{
+    begin_slow_write(IO_HOLD);
+    begin_other_program();
+    add_pwm("pwm1", IO_ZERO);
+    io.parameters[io.head.parameters - 1].value = 2000000; /* the period: another set-up */
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    main_pass();
+    go_on();
+    AWAIT(get(CHIP "pwm1/duty_cycle") == 0);
+    end_kernel();
+}
+
+/* Two threads would write it in any order. The first device of the program leaves a thread free, which comes first. */
+static void a_device_that_comes_back_has_its_thread_again(void)
+{
+    int passes;
+
+    begin_kernel();
+    add_device("Adc", "ads1115", SYSFS_IIO);
+    io_add_text_parameter(&io, SYSFS_CHANNEL + 0, "in_voltage0");
+    add_pwm("pwm1", IO_ZERO);
+    start_slow_write();
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    main_pass();
+    begin_other_program();
+    add_pwm("pwm1", IO_ZERO);
+    start_io();
+    set_input(bits_of(25));
+    for (passes = 0; passes < 30; passes++) {
+        (void)nanosleep(&(struct timespec){0, 1000000}, NULL);
+        CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    }
+    CHECK_EQUAL(SysAtomicLoad(&bus.both), 0);
+    go_on();
+    AWAIT(get(CHIP "pwm1/duty_cycle") == 250000);
+    end_kernel();
+    CHECK_EQUAL(get(CHIP "pwm1/duty_cycle"), 250000);
+}
+
+static void the_end_of_the_runtime_awaits_a_slow_device(void)
+{
+    begin_slow_write(IO_ZERO);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    main_pass();
+    end_kernel();
+    CHECK_EQUAL(get(CHIP "pwm1/duty_cycle"), 0);
+}
+
+static void an_error_that_passes_leaves_no_output_on(void)
+{
+    begin_slow_write(IO_ZERO);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    main_pass();
+    SysAtomicStore(&bus.fails, 2);
+    go_on();
+    AWAIT(get(CHIP "pwm1/duty_cycle") == 0);
+    end_kernel();
+}
+
 static int remove_entry(const char *path, const struct stat *status, int type, struct FTW *place)
 {
     RTS_UNUSED(status);
@@ -354,6 +568,14 @@ int main(void)
     RUN(what_the_kernel_has_not_refuses_the_program);
     RUN(pwm_has_period_and_share);
     RUN(an_output_that_is_not_exported_yet_is);
+    RUN(a_reset_to_origin_switches_an_output_off);
+    RUN(a_program_without_the_output_switches_it_off);
+    RUN(a_program_with_another_output_of_the_device_switches_it_off);
+    RUN(an_output_that_holds_keeps_the_last_value_of_the_program);
+    RUN(a_device_gets_to_the_program_that_is_the_last_one);
+    RUN(a_device_that_comes_back_has_its_thread_again);
+    RUN(the_end_of_the_runtime_awaits_a_slow_device);
+    RUN(an_error_that_passes_leaves_no_output_on);
     CHECK_EQUAL(nftw(root, remove_entry, 8, FTW_DEPTH | FTW_PHYS), 0);
     return test_result();
 }

@@ -6,7 +6,9 @@
  * To read such a file may take as long as a conversion (125 ms at 8 samples a second) or a time-out of the bus. So each
  * device has a thread that does nothing else: tasks and main copy from and to DEVICE.value only. What the thread works on
  * (`work`) is its own; it takes over what main wants (`setup`) between two rounds, and is never waited for but at the end
- * of the runtime. A device that is pulled is lost with its first error, and back with the first round without one.
+ * of the runtime. Before it takes over another set-up it writes what the outputs of its own have become (`last`): a slow
+ * device may still have what they were before they were made safe, and nothing writes them after that.
+ * A device that is pulled is lost with its first error, and back with the first round without one.
  */
 #define _GNU_SOURCE
 #include "IoDrvSysfs.h"
@@ -24,14 +26,16 @@
 #include <string.h>
 #include <time.h>
 
-enum { DEVICES = 8, END_MS = 500, TIMEOUT_MS = 3000 };
+enum { DEVICES = 8, TIMEOUT_MS = 3000, LAST_TRIES = 3 };
 
 typedef struct {
     RTS_UI32 user;     /* index of its connector + 1; 0: not in use */
-    SYSFS_SETUP setup; /* with `serial` and `value`: within SysLock */
-    RTS_UI32 serial;
+    SYSFS_SETUP setup; /* what main wants; with what follows, up to `last`, within SysLock */
+    RTS_UI32 serial;   /* of `setup` */
+    RTS_UI32 taken;    /* of `work` */
     RTS_UI32 value[IO_SYSFS_CHANNELS];
-    RTS_UI32 rounds; /* good ones of this setup, and bad ones: the thread counts */
+    RTS_UI32 last[IO_SYSFS_CHANNELS]; /* values of `work` at its end, while `setup` is another one */
+    RTS_UI32 rounds;                  /* good ones of this setup, and bad ones: the thread counts */
     RTS_UI32 errors;
     RTS_UI32 rounds_seen; /* by the cycle */
     RTS_UI32 errors_seen;
@@ -42,7 +46,7 @@ typedef struct {
     sem_t wake;
     pthread_t thread;
     /* the thread's */
-    SYSFS_SETUP work;
+    SYSFS_SETUP work; /* changed within SysLock */
     char folder[SYSFS_PATH_SIZE];
     RTS_UI32 written[IO_SYSFS_CHANNELS];
     RTS_UI32 is_written; /* a bit for each channel: the device has `written` */
@@ -64,17 +68,41 @@ static const IoDrvInfo *get_info(void)
 
 /* ---- the thread of a device ---- */
 
+/* Whether main wants another set-up. One that is given again, as by a download of the same program, goes on. */
+static bool is_replaced(DEVICE *device)
+{
+    RTS_UI32 lock = SysLockEnter();
+    bool is_other = memcmp(&device->work, &device->setup, sizeof device->work) != 0;
+
+    SysLockLeave(lock);
+    return is_other;
+}
+
 /* What main wants, if that is new. */
-static void take_setup(DEVICE *device, RTS_UI32 *serial)
+static void take_setup(DEVICE *device)
 {
     RTS_UI32 lock = SysLockEnter();
 
-    if (*serial != device->serial) {
-        *serial = device->serial;
+    if (device->taken != device->serial) {
+        device->taken = device->serial;
         device->work = device->setup;
         device->is_written = 0;
     }
     SysLockLeave(lock);
+}
+
+/* Of the channels of `work`. */
+static void get_values(const DEVICE *device, RTS_UI32 value[IO_SYSFS_CHANNELS])
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    memcpy(value, device->taken == device->serial ? device->value : device->last, sizeof device->value);
+    SysLockLeave(lock);
+}
+
+static bool is_output(const DEVICE *device, RTS_UI32 n)
+{
+    return (device->work.channel[n].options & SYSFS_OPTION_OUT) != 0;
 }
 
 static bool write_output(DEVICE *device, RTS_UI32 n, RTS_UI32 value)
@@ -88,32 +116,52 @@ static bool write_output(DEVICE *device, RTS_UI32 n, RTS_UI32 value)
     return true;
 }
 
+/* One that fails keeps no other from being switched off. */
+static bool write_all(DEVICE *device, const RTS_UI32 *value)
+{
+    bool is_good = true;
+    RTS_UI32 n;
+
+    for (n = 0; n < device->work.count; n++) {
+        if (is_output(device, n))
+            is_good = write_output(device, n, value[n]) && is_good;
+    }
+    return is_good;
+}
+
 /* All channels once; inputs come to the tasks together. */
-static bool do_round(DEVICE *device, RTS_UI32 serial)
+static void do_round(DEVICE *device)
 {
     RTS_UI32 value[IO_SYSFS_CHANNELS];
     bool is_good = SysfsFind(&device->work, device->folder);
-    RTS_UI32 lock = SysLockEnter();
+    RTS_UI32 lock;
     RTS_UI32 n;
 
-    memcpy(value, device->value, sizeof value);
-    SysLockLeave(lock);
-    for (n = 0; n < device->work.count && is_good; n++) {
-        bool is_output = (device->work.channel[n].options & SYSFS_OPTION_OUT) != 0;
-        is_good =
-            is_output ? write_output(device, n, value[n]) : SysfsRead(&device->work, n, device->folder, &value[n]);
-    }
+    get_values(device, value);
+    for (n = 0; n < device->work.count && is_good; n++)
+        is_good = is_output(device, n) ? write_output(device, n, value[n])
+                                       : SysfsRead(&device->work, n, device->folder, &value[n]);
     lock = SysLockEnter();
-    for (n = 0; is_good && serial == device->serial && n < device->work.count; n++) {
-        if ((device->work.channel[n].options & SYSFS_OPTION_OUT) == 0)
+    for (n = 0; is_good && device->taken == device->serial && n < device->work.count; n++) {
+        if (!is_output(device, n))
             device->value[n] = value[n];
     }
-    if (serial == device->serial)
+    if (device->taken == device->serial)
         (void)SysAtomicAdd(is_good ? &device->rounds : &device->errors, 1);
     SysLockLeave(lock);
     if (!is_good)
         device->is_written = 0; /* it may have been away */
-    return is_good;
+}
+
+/* Nothing writes the outputs of `work` after this: an error that passes is no reason to leave one on. */
+static void end_work(DEVICE *device)
+{
+    RTS_UI32 value[IO_SYSFS_CHANNELS];
+    RTS_UI32 tries = device->work.count > 0 ? LAST_TRIES : 0;
+
+    get_values(device, value);
+    while (tries > 0 && SysfsFind(&device->work, device->folder) && !write_all(device, value))
+        tries--;
 }
 
 static void sleep_or_wake(DEVICE *device, RTS_UI32 ms)
@@ -135,16 +183,20 @@ static void sleep_or_wake(DEVICE *device, RTS_UI32 ms)
 static void *run(void *arg)
 {
     DEVICE *device = arg;
-    RTS_UI32 serial = 0;
-    bool is_last = false;
+    bool is_ending = false;
 
-    while (!is_last) {
-        is_last = SysAtomicLoad(&device->is_ending) != 0; /* what outputs have become is written once more */
-        take_setup(device, &serial);
-        if (device->work.count > 0)
-            (void)do_round(device, serial);
-        if (!is_last)
+    while (!is_ending) {
+        is_ending = SysAtomicLoad(&device->is_ending) != 0; /* before it is looked what outputs have become */
+        if (is_replaced(device))
+            end_work(device);
+        take_setup(device);
+        if (is_ending) {
+            end_work(device);
+        } else {
+            if (device->work.count > 0)
+                do_round(device);
             sleep_or_wake(device, device->work.count > 0 ? device->work.every_ms : 1000);
+        }
     }
     return NULL;
 }
@@ -159,7 +211,6 @@ static RTS_RESULT start_thread(DEVICE *device)
 {
     if (device->has_thread)
         return ERR_OK;
-    device->is_ending = 0;
     if (sem_init(&device->wake, 0, 0) != 0)
         return ERR_FAILED;
     device->has_thread = pthread_create(&device->thread, NULL, run, device) == 0;
@@ -170,22 +221,35 @@ static RTS_RESULT start_thread(DEVICE *device)
 }
 
 /* One that hangs in the kernel is not waited for: the process ends. */
-static void end_thread(DEVICE *device)
+static void await_end(DEVICE *device, const struct timespec *until)
+{
+    if (pthread_clockjoin_np(device->thread, NULL, CLOCK_MONOTONIC, until) != 0) {
+        (void)pthread_detach(device->thread);
+        device->has_thread = 0;
+        return;
+    }
+    (void)sem_destroy(&device->wake);
+    memset(device, 0, sizeof *device);
+}
+
+/* All at once: each writes its outputs, and as long as a device may take that is waited for. */
+static void end_threads(void)
 {
     struct timespec until;
+    DEVICE *device;
 
-    if (!device->has_thread)
-        return;
-    SysAtomicStore(&device->is_ending, 1);
-    (void)sem_post(&device->wake);
-    (void)clock_gettime(CLOCK_REALTIME, &until);
-    until.tv_sec += (until.tv_nsec + END_MS * 1000000L) / 1000000000;
-    until.tv_nsec = (until.tv_nsec + END_MS * 1000000L) % 1000000000;
-    if (pthread_timedjoin_np(device->thread, NULL, &until) != 0)
-        (void)pthread_detach(device->thread);
-    else
-        (void)sem_destroy(&device->wake);
-    device->has_thread = 0;
+    for (device = devices; device < devices + DEVICES; device++) {
+        if (!device->has_thread)
+            continue;
+        SysAtomicStore(&device->is_ending, 1);
+        (void)sem_post(&device->wake);
+    }
+    (void)clock_gettime(CLOCK_MONOTONIC, &until);
+    until.tv_sec += TIMEOUT_MS / 1000;
+    for (device = devices; device < devices + DEVICES; device++) {
+        if (device->has_thread)
+            await_end(device, &until);
+    }
 }
 
 /* ---- configuration ---- */
@@ -234,6 +298,18 @@ static bool read_setup(const IoConfigConnector *connector, SYSFS_SETUP *setup)
     return setup->count > 0;
 }
 
+/* How well it fits. What a thread has not ended yet counts as well: of two threads with one device the older one might
+ * write last. */
+static RTS_UI32 rank_of(DEVICE *device, const char *name)
+{
+    RTS_UI32 lock = SysLockEnter();
+    bool is_same = strcmp(device->setup.device, name) == 0 || strcmp(device->work.device, name) == 0;
+    bool is_free = device->setup.count == 0 && device->work.count == 0;
+
+    SysLockLeave(lock);
+    return is_same ? 2 : is_free;
+}
+
 /* The device that a connector had before the download, else one that is free: a thread that still hangs in an old device
  * keeps no other waiting. */
 static DEVICE *choose(const SYSFS_SETUP *setup)
@@ -242,21 +318,20 @@ static DEVICE *choose(const SYSFS_SETUP *setup)
     DEVICE *device;
 
     for (device = devices; device < devices + DEVICES; device++) {
-        if (device->user != 0)
-            continue;
-        if (strcmp(device->setup.device, setup->device) == 0)
-            return device;
-        if (best == NULL || (best->setup.device[0] != '\0' && device->setup.device[0] == '\0'))
+        if (device->user == 0 && (best == NULL || rank_of(device, setup->device) > rank_of(best, setup->device)))
             best = device;
     }
     return best;
 }
 
-/* Outputs of a device that stays the same keep their values until a task writes them. */
+/* Outputs of a device that stays the same keep their values until a task writes them. A set-up that the thread has not
+ * taken has written nothing, so what is `last` stays that of the one it has. */
 static void give_setup(DEVICE *device, const SYSFS_SETUP *setup)
 {
     RTS_UI32 lock = SysLockEnter();
 
+    if (memcmp(&device->work, &device->setup, sizeof device->work) == 0)
+        memcpy(device->last, device->value, sizeof device->last);
     if (memcmp(&device->setup, setup, sizeof *setup) != 0)
         memset(device->value, 0, sizeof device->value);
     device->setup = *setup;
@@ -265,6 +340,7 @@ static void give_setup(DEVICE *device, const SYSFS_SETUP *setup)
     device->errors = device->errors_seen = 0;
     device->heard_ms = SysTimeGetMs();
     SysLockLeave(lock);
+    wake(device);
 }
 
 static RTS_RESULT configure(const IoConfigConnector *connector)
@@ -284,21 +360,30 @@ static RTS_RESULT configure(const IoConfigConnector *connector)
     device = choose(&setup);
     if (device == NULL)
         return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "there can be %u such devices.", (unsigned)DEVICES);
-    give_setup(device, &setup);
     if (start_thread(device) != ERR_OK)
         return IoMgrConfigRefuse(connector, ERR_FAILED, "the system gives no thread for it.");
+    give_setup(device, &setup);
     device->user = IoMgrConfigGetIndex(connector) + 1;
     return ERR_OK;
 }
 
-/* What is not used any more is not touched any more. */
+static bool is_taken(const DEVICE *device)
+{
+    RTS_UI32 lock = SysLockEnter();
+    bool result = device->taken == device->serial;
+
+    SysLockLeave(lock);
+    return result;
+}
+
+/* What is not used any more is not touched any more, once its outputs are as they were left. */
 static void release_unused(void)
 {
     static const SYSFS_SETUP none;
     DEVICE *device;
 
     for (device = devices; device < devices + DEVICES; device++) {
-        if (device->user == 0 && device->setup.count > 0)
+        if (device->user == 0 && device->setup.count > 0 && is_taken(device))
             give_setup(device, &none);
     }
 }
@@ -443,8 +528,6 @@ static const ICmpIoDrv functions = {
 
 RTS_RESULT IoDrvSysfs_Hook(CMP_HOOK hook)
 {
-    DEVICE *device;
-
     switch (hook) {
     case CH_INIT2:
         return IoMgrRegisterInstance(&sysfs_driver);
@@ -452,8 +535,7 @@ RTS_RESULT IoDrvSysfs_Hook(CMP_HOOK hook)
         release_unused();
         return ERR_OK;
     case CH_EXIT2:
-        for (device = devices; device < devices + DEVICES; device++)
-            end_thread(device);
+        end_threads();
         return IoMgrUnregisterInstance(&sysfs_driver);
     default:
         return ERR_OK;
