@@ -548,6 +548,18 @@ static void an_error_that_passes_leaves_no_output_on(void)
     end_kernel();
 }
 
+static void an_input_that_fails_keeps_no_output_on(void)
+{
+    begin_iio("ads1115", "in_voltage1", IO_HOLD);
+    start_io();
+    AWAIT(get(IIO "out_voltage0_raw") == 30);
+    put(IIO "in_voltage1_raw", "fail\n");
+    AWAIT(!is_ok());
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    AWAIT(get(IIO "out_voltage0_raw") == 0);
+    end_kernel();
+}
+
 static int remove_entry(const char *path, const struct stat *status, int type, struct FTW *place)
 {
     RTS_UNUSED(status);
@@ -576,6 +588,7 @@ int main(void)
     RUN(a_device_that_comes_back_has_its_thread_again);
     RUN(the_end_of_the_runtime_awaits_a_slow_device);
     RUN(an_error_that_passes_leaves_no_output_on);
+    RUN(an_input_that_fails_keeps_no_output_on);
     CHECK_EQUAL(nftw(root, remove_entry, 8, FTW_DEPTH | FTW_PHYS), 0);
     return test_result();
 }

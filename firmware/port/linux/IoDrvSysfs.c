@@ -129,7 +129,18 @@ static bool write_all(DEVICE *device, const RTS_UI32 *value)
     return is_good;
 }
 
-/* All channels once; inputs come to the tasks together. */
+static bool read_all(DEVICE *device, RTS_UI32 *value)
+{
+    bool is_good = true;
+    RTS_UI32 n;
+
+    for (n = 0; n < device->work.count && is_good; n++)
+        is_good = is_output(device, n) || SysfsRead(&device->work, n, device->folder, &value[n]);
+    return is_good;
+}
+
+/* All channels once. Outputs come first, so that an input that fails keeps none from being switched off; inputs come to
+ * the tasks together. */
 static void do_round(DEVICE *device)
 {
     RTS_UI32 value[IO_SYSFS_CHANNELS];
@@ -138,9 +149,7 @@ static void do_round(DEVICE *device)
     RTS_UI32 n;
 
     get_values(device, value);
-    for (n = 0; n < device->work.count && is_good; n++)
-        is_good = is_output(device, n) ? write_output(device, n, value[n])
-                                       : SysfsRead(&device->work, n, device->folder, &value[n]);
+    is_good = is_good && write_all(device, value) && read_all(device, value);
     lock = SysLockEnter();
     for (n = 0; is_good && device->taken == device->serial && n < device->work.count; n++) {
         if (!is_output(device, n))
