@@ -69,12 +69,25 @@ static int get_info(RTS_UI32 chip, struct gpio_v2_line_info *info)
     return 0;
 }
 
+/* Attributes that are not counted; the kernel of Debian 12 looks at them. */
+static bool are_unused_zero(const struct gpio_v2_line_config *config)
+{
+    static const struct gpio_v2_line_config_attribute zero;
+    RTS_UI32 i = config->num_attrs;
+
+    while (i < GPIO_V2_LINE_NUM_ATTRS_MAX && memcmp(&config->attrs[i], &zero, sizeof zero) == 0)
+        i++;
+    return i == GPIO_V2_LINE_NUM_ATTRS_MAX;
+}
+
 static int get_lines(RTS_UI32 chip, struct gpio_v2_line_request *ask)
 {
     int ends[2];
 
     if (kernel.is_taken)
         return fail(EBUSY);
+    if (!are_unused_zero(&ask->config))
+        return fail(EINVAL);
     kernel.asked[chip] = *ask;
     if (pipe(ends) != 0)
         return fail(EMFILE);

@@ -172,7 +172,6 @@ RTS_RESULT SysGpioAdd(RTS_UI32 group, RTS_UI32 number, const SYS_GPIO_LINE *line
     }
     LINE *place = &request->line[request->count];
     *place = (LINE){info.offset, flags_of(line->options), line->event, (RTS_UI8)number};
-    request->outputs &= ~(1ULL << request->count);
     request->outputs |= (RTS_UI64)((line->options & GPIO_OPTION_OUT) != 0) << request->count;
     request->chip = chip;
     request->request.file = -1;
@@ -225,12 +224,11 @@ static RTS_RESULT ask_kernel(REQUEST *request, int chip, RTS_UI32 outputs)
             return ERR_NOT_SUPPORTED;
         }
     }
-    struct gpio_v2_line_config_attribute *values = &ask.config.attrs[ask.config.num_attrs++];
-    values->attr.id = GPIO_V2_LINE_ATTR_ID_OUTPUT_VALUES;
-    values->attr.values = to_request(request, outputs) & request->outputs;
-    values->mask = request->outputs;
-    if (request->outputs == 0) {
-        ask.config.num_attrs--;
+    if (request->outputs != 0) {
+        struct gpio_v2_line_config_attribute *values = &ask.config.attrs[ask.config.num_attrs++];
+        values->attr.id = GPIO_V2_LINE_ATTR_ID_OUTPUT_VALUES;
+        values->attr.values = to_request(request, outputs) & request->outputs;
+        values->mask = request->outputs;
     }
     if (ioctl(chip, GPIO_V2_GET_LINE_IOCTL, &ask) != 0) {
         return errno == EBUSY ? ERR_OPERATION_DENIED : errno == EINVAL ? ERR_NOT_SUPPORTED : ERR_DEVICE;
@@ -287,6 +285,7 @@ void SysGpioClose(RTS_UI32 group)
             (void)close(request->request.file);
         }
         request->count = 0;
+        request->outputs = 0;
     }
 }
 
