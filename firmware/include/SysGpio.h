@@ -38,8 +38,9 @@ RTS_RESULT SysGpioOpen(RTS_UI32 group, RTS_UI32 outputs);
  * opened. */
 void SysGpioClose(RTS_UI32 group);
 
-/* In each pass of main: a port whose edges are no interrupts looks for them here, without waiting. */
-void SysGpioPoll(void);
+/* In each pass of main, of an open group: a port whose edges are no interrupts looks for them here, without waiting.
+ * ERR_DEVICE: the chip has gone, which nothing else may notice, if the tasks of the group run by its edges only. */
+RTS_RESULT SysGpioPoll(RTS_UI32 group);
 
 /* ---- from a task or main, one call for a group at a time, of an open group ---- */
 

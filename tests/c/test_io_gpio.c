@@ -323,6 +323,72 @@ static void a_chip_that_has_gone_comes_back(void)
     end_lines();
 }
 
+static void main_pass(void)
+{
+    CHECK_EQUAL(IoDrvGpio_Hook(CH_COMM_CYCLE), ERR_OK);
+}
+
+static bool is_ok(void)
+{
+    IO_DEVICE_STATE state;
+
+    CHECK_EQUAL(IoMgrGetState(0, &state), ERR_OK);
+    return state.ok != 0;
+}
+
+/* DI0 is read by the task that its edges start, and by no other one. */
+static void begin_line_with_event(void)
+{
+    begin_lines();
+    begin_lines_again();
+    spec.task_count = 0;
+    add_copying_task("OnDoor", 0, 0)->kind = KIND_EXTERNAL;
+    spec.tasks[0].event_offset = CRC32Update(0, "door", 4);
+    add_connector_of("DI0", GPIO_OPTION_RISING);
+    io_add_text_parameter(&io, GPIO_EVENT + 0, "door");
+    io_add_channel(&io, 0, IO_MAP_INPUTS, 0, GPIO_INPUTS, 0, 0, 1);
+}
+
+/* Without an event nothing reads the lines, and a chip that has gone posts none. */
+static void a_chip_that_only_posts_events_is_lost_and_comes_back(void)
+{
+    begin_line_with_event();
+    start_io();
+    main_pass();
+    CHECK(is_ok());
+    SimGpioUnplug(1);
+    main_pass();
+    CHECK(!is_ok());
+    CHECK_EQUAL(SimAdvance(ms(150)), ERR_OK); /* it is looked for */
+    main_pass();
+    CHECK(!is_ok());
+    SimGpioUnplug(0);
+    CHECK_EQUAL(SimAdvance(ms(150)), ERR_OK);
+    main_pass();
+    CHECK(is_ok());
+    CHECK(log_has("DI0 has an error") && log_has("DI0 is back"));
+    CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_OUTPUT, 0), 1);
+    end_lines();
+}
+
+/* Each pass of main looks, but it is one error. */
+static void a_chip_that_has_gone_is_one_error(void)
+{
+    IO_DEVICE_STATE state;
+
+    begin_line_with_event();
+    start_io();
+    SimGpioUnplug(1);
+    main_pass();
+    main_pass();
+    CHECK_EQUAL(IoMgrGetState(0, &state), ERR_OK);
+    CHECK_EQUAL(state.errors, 1);
+    SimGpioUnplug(0);
+    end_lines();
+}
+
 int main(void)
 {
     NEEDS_X86_64;
@@ -344,5 +410,7 @@ int main(void)
     RUN(a_refused_connector_leaves_its_group);
     RUN(lines_are_given_back_with_the_application);
     RUN(a_chip_that_has_gone_comes_back);
+    RUN(a_chip_that_only_posts_events_is_lost_and_comes_back);
+    RUN(a_chip_that_has_gone_is_one_error);
     return test_result();
 }

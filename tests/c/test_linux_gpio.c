@@ -18,6 +18,7 @@
 #include "CmpChecksum.h"
 #include "SchedEvents.h"
 #include "SysGpio.h"
+#include "port.h"
 #include "test.h"
 
 enum { CHIPS = 2, LINES = 4, FILES = 64, NO_CHIP = 0, CHIP = 1, REQUEST = 1 + CHIPS };
@@ -31,6 +32,7 @@ static struct {
     struct gpio_v2_line_values written[CHIPS];
     RTS_UI64 levels[CHIPS];
     int edges; /* where they are written to */
+    int error; /* that reading edges ends with */
 } kernel;
 
 static int new_file(int file, RTS_UI32 what)
@@ -117,6 +119,23 @@ int __wrap_ioctl(int file, unsigned long request, void *arg)
     default:
         return fail(ENOTTY);
     }
+}
+
+/* Of lines of a chip that has gone: poll says that there is something, read what. */
+ssize_t __real_read(int file, void *to, size_t size);
+ssize_t __wrap_read(int file, void *to, size_t size);
+ssize_t __wrap_read(int file, void *to, size_t size)
+{
+    if (kernel.error != 0 && file >= 0 && file < FILES && kernel.file[file] >= REQUEST)
+        return fail(kernel.error);
+    return __real_read(file, to, size);
+}
+
+static void pull(void)
+{
+    kernel.is_gone = true;
+    kernel.error = ENODEV;
+    (void)close(kernel.edges);
 }
 
 static RTS_RESULT add(RTS_UI32 number, const char *name, RTS_UI32 options)
@@ -241,15 +260,53 @@ static void edges_are_taken_from_the_kernel(void)
     begin();
     CHECK_EQUAL(add(0, "1", GPIO_OPTION_RISING), ERR_OK);
     CHECK_EQUAL(SysGpioOpen(0, 0), ERR_OK);
-    SysGpioPoll(); /* nothing there: it does not wait */
+    CHECK_EQUAL(SysGpioPoll(0), ERR_OK); /* nothing there: it does not wait */
     for (i = 0; i < 20; i++)
         CHECK_EQUAL(write(kernel.edges, &edge, sizeof edge), (long)sizeof edge);
-    SysGpioPoll();
-    SysGpioPoll();
+    CHECK_EQUAL(SysGpioPoll(0), ERR_OK);
+    CHECK_EQUAL(SysGpioPoll(0), ERR_OK);
+    CHECK(PortWait(0)); /* that was as many as are taken at once */
     (void)close(kernel.edges);
     for (i = 0; i < FILES && kernel.file[i] != REQUEST; i++) {
     }
     CHECK_EQUAL(read(i, &byte, 1), 0); /* all are taken */
+}
+
+static void a_chip_with_edges_that_has_gone_keeps_main_no_more_busy(void)
+{
+    const struct gpio_v2_line_event edge = {.offset = 1, .id = GPIO_V2_LINE_EVENT_RISING_EDGE};
+
+    begin();
+    CHECK_EQUAL(add(0, "1", GPIO_OPTION_RISING), ERR_OK);
+    CHECK_EQUAL(SysGpioOpen(0, 0), ERR_OK);
+    CHECK(!PortWait(0));
+    pull();
+    CHECK(PortWait(0));
+    CHECK_EQUAL(SysGpioPoll(0), ERR_DEVICE);
+    CHECK(!PortWait(0));
+    SysGpioClose(0);
+    kernel.is_gone = false;
+    kernel.error = 0;
+    CHECK_EQUAL(add(0, "1", GPIO_OPTION_RISING), ERR_OK);
+    CHECK_EQUAL(SysGpioOpen(0, 0), ERR_OK);
+    CHECK_EQUAL(write(kernel.edges, &edge, sizeof edge), (long)sizeof edge);
+    CHECK(PortWait(0));
+    CHECK_EQUAL(SysGpioPoll(0), ERR_OK);
+    CHECK(!PortWait(0));
+}
+
+static void what_may_pass_is_no_lost_chip(void)
+{
+    static const int errors[] = {EAGAIN, EINTR};
+    RTS_UI32 i;
+
+    begin();
+    CHECK_EQUAL(add(0, "1", GPIO_OPTION_RISING), ERR_OK);
+    CHECK_EQUAL(SysGpioOpen(0, 0), ERR_OK);
+    for (i = 0; i < RTS_COUNT(errors); i++) {
+        kernel.error = errors[i];
+        CHECK_EQUAL(SysGpioPoll(0), ERR_OK);
+    }
 }
 
 int main(void)
@@ -261,5 +318,7 @@ int main(void)
     RUN(values_are_those_of_the_numbers);
     RUN(a_chip_that_has_gone);
     RUN(edges_are_taken_from_the_kernel);
+    RUN(a_chip_with_edges_that_has_gone_keeps_main_no_more_busy);
+    RUN(what_may_pass_is_no_lost_chip);
     return test_result();
 }

@@ -15,9 +15,18 @@ from plctool.testing.plcrt import Plcrt
 @pytest.fixture(scope="module")
 def image(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """PROGRAM with DESCRIPTION of the module that asks."""
-    folder = tmp_path_factory.mktemp("program")
-    (folder / "main.st").write_text(request.module.PROGRAM)
-    (folder / "main.io.toml").write_text(request.module.DESCRIPTION)
+    return build(tmp_path_factory.mktemp("program"), request.module.PROGRAM, request.module.DESCRIPTION)
+
+
+@pytest.fixture(scope="module")
+def event_image(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """EVENT_PROGRAM with EVENT_DESCRIPTION of the module that asks."""
+    return build(tmp_path_factory.mktemp("events"), request.module.EVENT_PROGRAM, request.module.EVENT_DESCRIPTION)
+
+
+def build(folder: Path, program: str, description: str) -> Path:
+    (folder / "main.st").write_text(program)
+    (folder / "main.io.toml").write_text(description)
     compile_sources([folder / "main.st"], io=IoFiles(device=None)).write(folder / "main.cdl")
     return folder / "main.cdl"
 

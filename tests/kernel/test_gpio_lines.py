@@ -40,6 +40,21 @@ MOTOR = { var = "motor", on_stop = 0 }
 LAMP = { var = "lamp", on_stop = "hold" }
 """
 
+EVENT_PROGRAM = """\
+VAR_GLOBAL start : BOOL; starts : DINT; END_VAR
+PROGRAM Count IF start THEN starts := starts + 1; END_IF; END_PROGRAM
+CONFIGURATION C
+    RESOURCE R ON PLC
+        TASK Edge(EVENT := 'started', PRIORITY := 2);
+        PROGRAM Count WITH Edge : Count;
+    END_RESOURCE
+END_CONFIGURATION
+"""
+EVENT_DESCRIPTION = """\
+[gpio.in]
+START = { var = "start", event = "started" }
+"""
+
 # Another process that has an input line of a chip until its standard input ends: struct gpio_v2_line_request.
 OTHER = """
 import fcntl, os, struct, sys
@@ -155,3 +170,17 @@ def test_chip_that_is_pulled_is_lost_and_comes_back(chip: Chip, plc: Plc, image:
     chip.pull("DOOR", True)
     eventually(lambda: plc.io_devices()[0].state == "ok")
     eventually(lambda: chip.level("MOTOR") == 1)
+
+
+def test_chip_that_only_posts_events_is_lost_and_comes_back(chip: Chip, plc: Plc, event_image: Path) -> None:
+    chip.pull("START", False)
+    plc.flash(event_image)
+    chip.pull("START", True)
+    eventually(lambda: plc.read("starts") == 1)
+    chip.unplug()
+    eventually(lambda: plc.io_devices()[0].state != "ok")
+    chip.plug()
+    chip.pull("START", False)
+    eventually(lambda: plc.io_devices()[0].state == "ok")
+    chip.pull("START", True)
+    eventually(lambda: plc.read("starts") == 2)

@@ -300,27 +300,36 @@ static void post(const REQUEST *request, const struct gpio_v2_line_event *edge)
     }
 }
 
-static void post_edges(const REQUEST *request)
+/* Of a chip that has gone poll says for ever that there is something to read. */
+static RTS_RESULT post_edges(const REQUEST *request)
 {
     struct gpio_v2_line_event edges[EVENTS_AT_ONCE];
     ssize_t size = read(request->request.file, edges, sizeof(edges));
+    if (size < 0 && (errno == EAGAIN || errno == EINTR)) {
+        return ERR_OK;
+    }
+    if (size <= 0) {
+        PortWaitRemove(&request->request);
+        return ERR_DEVICE;
+    }
     for (ssize_t i = 0; i < size / (ssize_t)sizeof(edges[0]); i++) {
         post(request, &edges[i]);
     }
     if (size == (ssize_t)sizeof(edges)) {
         PortWaitNotNow();
     }
+    return ERR_OK;
 }
 
-void SysGpioPoll(void)
+RTS_RESULT SysGpioPoll(RTS_UI32 group)
 {
-    for (RTS_UI32 group = 0; group < IO_GPIO_GROUPS; group++) {
-        for (RTS_UI32 i = 0; i < CHIPS_OF_GROUP; i++) {
-            if (has_edges(&groups[group][i])) {
-                post_edges(&groups[group][i]);
-            }
+    RTS_RESULT result = ERR_OK;
+    for (RTS_UI32 i = 0; i < CHIPS_OF_GROUP; i++) {
+        if (has_edges(&groups[group][i]) && post_edges(&groups[group][i]) != ERR_OK) {
+            result = ERR_DEVICE;
         }
     }
+    return result;
 }
 
 /* ---- values ---- */

@@ -125,8 +125,10 @@ void SysGpioClose(RTS_UI32 group)
     }
 }
 
-void SysGpioPoll(void)
+RTS_RESULT SysGpioPoll(RTS_UI32 group)
 {
+    RTS_UNUSED(group);
+    return board.is_gone ? ERR_DEVICE : ERR_OK;
 }
 
 RTS_RESULT SysGpioRead(RTS_UI32 group, RTS_UI32 *values)

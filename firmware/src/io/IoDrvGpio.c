@@ -13,6 +13,7 @@
 #include "CmpBytes.h"
 #include "CmpIoMgrEmbedded.h"
 #include "SchedEvents.h"
+#include "SysAtomic.h"
 #include "SysGpio.h"
 #include "SysLock.h"
 #include "rts_config.h"
@@ -21,13 +22,13 @@ RTS_STATIC_ASSERT((int)IO_GPIO_LINES == 32, a_value_has_a_bit_for_each_line);
 RTS_STATIC_ASSERT(SCHED_MAX_EXTERNAL_EVENTS <= 32, events_have_a_bit_each);
 
 typedef struct {
-    RTS_UI32 user;    /* index of its connector + 1; 0: the group is not in use now */
-    RTS_UI32 outputs; /* lines that are some */
-    RTS_UI8 in[4];    /* as they were read */
-    RTS_UI8 out[4];   /* to be written */
-    RTS_UI32 lines;   /* CRC of what they are; 0: closed */
-    RTS_UI32 events;  /* handles of those that are registered for it, a bit each */
-    bool has_failed;  /* since it was opened */
+    RTS_UI32 user;       /* index of its connector + 1; 0: the group is not in use now */
+    RTS_UI32 outputs;    /* lines that are some */
+    RTS_UI8 in[4];       /* as they were read */
+    RTS_UI8 out[4];      /* to be written */
+    RTS_UI32 lines;      /* CRC of what they are; 0: closed */
+    RTS_UI32 events;     /* handles of those that are registered for it, a bit each */
+    RTS_UI32 has_failed; /* since it was opened; tasks and main say so */
 } GROUP;
 
 static GROUP groups[IO_GPIO_GROUPS];
@@ -148,7 +149,7 @@ static RTS_RESULT open_group(GROUP *group, const IoConfigConnector *connector, c
         result = add_line(group, n, bad);
     if (result == ERR_OK)
         result = SysGpioOpen((RTS_UI32)(group - groups), BytesGet32(group->out));
-    group->has_failed = result != ERR_OK;
+    SysAtomicStore(&group->has_failed, result != ERR_OK);
     if (result == ERR_OK)
         IoMgrConfigNoteAlive(connector);
     else
@@ -279,7 +280,7 @@ static RTS_UI32 group_of(const IoConfigConnectorMap *map)
 
 static void note_failure(GROUP *group)
 {
-    group->has_failed = true;
+    SysAtomicStore(&group->has_failed, 1);
     IoMgrConfigSetDiagnosis(connector_of(group), CF_CONNECTOR_ERROR);
 }
 
@@ -328,10 +329,22 @@ static RTS_RESULT diagnose(const IoConfigConnector *connector)
     const char *bad;
     GROUP *group = find_group(user_of(connector));
 
-    if (group == NULL || !group->has_failed)
+    if (group == NULL || SysAtomicLoad(&group->has_failed) == 0)
         return ERR_OK;
     close_group(group);
     return open_group(group, connector, &bad);
+}
+
+/* Edges, and chips that have gone: without edges there may be no task that would notice. */
+static void poll_groups(void)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < IO_GPIO_GROUPS; i++) {
+        GROUP *group = &groups[i];
+        if (group->user != 0 && group->lines != 0 && SysGpioPoll(i) != ERR_OK && SysAtomicLoad(&group->has_failed) == 0)
+            note_failure(group);
+    }
 }
 
 static const ICmpIoDrv functions = {
@@ -351,7 +364,7 @@ RTS_RESULT IoDrvGpio_Hook(CMP_HOOK hook)
     case CH_INIT2:
         return IoMgrRegisterInstance(&gpio_driver);
     case CH_COMM_CYCLE:
-        SysGpioPoll();
+        poll_groups();
         close_unused();
         break;
     case CH_EXIT2:

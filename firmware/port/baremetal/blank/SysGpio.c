@@ -30,9 +30,11 @@ void SysGpioClose(RTS_UI32 group)
     RTS_UNUSED(group);
 }
 
-/* Write here, where pins have no interrupts: look for edges. */
-void SysGpioPoll(void)
+/* Write here, where pins have no interrupts: look for edges; ERR_DEVICE if the lines are on a chip that has gone. */
+RTS_RESULT SysGpioPoll(RTS_UI32 group)
 {
+    RTS_UNUSED(group);
+    return ERR_OK;
 }
 
 /* Write here: the levels, by the lines' numbers, turned round for GPIO_OPTION_ACTIVE_LOW. */

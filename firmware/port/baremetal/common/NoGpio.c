@@ -25,8 +25,10 @@ void SysGpioClose(RTS_UI32 group)
     RTS_UNUSED(group);
 }
 
-void SysGpioPoll(void)
+RTS_RESULT SysGpioPoll(RTS_UI32 group)
 {
+    RTS_UNUSED(group);
+    return ERR_OK;
 }
 
 RTS_RESULT SysGpioRead(RTS_UI32 group, RTS_UI32 *values)

@@ -68,8 +68,10 @@ void SysGpioClose(RTS_UI32 group)
     memset(bits[group], 0, sizeof bits[group]);
 }
 
-void SysGpioPoll(void)
+RTS_RESULT SysGpioPoll(RTS_UI32 group)
 {
+    RTS_UNUSED(group);
+    return ERR_OK;
 }
 
 RTS_RESULT SysGpioRead(RTS_UI32 group, RTS_UI32 *values)
