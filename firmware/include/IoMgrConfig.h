@@ -60,6 +60,8 @@ void IoMgrCopyInputLE(const IoConfigChannelMap *channel, const void *memory);
 void IoMgrCopyInputBE(const IoConfigChannelMap *channel, const void *memory);
 void IoMgrCopyOutputLE(const IoConfigChannelMap *channel, void *memory);
 void IoMgrCopyOutputBE(const IoConfigChannelMap *channel, void *memory);
+/* What an input is now, perhaps its initial value, for a device that starts with it. */
+void IoMgrCopyInputBackLE(const IoConfigChannelMap *channel, void *memory);
 
 /* LE of `count` channels from `channel` on, all of them in one memory: faster than a call for each. */
 void IoMgrCopyInputs(const IoConfigChannelMap *channel, RTS_UI32 count, const void *memory);

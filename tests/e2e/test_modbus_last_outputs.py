@@ -1,4 +1,4 @@
-"""When a program goes, devices get what its outputs are then: `on_stop`. Nobody writes to them any more after that."""
+"""When a program goes, devices get what its outputs are then: `on_stop`. Later nothing writes to them."""
 
 from __future__ import annotations
 

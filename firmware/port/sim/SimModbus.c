@@ -378,12 +378,16 @@ static RTS_RESULT set_place(const IoConfigConnector *connector, const SIM_IO_PLA
     REGION region;
     RTS_RESULT result = find_region(connector, place, &region);
 
+    if (result == ERR_OK && region.memory != NULL)
+        IoDrvModbusFollowInputs();
     for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++) {
         if (!set_bit(&region, place->bit + i, (data[i / 8] >> i % 8 & 1) != 0))
             result = ERR_NOMEMORY;
     }
-    if (result == ERR_OK && region.memory != NULL)
+    if (result == ERR_OK && region.memory != NULL) {
         ModbusFindPlace(setup(), connector).server->server.written++;
+        IoMgrConfigNoteData(connector); /* for the next cycle, which may come before the next pass of main */
+    }
     return result;
 }
 

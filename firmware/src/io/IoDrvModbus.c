@@ -26,6 +26,8 @@ static MODBUS_SETUP setup;
 
 /* Between IoDrvUpdateMapping and the next configuration. */
 static bool is_running;
+static const IoConfigTaskMap *maps;
+static int map_count;
 
 static const ICmpIoDrv functions;
 static IO_DRIVER driver = {.functions = &functions};
@@ -129,6 +131,8 @@ static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
             result = IoMgrConfigEachChannel(task_maps, count, &driver, check_channel);
     } while (result == ERR_PENDING);
     is_running = result == ERR_OK;
+    maps = task_maps;
+    map_count = count;
     if (is_running)
         ModbusCallsBegin(&setup, NULL);
     return result;
@@ -150,6 +154,29 @@ static void note_output(MODBUS_JOB_STATE *job, const IoConfigChannelMap *channel
     job->has_out = size == 0;
 }
 
+static bool is_untouched(const MODBUS_PLACE *place)
+{
+    return place->server != NULL && place->server->server.written == 0;
+}
+
+static RTS_RESULT follow(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
+{
+    MODBUS_PLACE place = ModbusFindPlace(&setup, connector);
+    RTS_UI32 bits;
+
+    if (type == IO_MAP_INPUTS && is_untouched(&place))
+        IoMgrCopyInputBackLE(channel, ModbusFindMemory(&place, channel->parameter, false, &bits));
+    return ERR_OK;
+}
+
+void IoDrvModbusFollowInputs(void)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    (void)IoMgrConfigEachChannel(maps, map_count, &driver, follow);
+    SysLockLeave(lock);
+}
+
 static void copy(const IoConfigConnectorMap *map, bool is_output)
 {
     const MODBUS_PLACE place = ModbusFindPlace(&setup, IoMgrConfigGetConnector(map->connector));
@@ -161,7 +188,8 @@ static void copy(const IoConfigConnectorMap *map, bool is_output)
         if (memory == NULL)
             continue;
         if (!is_output) {
-            IoMgrCopyInputLE(channel, memory);
+            if (!is_untouched(&place))
+                IoMgrCopyInputLE(channel, memory);
             continue;
         }
         IoMgrCopyOutputLE(channel, memory);
@@ -329,6 +357,8 @@ static void cycle(void)
         ModbusScanPoll(&setup.clients[i].client, now_ns);
         note_client(&setup.clients[i]);
     }
+    if (setup.server_count != 0)
+        IoDrvModbusFollowInputs();
     for (RTS_UI32 i = 0; i < setup.server_count; i++) {
         MODBUS_SERVER_LINE *line = &setup.servers[i];
         line->server.running = AppGetState() == AS_RUN;

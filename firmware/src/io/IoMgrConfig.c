@@ -260,6 +260,11 @@ void IoMgrCopyInputBE(const IoConfigChannelMap *channel, const void *memory)
     copy_input(channel, memory, IO_CHANNEL_BIG_ENDIAN);
 }
 
+void IoMgrCopyInputBackLE(const IoConfigChannelMap *channel, void *memory)
+{
+    copy(channel, memory, channel->parameter_bit, tables.areas[APP_AREA_INPUT], channel->area_bit, 0);
+}
+
 void IoMgrCopyOutputLE(const IoConfigChannelMap *channel, void *memory)
 {
     copy_output(channel, memory, 0);

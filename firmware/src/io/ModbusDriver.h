@@ -11,4 +11,8 @@
 /* What is configured now. From main. */
 MODBUS_SETUP *IoDrvModbusGetSetup(void);
 
+/* Until a client writes to a server for the first time, its memory is what the inputs are: so they start with the initial
+ * values of the program. From main, while a program is loaded, before what a client writes is taken. */
+void IoDrvModbusFollowInputs(void);
+
 #endif

@@ -158,14 +158,13 @@ static RTS_UI8 access(MODBUS_SERVER *server, MODBUS_REQUEST *request, RTS_UI8 *p
     if (!exchange(server, request, false, NULL) || !exchange(server, request, true, NULL))
         return MODBUS_ILLEGAL_ADDRESS;
     lock = SysLockEnter();
+    server->written += request->write_count != 0;
     if (request->function->function == MODBUS_MASK_WRITE_REGISTER)
         mask_register(server, request);
     else
         (void)exchange(server, request, true, request->data);
     (void)exchange(server, request, false, pdu + 2);
     SysLockLeave(lock);
-    if (request->write_count != 0)
-        server->written++;
     return 0;
 }
 
