@@ -6,6 +6,8 @@
  * How the run before ended is what the port says (SysStart.h), and what the flash says about an initialisation that was
  * not finished.
  */
+#include "../../firmware/src/app/AppImage.h"
+#include "AppAddress.h"
 #include "SysFileFlash.h"
 #include "app_device.h"
 
@@ -103,6 +105,19 @@ static void a_first_application_that_crashed_stays_stopped_until_it_is_started_b
     CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK_EQUAL(running_step(), 1);
+}
+
+/* Its pointers are NULL, and lead nowhere, as they do in a process in which nothing was loaded before. */
+static void pointers_of_one_that_stays_stopped_can_be_followed(void)
+{
+    AREA_ADDRESS address = {APP_AREA_DATA, 0};
+
+    start_with_counter(1);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    AppImageAttach(NULL);
+    CHECK_EQUAL(restart(SYS_START_CRASH, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(AppAddressFollow(&address), MONITORING_ERR_INVALID_POINTER);
 }
 
 static void a_proven_application_that_crashed_runs_again(void)
@@ -393,6 +408,7 @@ int main(void)
     NEEDS_X86_64;
     RUN(one_crash_of_an_unproven_application_rolls_it_back);
     RUN(a_first_application_that_crashed_stays_stopped_until_it_is_started_by_hand);
+    RUN(pointers_of_one_that_stays_stopped_can_be_followed);
     RUN(a_proven_application_that_crashed_runs_again);
     RUN(a_crash_of_the_runtime_beside_a_stopped_application_is_not_its_own);
     RUN(a_reset_of_unknown_cause_counts_nothing_in_its_cycles);

@@ -392,16 +392,6 @@ static void what_is_written_takes_its_copy_twice(void)
     CHECK_EQUAL(byte_of(HIGH, APP_AREA_OUTPUT, 8), (RTS_UI8 *)copies + 32);
 }
 
-/* As in a device that has just started and leaves its program alone, because it failed before. */
-static void of_a_program_that_was_never_initialised_no_address_is_in_a_copy(void)
-{
-    RTS_UI32 area;
-    RTS_UI32 offset;
-
-    CHECK(!AppImageFind((uintptr_t)copies, &area, &offset));
-    CHECK(!AppImageFind(0, &area, &offset));
-}
-
 static void an_address_in_a_copy_is_that_of_the_area(void)
 {
     RTS_UI32 area = 99;
@@ -448,7 +438,6 @@ static void every_bit_goes_both_ways_and_no_other_changes(void)
 
 int main(void)
 {
-    RUN(of_a_program_that_was_never_initialised_no_address_is_in_a_copy);
     RUN(two_tasks_never_undo_each_others_bits);
     RUN(without_copies_they_do);
     RUN(what_main_writes_is_neither_lost_nor_undoes_anything);

@@ -17,7 +17,7 @@ typedef RTS_UI64 __attribute__((may_alias)) UNIT;
 RTS_STATIC_ASSERT(sizeof(UNIT) == CDL_IMAGE_UNIT, units_are_those_of_the_image);
 RTS_STATIC_ASSERT(APP_IMAGE_SIZE / CDL_IMAGE_UNIT <= (IMAGE_INDEX)-1, copies_can_be_indexed);
 
-/* One for each of APP_MAX_TASKS; NULL until one is initialised. */
+/* One for each of APP_MAX_TASKS; NULL before the first application is loaded. */
 static const TASK_IMAGE *plan;
 
 /* ---- the plan ---- */
@@ -66,12 +66,9 @@ bool AppImageSetContext(RTS_UI32 task, IEC_CONTEXT *context)
 
 bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset)
 {
-    const IMAGE_PART *part;
+    const IMAGE_PART *part = plan[0].part;
     RTS_UI32 i;
 
-    if (plan == NULL)
-        return false; /* it is loaded, but was never initialised */
-    part = plan[0].part;
     for (i = 0; i < IMAGE_AREAS * APP_MAX_TASKS; i++, part++) {
         uintptr_t distance = address - (uintptr_t)copy_at(part->copy);
         if (distance < part->count * sizeof(UNIT)) {

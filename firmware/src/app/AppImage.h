@@ -55,7 +55,7 @@ bool AppImageSetContext(RTS_UI32 task, IEC_CONTEXT *context);
 void AppImageCopyIn(RTS_UI32 task);
 void AppImageCopyOut(RTS_UI32 task, const RTS_UI32 *running);
 
-/* The area and offset that an address in a copy stands for. */
+/* The area and offset that an address in a copy stands for. When an application is loaded. */
 bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset);
 
 #else /* tasks run one after the other, or there is nothing to share */

@@ -198,7 +198,6 @@ static RTS_RESULT initialise(bool init_retains)
     AppExceptionClear();
     AppAreasClear();
     app.pending = INIT_DONE;
-    AppImageAttach(app.image.task_image);
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
     if (result != ERR_OK) {
         unload();
@@ -279,6 +278,7 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     app.code = code;
     app.state = AS_STOP;
     SysExceptCodeRange(code, image->code.size);
+    AppImageAttach(app.image.task_image);
     set_context();
     AppAreasClear();
     result = load_io(refusal);

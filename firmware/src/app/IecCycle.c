@@ -174,12 +174,10 @@ static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
 {
     RTS_UI32 elapsed = saturate(elapsed_ns);
     RTS_UI32 late = saturate(late_ns);
-    RTS_UI32 cycles = task->cycles + 1;
+    RTS_UI32 cycles = task->cycles;
 
-    if (cycles == 0) { /* both start again, or the average would be wrong from now on */
-        task->sum_ns = 0;
-        cycles = 1;
-    }
+    if (cycles == 0)
+        task->sum_ns = 0; /* after 2^32 cycles both start again, or the average would be wrong */
     task->last_ns = elapsed;
     task->sum_ns += elapsed;
     if (elapsed < task->min_ns)
@@ -188,7 +186,7 @@ static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
         task->max_ns = elapsed;
     if (late > task->jitter_ns)
         task->jitter_ns = late;
-    SysAtomicStore(&task->cycles, cycles);
+    SysAtomicStore(&task->cycles, cycles + 1);
 }
 
 /* What SysTimeGetNs does not give: how long this context had the processor. It costs more. */

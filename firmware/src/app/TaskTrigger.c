@@ -119,13 +119,13 @@ RTS_UI32 TriggerGetLost(RTS_UI32 task)
 
 void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas, const RTS_HANDLE *task_timers)
 {
-    SysAtomicStore(&triggers.count, 0); /* an external event that comes meanwhile is for no task */
+    if (SCHED_MAX_EXTERNAL_EVENTS > 0)
+        SysAtomicStore(&triggers.count, 0); /* an event that comes meanwhile is for no task */
     triggers.watched = 0;
     memset(triggers.list, 0, sizeof triggers.list);
-    if (count > 0) {
-        triggers.tasks = tasks;
-        triggers.areas = areas;
-    }
+    if (SCHED_MAX_EXTERNAL_EVENTS == 0 || count > 0)
+        triggers.tasks = tasks; /* those of before stay readable */
+    triggers.areas = areas;
     timers = task_timers;
     SysAtomicStore(&triggers.count, count);
 }
