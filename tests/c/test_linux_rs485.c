@@ -1,5 +1,6 @@
 /*
- * test_linux_rs485.c - SysCom on a line whose port drives the bus: what the kernel is asked, and drivers that cannot.
+ * test_linux_rs485.c - SysCom on a line whose port drives the bus, and on one that hands over late: what the kernel is
+ * asked, and drivers that cannot.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -27,6 +28,9 @@ static struct {
     RTS_UI32 count;            /* how often */
     int error;                 /* it refuses with this one */
     RTS_UI32 never;            /* flags that it drops without saying so */
+    struct serial_struct port; /* what it has, and is given */
+    RTS_UI32 port_count;       /* how often it is given */
+    int port_error;
 } kernel;
 
 static int fail(int error)
@@ -45,12 +49,33 @@ static int set_rs485(struct serial_rs485 *rs485)
     return 0;
 }
 
+static int get_port(struct serial_struct *port)
+{
+    if (kernel.port_error == ENOTTY)
+        return fail(ENOTTY);
+    *port = kernel.port;
+    return 0;
+}
+
+static int set_port(const struct serial_struct *port)
+{
+    kernel.port_count++;
+    if (kernel.port_error != 0)
+        return fail(kernel.port_error);
+    kernel.port = *port;
+    return 0;
+}
+
 int __real_ioctl(int file, unsigned long request, void *arg);
 int __wrap_ioctl(int file, unsigned long request, void *arg);
 int __wrap_ioctl(int file, unsigned long request, void *arg)
 {
     if (request == TIOCSRS485)
         return set_rs485(arg);
+    if (request == TIOCGSERIAL)
+        return get_port(arg);
+    if (request == TIOCSSERIAL)
+        return set_port(arg);
     if (request != TIOCGRS485)
         return __real_ioctl(file, request, arg);
     if (kernel.error != 0)
@@ -217,7 +242,33 @@ static void a_device_that_comes_back_is_asked_again(void)
     (void)unlink(name);
 }
 
+static void bytes_are_handed_over_at_once(void)
+{
+    begin();
+    kernel.port = (struct serial_struct){.type = PORT_16550A, .flags = ASYNC_SKIP_TEST, .baud_base = 115200};
+    CHECK_EQUAL(try(&plain), ERR_OK);
+    CHECK_EQUAL(kernel.port_count, 1);
+    CHECK_EQUAL(kernel.port.flags, ASYNC_SKIP_TEST | ASYNC_LOW_LATENCY);
+    CHECK_EQUAL(kernel.port.type, PORT_16550A);
+    CHECK_EQUAL(kernel.port.baud_base, 115200);
+    CHECK_EQUAL(try(&plain), ERR_OK); /* it is so already */
+    CHECK_EQUAL(kernel.port_count, 1);
+}
+
 /* ---- drivers that cannot ---- */
+
+static void a_port_that_cannot_hand_over_at_once_is_used_all_the_same(void)
+{
+    static const int errors[] = {ENOTTY, EPERM, EINVAL, EIO};
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(errors); i++) {
+        begin();
+        kernel.port_error = errors[i];
+        CHECK_EQUAL(try(&plain), ERR_OK);
+        CHECK_EQUAL(kernel.port.flags, 0);
+        CHECK_EQUAL(try(&driven), ERR_OK);
+    }
+}
 
 static const char why[] = "its driver cannot switch the direction of the bus (drive)";
 
@@ -316,6 +367,8 @@ int main(void)
     RUN(own_bytes_are_not_heard);
     RUN(hardware_that_needs_no_rts_may_say_so);
     RUN(a_device_that_comes_back_is_asked_again);
+    RUN(bytes_are_handed_over_at_once);
+    RUN(a_port_that_cannot_hand_over_at_once_is_used_all_the_same);
     RUN(a_driver_without_rs485_refuses_the_line);
     RUN(a_driver_that_does_not_take_the_flags_refuses_the_line);
     RUN(a_driver_that_drops_the_request_without_saying_so_refuses_the_line);
