@@ -27,6 +27,10 @@ enum {
 
 typedef struct MODBUS_LINK MODBUS_LINK;
 
+/* What is looked for in what comes on a serial line, where only its contents say for certain where a frame ends: nothing,
+ * the reply of `unit` to `function`, or requests to `unit`. */
+typedef enum { MODBUS_LOOKS_FOR_NOTHING, MODBUS_LOOKS_FOR_REPLY, MODBUS_LOOKS_FOR_REQUESTS } MODBUS_LOOKS_FOR;
+
 /* The functions of a serial line (ModbusRtu.h), and of the connection of a client or a server (ModbusTcp.h). None of
  * them blocks; `now_ns`: SysTimeGetNs, or the clock of a test. */
 typedef struct {
@@ -54,8 +58,12 @@ struct MODBUS_LINK {
     RTS_I64 began_ns;    /* TCP: when the connection began, or was tried */
     RTS_I64 moved_ns;    /* RTU: when the last byte that is sent leaves; TCP: when a byte moved last, or it began */
     RTS_UI32 silence_ns; /* RTU: the shortest pause between frames */
+    RTS_UI32 gap_ns;     /* RTU: the longest pause within one, as bytes are handed over; no less than silence_ns */
     RTS_UI32 char_ns;    /* RTU: how long a character takes */
     SOCKADDRESS peer;    /* TCP: the server that a client connects to */
+    RTS_UI8 looks_for;   /* RTU: MODBUS_LOOKS_FOR_* */
+    RTS_UI8 unit;        /* RTU: the server's own; of a client, to which a request was sent last, */
+    RTS_UI8 function;    /* and its function */
     RTS_UI32 bad_frames; /* of a wrong CRC or length */
     RTS_UI8 frame[MODBUS_FRAME_SIZE];
 };

@@ -47,6 +47,11 @@ RTS_UI8 ModbusCheckCounts(const MODBUS_REQUEST *request);
  * are within the limits. Returns its size, with the data. */
 RTS_UI32 ModbusBeginRequest(MODBUS_REQUEST *request, RTS_UI8 *pdu);
 
+/* How long the request, or the reply, is that begins with these bytes, as far as they say: more than `size` (1 at least)
+ * while it is not all there. 0: its function does not say it. */
+RTS_UI32 ModbusGetRequestSize(const RTS_UI8 *pdu, RTS_UI32 size);
+RTS_UI32 ModbusGetReplySize(const RTS_UI8 *pdu, RTS_UI32 size);
+
 /* What a reply is to a request. */
 typedef enum {
     MODBUS_REPLY_GOOD,      /* data that were read begin at pdu + 2; of functions 17 and 43 none are looked at */

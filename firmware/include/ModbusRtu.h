@@ -4,7 +4,9 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Modbus over serial line V1.02, 2.5.1: a frame ends when no byte has come for 3.5 characters, above 19200 baud for
- * 1.75 ms. All from main.
+ * 1.75 ms, and nothing is sent before that. But a port may hand over bytes in groups (SYSCOM_HELD_MS), with pauses within
+ * a frame, and none between two. There a request or a reply ends where its length says, with a right CRC, and what never
+ * is complete is given up after a longer pause. All from main.
  */
 #ifndef MODBUSRTU_H
 #define MODBUSRTU_H

@@ -421,6 +421,15 @@
 #define SYSCOM_BYTE_TIMES 0
 #endif
 
+/* How long hardware or driver of the port may hold back bytes that have come on a serial line before SysComRead gets
+ * them: SYSCOM_HELD_CHARS characters and SYSCOM_HELD_MS [ms]. 0: the time of each byte is known (SysComGetByteNs). */
+#ifndef SYSCOM_HELD_CHARS
+#define SYSCOM_HELD_CHARS 0
+#endif
+#ifndef SYSCOM_HELD_MS
+#define SYSCOM_HELD_MS 0
+#endif
+
 /* Modbus (IoDrvModbus): what an application may have. 0 clients or servers: none, and no flash for them. */
 #ifndef MODBUS_MAX_CLIENTS /* serial lines, or TCP connections, with devices; about 400 bytes each */
 #define MODBUS_MAX_CLIENTS 1

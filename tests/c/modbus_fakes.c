@@ -86,6 +86,32 @@ RTS_UI32 line_take(RTS_UI8 *data, RTS_UI32 capacity)
     return size;
 }
 
+/* Bytes that are there at this time and have not been read. */
+static RTS_UI32 count_until(const FAKE_BYTES *bytes, RTS_I64 time_ns)
+{
+    RTS_UI32 end = bytes->read;
+
+    while (end < bytes->size && bytes->time_ns[end] <= time_ns)
+        end++;
+    return end - bytes->read;
+}
+
+/* Of those that are there, how many the hardware hands over now. */
+static RTS_UI32 count_handed_over(const FAKE_BYTES *bytes)
+{
+    enum { TRIGGER = 8, CHARS_AFTER = 4, PACKET = 62 };
+    const RTS_I64 latency_ns = 16000000;
+    RTS_UI32 count = count_until(bytes, fakes.now_ns);
+
+    if (count == 0 || fakes.hardware == FAKE_EACH)
+        return count;
+    if (fakes.hardware == FAKE_USB)
+        return count >= PACKET ? count : count_until(bytes, fakes.now_ns / latency_ns * latency_ns);
+    if (fakes.now_ns - bytes->time_ns[bytes->read + count - 1] >= CHARS_AFTER * fakes.char_ns)
+        return count;
+    return count / TRIGGER * TRIGGER;
+}
+
 RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
 {
     FAKE_BYTES *to = &fakes.to_device;
@@ -99,8 +125,8 @@ RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
         fakes.last_byte_ns = fakes.now_ns;
         return size;
     }
-    while (to->read < to->size && count < size && to->time_ns[to->read] <= fakes.now_ns) {
-        fakes.last_byte_ns = to->time_ns[to->read];
+    for (RTS_UI32 left = count_handed_over(to); left != 0 && count < size; left--) {
+        fakes.last_byte_ns = fakes.hardware == FAKE_EACH ? to->time_ns[to->read] : fakes.now_ns;
         data[count++] = to->data[to->read++];
     }
     if (to->read == to->size)

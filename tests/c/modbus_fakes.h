@@ -12,6 +12,13 @@
 #include "ModbusLink.h"
 #include "SysCom.h"
 
+/* How the bytes of a line are handed over. */
+typedef enum {
+    FAKE_EACH,  /* each one when it is there, with its time */
+    FAKE_16550, /* 8 of them, or what there is 4 characters after the last one; their time is not known */
+    FAKE_USB,   /* what is there every 16 ms, or 62 of them; their time is not known */
+} FAKE_HARDWARE;
+
 enum { FAKE_LINE_ROOM = 4096, FAKE_SOCKETS = 64, FAKE_SOCKET_ROOM = 4096, FAKE_LISTENER = 1000, FAKE_READS = 1000000 };
 
 typedef struct {
@@ -38,6 +45,7 @@ typedef struct {
     FAKE_BYTES to_device;
     FAKE_BYTES from_device;
     RTS_I64 last_byte_ns;
+    FAKE_HARDWARE hardware;
     RTS_UI32 discards;
     RTS_UI32 write_limit; /* bytes that one SysComWrite takes */
     RTS_UI32 read_limit;  /* bytes that one SysComRead gives */

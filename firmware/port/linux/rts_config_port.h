@@ -102,6 +102,11 @@
 /* Serial lines of field buses, besides the one of --serial. */
 #define PORT_MAX_BUS_LINES 8
 
+/* A 16550A interrupts at 8 characters, others at up to 32, or 4 characters after the last one; an FTDI adapter sends
+ * what it has each 16 ms; and main may come some ms later. */
+#define SYSCOM_HELD_CHARS 32
+#define SYSCOM_HELD_MS 20
+
 /* Modbus: as many connections as the field has; the others as many as a large machine has. */
 #define MODBUS_MAX_CONNECTIONS 32
 #define MODBUS_MAX_CLIENTS 16

@@ -556,7 +556,10 @@ static void try_to_send(MODBUS_CLIENT *client, RTS_I64 now_ns)
 
 void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
-    if (client->device != NULL && client->sent) {
+    bool asked = client->device != NULL && client->sent;
+
+    client->link.looks_for = asked ? MODBUS_LOOKS_FOR_REPLY : MODBUS_LOOKS_FOR_NOTHING;
+    if (asked) {
         wait_for_reply(client, now_ns);
         return;
     }

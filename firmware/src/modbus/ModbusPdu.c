@@ -45,10 +45,42 @@ RTS_NOINLINE void ModbusPut16(RTS_UI8 *data, RTS_UI32 value)
     data[1] = (RTS_UI8)value;
 }
 
+/* Of a reply that repeats its request. */
+static RTS_UI32 size_of_repeated(const MODBUS_FUNCTION *function)
+{
+    return function->function == MODBUS_MASK_WRITE_REGISTER ? 7 : 5;
+}
+
 /* Whether the data of its request are as long as a count says that is before them. */
 static bool has_byte_count(const MODBUS_FUNCTION *function)
 {
     return function->most_written > 1;
+}
+
+/* ---- where they end ---- */
+
+RTS_UI32 ModbusGetRequestSize(const RTS_UI8 *pdu, RTS_UI32 size)
+{
+    const MODBUS_FUNCTION *function = ModbusFindFunction(pdu[0]);
+
+    if (function == NULL || (pdu[0] == MODBUS_ENCAPSULATED && size >= 2 && pdu[1] != MODBUS_DEVICE_IDENTIFICATION))
+        return 0;
+    if (!has_byte_count(function) || size < function->size)
+        return function->size;
+    return (RTS_UI32)function->size + pdu[function->size - 1];
+}
+
+RTS_UI32 ModbusGetReplySize(const RTS_UI8 *pdu, RTS_UI32 size)
+{
+    const MODBUS_FUNCTION *function = ModbusFindFunction(pdu[0]);
+
+    if ((pdu[0] & MODBUS_EXCEPTION) != 0)
+        return 2;
+    if (function == NULL || pdu[0] == MODBUS_ENCAPSULATED)
+        return 0;
+    if (function->most_written != 0 && function->most_read == 0)
+        return size_of_repeated(function);
+    return size < 2 ? 2 : 2u + pdu[1];
 }
 
 /* ---- requests that come ---- */
@@ -166,9 +198,8 @@ static MODBUS_REPLY check_data_reply(const MODBUS_REQUEST *request, const RTS_UI
 static MODBUS_REPLY check_repeated(const MODBUS_REQUEST *request, const RTS_UI8 *head, const RTS_UI8 *pdu,
                                    RTS_UI32 size)
 {
-    RTS_UI32 expected = request->function->function == MODBUS_MASK_WRITE_REGISTER ? 7 : 5;
-
-    return size == expected && memcmp(head, pdu, size) == 0 ? MODBUS_REPLY_GOOD : MODBUS_REPLY_OTHER;
+    return size == size_of_repeated(request->function) && memcmp(head, pdu, size) == 0 ? MODBUS_REPLY_GOOD
+                                                                                       : MODBUS_REPLY_OTHER;
 }
 
 /* What a device says of itself: its own length is in the one, and the category that was asked for in the other. */

@@ -5,13 +5,22 @@
  */
 #include "ModbusRtu.h"
 
+#include <string.h>
+
+#include "ModbusPdu.h"
+#include "rts_config.h"
+
 enum {
     NS_PER_S = 1000000000,
+    NS_PER_MS = 1000000,
     FAST_BAUD = 19200, /* above, silence does not get shorter */
     FAST_SILENCE_NS = 1750000,
     HALVES_OF_SILENCE = 7, /* 3.5 characters */
-    FRAME_MIN = 1 + 1 + MODBUS_CRC_SIZE,
+    AROUND_PDU = 1 + MODBUS_CRC_SIZE,
+    FRAME_MIN = AROUND_PDU + 1,
+    FRAME_MAX = AROUND_PDU + MODBUS_MAX_PDU,
     ROOM = MODBUS_FRAME_SIZE - MODBUS_AT_UNIT,
+    IN_PIECES = SYSCOM_HELD_CHARS > 0 || SYSCOM_HELD_MS > 0, /* else silence ends a frame, and only that */
     READS_MAX = 4, /* in one pass: a line that babbles does not hold up main */
 };
 
@@ -44,6 +53,7 @@ void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *set
     link->fill = 0;
     link->char_ns = NS_PER_S / settings->baud * bits;
     link->silence_ns = settings->baud > FAST_BAUD ? FAST_SILENCE_NS : link->char_ns * HALVES_OF_SILENCE / 2;
+    link->gap_ns = link->silence_ns + SYSCOM_HELD_CHARS * link->char_ns + SYSCOM_HELD_MS * NS_PER_MS;
     link->moved_ns = 0;
 }
 
@@ -91,7 +101,9 @@ void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns)
 
     unit[1 + pdu_size] = (RTS_UI8)crc;
     unit[2 + pdu_size] = (RTS_UI8)(crc >> 8);
-    link->fill = (RTS_UI16)(1 + pdu_size + MODBUS_CRC_SIZE);
+    link->fill = (RTS_UI16)(pdu_size + AROUND_PDU);
+    link->unit = unit[0];
+    link->function = unit[1];
     link->sent = 0;
     link->sending = true;
     link->moved_ns = now_ns + (RTS_I64)link->fill * link->char_ns;
@@ -99,11 +111,138 @@ void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns)
     transmit(link, now_ns);
 }
 
+/* ---- frames in what has come ---- */
+
+static const RTS_UI8 *first_byte(const MODBUS_LINK *link)
+{
+    return link->frame + MODBUS_AT_UNIT;
+}
+
+static bool is_right(const RTS_UI8 *frame, RTS_UI32 size)
+{
+    return size >= FRAME_MIN && size <= FRAME_MAX && ModbusCrc(frame, size) == 0;
+}
+
+/* Drops the bytes before `at`. */
+static void move_to_front(MODBUS_LINK *link, RTS_UI32 at)
+{
+    link->fill = (RTS_UI16)(link->fill - at);
+    memmove(link->frame + MODBUS_AT_UNIT, first_byte(link) + at, link->fill);
+}
+
+/* As the functions of ModbusPdu.h that say where a PDU ends, for its frame. */
+static RTS_UI32 frame_size(RTS_UI32 (*pdu_size)(const RTS_UI8 *, RTS_UI32), const RTS_UI8 *frame, RTS_UI32 fill)
+{
+    RTS_UI32 size = pdu_size(frame + 1, fill - 1);
+
+    return size != 0 ? size + AROUND_PDU : 0;
+}
+
+/* ---- a server: requests, between those to others and their replies ---- */
+
+/* The size of the frame with a right CRC that is first; more than `fill` if one may become it; 0: it is none. */
+static RTS_UI32 size_of_first(const MODBUS_LINK *link)
+{
+    const RTS_UI8 *frame = first_byte(link);
+    RTS_UI32 request;
+    RTS_UI32 reply;
+
+    if (frame[0] > MODBUS_MAX_UNIT)
+        return 0;
+    if (link->fill < 2)
+        return FRAME_MIN;
+    request = frame_size(ModbusGetRequestSize, frame, link->fill);
+    reply = frame[0] != link->unit ? frame_size(ModbusGetReplySize, frame, link->fill) : 0;
+    if (request <= link->fill && is_right(frame, request))
+        return request;
+    if (reply <= link->fill && is_right(frame, reply))
+        return reply;
+    if (request < reply)
+        request = reply;
+    return request > link->fill && request <= FRAME_MAX ? request : 0;
+}
+
+/* What is before the last frame is for others, or is not waited for any more. */
+static void drop_all_but_last(MODBUS_LINK *link)
+{
+    RTS_UI32 size;
+
+    while ((size = size_of_first(link)) != 0 && size < link->fill)
+        move_to_front(link, size);
+}
+
+/* Whether it is the whole of a request to this server that comes last, after something else. */
+static bool is_request_at(const MODBUS_LINK *link, RTS_UI32 at)
+{
+    const RTS_UI8 *frame = first_byte(link) + at;
+    RTS_UI32 left = link->fill - at;
+
+    return frame[0] == link->unit && frame_size(ModbusGetRequestSize, frame, left) == left && is_right(frame, left);
+}
+
+static bool find_request(MODBUS_LINK *link)
+{
+    for (RTS_UI32 at = 1; at + FRAME_MIN <= link->fill; at++) {
+        if (is_request_at(link, at)) {
+            link->bad_frames++;
+            move_to_front(link, at);
+            return true;
+        }
+    }
+    return false;
+}
+
+/* After silence: whether a frame has come. What may go on is waited for; within it nothing is looked for, because its
+ * data may be anything. */
+static bool has_request(MODBUS_LINK *link, bool over)
+{
+    RTS_UI32 size = size_of_first(link);
+
+    if (size == link->fill)
+        return true;
+    if (link->fill < ROOM && (size == 0 || over))
+        return is_right(first_byte(link), link->fill) || find_request(link);
+    return false;
+}
+
+/* ---- a client: the reply ---- */
+
+static bool is_reply_at(const MODBUS_LINK *link, RTS_UI32 at)
+{
+    const RTS_UI8 *frame = first_byte(link) + at;
+
+    return frame[0] == link->unit && (frame[1] & ~MODBUS_EXCEPTION) == link->function;
+}
+
+/* Finds it wherever it is: what is before and after it is noise. */
+static bool find_reply(MODBUS_LINK *link)
+{
+    for (RTS_UI32 at = 0; at + FRAME_MIN <= link->fill; at++) {
+        RTS_UI32 left = link->fill - at;
+        RTS_UI32 size = is_reply_at(link, at) ? frame_size(ModbusGetReplySize, first_byte(link) + at, left) : 0;
+        if (size <= left && is_right(first_byte(link) + at, size)) {
+            move_to_front(link, at);
+            link->fill = (RTS_UI16)size;
+            return true;
+        }
+    }
+    return false;
+}
+
+/* After silence: whether a frame has come that is another, or a reply of a function that does not say its length. */
+static bool has_other(const MODBUS_LINK *link, bool over)
+{
+    bool may_go_on = link->fill >= 2 && is_reply_at(link, 0) &&
+                     frame_size(ModbusGetReplySize, first_byte(link), link->fill) > link->fill;
+
+    return (over || !may_go_on) && is_right(first_byte(link), link->fill);
+}
+
 /* ---- receiving ---- */
 
-static bool is_quiet(const MODBUS_LINK *link, RTS_I64 now_ns)
+static bool is_quiet(const MODBUS_LINK *link, RTS_UI32 silence_ns, RTS_I64 now_ns)
 {
-    return now_ns - SysComGetByteNs(link->handle) >= link->silence_ns;
+    return now_ns - SysComGetByteNs(link->handle) >= silence_ns;
 }
 
 /* True when all that has come was read. What is too long for a frame stays so: its bytes are written over. */
@@ -116,24 +255,40 @@ static bool take_bytes(MODBUS_LINK *link)
         RTS_UI32 size = SysComRead(link->handle, frame + at, ROOM - at);
         if (size == 0)
             return true;
-        if (link->fill < ROOM)
-            link->fill = (RTS_UI16)(at + size);
+        if (link->fill == ROOM)
+            continue;
+        link->fill = (RTS_UI16)(at + size);
+        if (IN_PIECES && link->looks_for == MODBUS_LOOKS_FOR_REQUESTS)
+            drop_all_but_last(link);
     }
     return false;
 }
 
-/* The size of the PDU, 0 if the frame is not good. */
-static RTS_UI32 end_frame(MODBUS_LINK *link)
+static bool has_frame(MODBUS_LINK *link, bool over)
 {
-    const RTS_UI8 *frame = link->frame + MODBUS_AT_UNIT;
-    RTS_UI32 size = link->fill;
+    if (!IN_PIECES || link->looks_for == MODBUS_LOOKS_FOR_NOTHING)
+        return is_right(first_byte(link), link->fill);
+    return link->looks_for == MODBUS_LOOKS_FOR_REQUESTS ? has_request(link, over) : has_other(link, over);
+}
 
-    if (size >= FRAME_MIN && size < ROOM &&
-        ModbusCrc(frame, size - MODBUS_CRC_SIZE) == (frame[size - 2] | frame[size - 1] << 8))
-        return size - 1 - MODBUS_CRC_SIZE;
-    link->bad_frames++;
-    ModbusLinkDrop(link);
-    return 0;
+/* A reply may come as long as it is waited for. */
+static bool is_given_up(const MODBUS_LINK *link, bool over)
+{
+    return !IN_PIECES || link->fill >= ROOM || (over && link->looks_for != MODBUS_LOOKS_FOR_REPLY);
+}
+
+/* After silence: whether what has come ends with a frame. */
+static bool end_frame(MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    bool over = link->looks_for == MODBUS_LOOKS_FOR_NOTHING || is_quiet(link, link->gap_ns, now_ns);
+
+    if (has_frame(link, over))
+        return true;
+    if (is_given_up(link, over)) {
+        link->bad_frames++;
+        ModbusLinkDrop(link);
+    }
+    return false;
 }
 
 RTS_UI32 ModbusRtuReceive(MODBUS_LINK *link, RTS_I64 now_ns)
@@ -142,10 +297,15 @@ RTS_UI32 ModbusRtuReceive(MODBUS_LINK *link, RTS_I64 now_ns)
         transmit(link, now_ns);
         return 0;
     }
-    return take_bytes(link) && link->fill != 0 && is_quiet(link, now_ns) ? end_frame(link) : 0;
+    if (!take_bytes(link) || link->fill == 0)
+        return 0;
+    if (IN_PIECES && link->looks_for == MODBUS_LOOKS_FOR_REPLY && find_reply(link))
+        return (RTS_UI32)link->fill - AROUND_PDU;
+    return is_quiet(link, link->silence_ns, now_ns) && end_frame(link, now_ns) ? (RTS_UI32)link->fill - AROUND_PDU : 0;
 }
 
 bool ModbusRtuReady(MODBUS_LINK *link, RTS_I64 now_ns)
 {
-    return !link->sending && link->fill == 0 && now_ns - link->moved_ns >= link->silence_ns && is_quiet(link, now_ns);
+    return !link->sending && link->fill == 0 && now_ns - link->moved_ns >= link->silence_ns &&
+           is_quiet(link, link->silence_ns, now_ns);
 }

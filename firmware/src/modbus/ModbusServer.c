@@ -347,10 +347,14 @@ static void give_up_late(const MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64
 
 bool ModbusServerPoll(MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64 now_ns)
 {
-    RTS_UI32 size = ModbusLinkType(link)->receive(link, now_ns);
-    RTS_UI8 unit = link->frame[MODBUS_AT_UNIT];
     RTS_UI8 *pdu = link->frame + MODBUS_AT_PDU;
+    RTS_UI8 unit;
+    RTS_UI32 size;
 
+    link->looks_for = MODBUS_LOOKS_FOR_REQUESTS;
+    link->unit = server->unit;
+    size = ModbusLinkType(link)->receive(link, now_ns);
+    unit = link->frame[MODBUS_AT_UNIT];
     if (size == 0) {
         give_up_late(server, link, now_ns);
         return false;
