@@ -85,6 +85,7 @@ typedef struct MODBUS_CLIENT {
     bool waits; /* the last byte has left */
     bool verifies;
     RTS_I64 since_ns; /* from when it waits for the link, or for the reply: the time-out runs */
+    RTS_I64 late_ns;  /* until then the reply to a request that was given up may come, and nothing is sent */
     RTS_UI16 transaction;
     RTS_UI8 head[MODBUS_HEAD_SIZE];
 } MODBUS_CLIENT;

@@ -76,6 +76,13 @@ static inline const MODBUS_LINK_TYPE *ModbusLinkType(const MODBUS_LINK *link)
     return MODBUS_MAX_CONNECTIONS > 0 ? link->type : &ModbusRtuType;
 }
 
+/* Whether the frame that has come on a serial line is of the device and function that were asked last. */
+static inline bool ModbusLinkIsReply(const MODBUS_LINK *link)
+{
+    return link->frame[MODBUS_AT_UNIT] == link->unit &&
+           (link->frame[MODBUS_AT_PDU] & ~MODBUS_EXCEPTION) == link->function;
+}
+
 /* What was received is not needed, the next frame may come. */
 static inline void ModbusLinkDrop(MODBUS_LINK *link)
 {

@@ -32,6 +32,15 @@ static RTS_UI8 reply[300];
 RTS_UI32 reply_size;
 static RTS_I64 reply_ns;
 
+/* replies that wait until that one was sent */
+enum { QUEUE = 8 };
+static struct {
+    RTS_UI8 data[300];
+    RTS_UI32 size;
+    RTS_I64 due_ns;
+} queue[QUEUE];
+static RTS_UI32 queued;
+
 void begin(RTS_UI32 count)
 {
     const SYSCOM_SETTINGS settings = {19200, SYSCOM_PARITY_EVEN, 1, false};
@@ -44,7 +53,7 @@ void begin(RTS_UI32 count)
     memset(states, 0, sizeof(states));
     memset(in, 0, sizeof(in));
     memset(out, 0, sizeof(out));
-    request_size = reply_size = 0;
+    request_size = reply_size = queued = 0;
     for (RTS_UI32 i = 0; i < DEVICES; i++) {
         remotes[i].server.unit = (RTS_UI8)(i + 1);
         remotes[i].server.memory = &remotes[i].memory;
@@ -86,6 +95,24 @@ static void send_reply(void)
 {
     line_send(reply, reply_size);
     reply_size = 0;
+    if (queued == 0)
+        return;
+    memcpy(reply, queue[0].data, queue[0].size);
+    reply_size = queue[0].size;
+    reply_ns = queue[0].due_ns;
+    memmove(queue, queue + 1, --queued * sizeof(queue[0]));
+}
+
+/* What is in `reply` comes after the replies before; `size` bytes of `first` are the one that is due before all. */
+static void queue_reply(const RTS_UI8 *first, RTS_UI32 size, RTS_I64 due_ns)
+{
+    CHECK(queued < QUEUE);
+    memcpy(queue[queued].data, reply, reply_size);
+    queue[queued].size = reply_size;
+    queue[queued++].due_ns = reply_ns;
+    memcpy(reply, first, size);
+    reply_size = size;
+    reply_ns = due_ns;
 }
 
 /* The reply with its fault. */
@@ -112,11 +139,16 @@ static void spoil(FAULT fault)
 
 static void serve(REMOTE *remote)
 {
+    RTS_UI8 first[300];
+    RTS_UI32 first_size = reply_size;
+    RTS_I64 first_ns = reply_ns;
+
     remote->asked++;
     remote->asked_ns = fakes.now_ns;
     remote->function = request[1];
-    if (remote->fault == SILENT)
+    if (remote->fault == SILENT || (reply_size != 0 && remote->loses))
         return;
+    memcpy(first, reply, sizeof(first));
     memcpy(reply, request, request_size);
     reply_size = 1 + ModbusServerReply(&remote->server, reply + 1, request_size - 3);
     if (remote->fault == EXCEPTION) {
@@ -126,6 +158,8 @@ static void serve(REMOTE *remote)
     }
     spoil(remote->fault);
     reply_ns = fakes.now_ns + (RTS_I64)(remote->fault == LATE ? TIMEOUT_MS + 50 : remote->delay_ms) * MS;
+    if (first_size != 0 && request[0] != MODBUS_BROADCAST)
+        queue_reply(first, first_size, first_ns);
 }
 
 static void run_remotes(void)

@@ -24,6 +24,7 @@ typedef struct {
     RTS_UI8 data[2 * REGISTERS];
     FAULT fault;
     RTS_UI32 delay_ms; /* before it replies; 2 */
+    bool loses;        /* requests that come before it has replied; else it replies to all, one after the other */
     RTS_UI32 asked;
     RTS_I64 asked_ns;
     RTS_UI8 function; /* of the last request */

@@ -36,6 +36,7 @@ void ModbusClientBegin(MODBUS_CLIENT *client, MODBUS_DEVICE *devices, RTS_UI32 c
     client->device_count = count;
     client->device = NULL;
     client->call_count = 0;
+    client->late_ns = 0;
     client->transaction = 0;
 }
 
@@ -316,12 +317,18 @@ static void write_all_again(const MODBUS_DEVICE *device, const MODBUS_JOB_STATE 
     }
 }
 
-/* The whole line was away: the others need not wait until it is their turn. */
+static RTS_I64 timeout_ns(const MODBUS_DEVICE *device)
+{
+    return device->timeout_ms * NS_PER_MS;
+}
+
+/* The whole line was away: the others need not wait until it is their turn, but for the late reply to the last try. */
 static void ask_all(const MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     for (RTS_UI32 i = 0; i < client->device_count; i++) {
-        if (client->devices[i].retry_ns > now_ns)
-            client->devices[i].retry_ns = now_ns;
+        MODBUS_DEVICE *device = &client->devices[i];
+        if (device->retry_ns > now_ns + timeout_ns(device))
+            device->retry_ns = now_ns + timeout_ns(device);
     }
 }
 
@@ -338,11 +345,40 @@ static void note_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
     device->good_ns = now_ns;
 }
 
-static RTS_I64 pause_of(const MODBUS_CLIENT *client)
+static RTS_I64 usual_pause_of(const MODBUS_CLIENT *client)
 {
     if (!others_reply(client))
         return MODBUS_RETRY_ALONE_MS * NS_PER_MS;
     return (client->device->failures == MODBUS_TRIES ? MODBUS_RETRY_SOON_MS : MODBUS_RETRY_MS) * NS_PER_MS;
+}
+
+/* Before a lost device is asked again: for so long its late reply may come. */
+static RTS_I64 pause_of(const MODBUS_CLIENT *client)
+{
+    RTS_I64 least_ns = timeout_ns(client->device);
+    RTS_I64 usual_ns = usual_pause_of(client);
+
+    return usual_ns > least_ns ? usual_ns : least_ns;
+}
+
+static bool has_other_name(const MODBUS_CLIENT *client)
+{
+    for (RTS_UI32 i = 0; i < client->device_count; i++) {
+        if (&client->devices[i] != client->device && client->devices[i].unit == client->device->unit)
+            return true;
+    }
+    return false;
+}
+
+/* On a serial line a reply does not say to which request it is. So nothing is asked before that to a request which is
+ * given up has come, or has had as much time again. A device that is lost by that is not asked again so soon anyway,
+ * unless by another name, and what a search asks (no table) is not what jobs ask. */
+static void await_late_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    if (!client->waits || !ModbusLinkType(&client->link)->broadcasts || client->request.function->table == 0 ||
+        (client->device->failures + 1 >= MODBUS_TRIES && !has_other_name(client)))
+        return;
+    client->late_ns = now_ns + timeout_ns(client->device);
 }
 
 static void fail_job(MODBUS_JOB_STATE *job, bool lost, RTS_I64 now_ns)
@@ -499,7 +535,7 @@ static void take_frame(MODBUS_CLIENT *client, RTS_UI32 size, RTS_I64 now_ns)
 
 static bool is_too_late(const MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
-    return now_ns - client->since_ns >= client->device->timeout_ms * NS_PER_MS;
+    return now_ns - client->since_ns >= timeout_ns(client->device);
 }
 
 static void end_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
@@ -510,6 +546,7 @@ static void end_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
         return;
     }
     ModbusLinkType(&client->link)->give_up(&client->link);
+    await_late_reply(client, now_ns);
     fail(client, now_ns);
 }
 
@@ -539,11 +576,21 @@ static void begin(MODBUS_CLIENT *client, RTS_I64 now_ns)
     client->since_ns = now_ns;
 }
 
-/* Frames that come while nothing was asked belong to nothing. */
+static bool may_be_late(const MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    return now_ns < client->late_ns;
+}
+
+/* Frames that come while nothing was asked belong to nothing: at most one of them is the reply that is late. */
 static void drop_frames(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
-    if (client->link.handle != RTS_INVALID_HANDLE && ModbusLinkType(&client->link)->receive(&client->link, now_ns) != 0)
-        ModbusLinkDrop(&client->link);
+    MODBUS_LINK *link = &client->link;
+
+    if (link->handle == RTS_INVALID_HANDLE || ModbusLinkType(link)->receive(link, now_ns) == 0)
+        return;
+    if (ModbusLinkIsReply(link))
+        client->late_ns = now_ns;
+    ModbusLinkDrop(link);
 }
 
 static void try_to_send(MODBUS_CLIENT *client, RTS_I64 now_ns)
@@ -557,13 +604,16 @@ static void try_to_send(MODBUS_CLIENT *client, RTS_I64 now_ns)
 void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     bool asked = client->device != NULL && client->sent;
+    bool expects = asked || may_be_late(client, now_ns);
 
-    client->link.looks_for = asked ? MODBUS_LOOKS_FOR_REPLY : MODBUS_LOOKS_FOR_NOTHING;
+    client->link.looks_for = expects ? MODBUS_LOOKS_FOR_REPLY : MODBUS_LOOKS_FOR_NOTHING;
     if (asked) {
         wait_for_reply(client, now_ns);
         return;
     }
     drop_frames(client, now_ns);
+    if (may_be_late(client, now_ns))
+        return;
     if (client->device == NULL)
         begin(client, now_ns);
     if (client->device != NULL)
@@ -585,7 +635,9 @@ RTS_I64 ModbusClientGetDueNs(const MODBUS_CLIENT *client, RTS_I64 now_ns)
     RTS_I64 due = NEVER;
 
     if (client->device != NULL)
-        return client->sent ? client->since_ns + client->device->timeout_ms * NS_PER_MS : now_ns;
+        return client->sent ? client->since_ns + timeout_ns(client->device) : now_ns;
+    if (may_be_late(client, now_ns))
+        return client->late_ns;
     for (const MODBUS_CALL *call = client->calls; call < client->calls + client->call_count; call++) {
         if (SysAtomicLoad(&call->state) == MODBUS_CALL_WAITS && call->client == client)
             return now_ns;
