@@ -132,6 +132,30 @@ static void a_connection_that_never_comes_is_given_up(void)
     CHECK(!fakes.sockets[0].open);
 }
 
+/* The device is lost, and nothing is asked of it for a while: what is not looked at would wake main all the time. */
+static void a_connection_that_comes_or_fails_while_nothing_is_asked_is_seen(void)
+{
+    static const RTS_RESULT results[] = {ERR_OK, ERR_NET_NOTCONNECTED};
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(results); i++) {
+        begin(1);
+        fakes.connect_result = ERR_PENDING;
+        while (!ModbusDeviceIsLost(&devices[0]))
+            run_ms(1);
+        run_ms(10);
+        CHECK(newest()->open && !newest()->connected);
+        fakes.connect_result = results[i];
+        run_ms(2);
+        CHECK_EQUAL(newest()->connected, i == 0);
+        CHECK_EQUAL(newest()->open, i == 0);
+        CHECK_EQUAL(devices[0].counters.requests, 0);
+        fakes.connect_result = ERR_OK;
+        run_ms(2500);
+        CHECK(ModbusDeviceIsGood(&devices[0]));
+        CHECK_EQUAL(fakes.connects, i == 0 ? 1 : 2);
+    }
+}
+
 static void a_lost_connection_is_made_again(void)
 {
     begin(1);
@@ -297,6 +321,7 @@ int main(void)
     RUN(a_refused_connection_is_tried_every_second);
     RUN(a_slow_connection_is_waited_for);
     RUN(a_connection_that_never_comes_is_given_up);
+    RUN(a_connection_that_comes_or_fails_while_nothing_is_asked_is_seen);
     RUN(a_lost_connection_is_made_again);
     RUN(a_reply_of_another_transaction_is_passed_over);
     RUN(a_device_that_the_gateway_does_not_reach_is_lost);

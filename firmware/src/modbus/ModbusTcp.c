@@ -157,6 +157,8 @@ static bool is_header_good(MODBUS_LINK *link)
 
 RTS_UI32 ModbusTcpReceive(MODBUS_LINK *link, RTS_I64 now_ns)
 {
+    if (link->connecting)
+        look_at_connecting(link, now_ns);
     if (!is_open(link) || link->connecting)
         return 0;
     if (link->sending) {
