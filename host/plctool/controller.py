@@ -294,15 +294,17 @@ class Controller(ABC):
         """The variables with these names, or that match these patterns, as they are now; of one moment between two
         cycles if the reading says so.
 
-        Raises UsageError for a name that is unknown, DeviceError when a pointer leads to no variable.
+        Raises UsageError for a name that is unknown, DeviceError when a pointer leads to no variable; what a pattern
+        finds is None then.
         """
         table = self.symbols()
-        reading = self._sample(table, names)
-        reading.check(lambda pointer: self._read(table, [pointer]).values[0])
+        reading = self.sample_symbols(table, table.select(names))
+        typed = [name for name in names if not is_pattern(name)]
+        reading.check(typed, lambda pointer: self._read(table, [pointer]).values[0])
         return reading
 
-    def _sample(self, table: SymbolTable, names: Sequence[str]) -> Reading:
-        symbols = table.select(names)
+    def sample_symbols(self, table: SymbolTable, symbols: dict[str, Symbol]) -> Reading:
+        """The same of variables of a table, by the names they are to have. None: a pointer leads to no variable."""
         contents = self._read(table, list(symbols.values()))
         return Reading(symbols, dict(zip(symbols, contents.values, strict=True)), contents.consistent)
 

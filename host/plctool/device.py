@@ -346,7 +346,8 @@ class Plc(Controller):
             due += interval
             at = time.monotonic() - begin
             try:
-                reading = self._sample(self.symbols(), names)
+                table = self.symbols()
+                reading = self.sample_symbols(table, table.select(names))
             except LinkError as error:
                 if error.code != BUSY:
                     raise

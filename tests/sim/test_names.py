@@ -258,3 +258,25 @@ def test_a_subrange_keeps_its_limits(plc: Simulator) -> None:
     plc.write({"Main.level": 100})
     with pytest.raises(UsageError, match="0 to 100"):
         plc.write({"Main.level": 101})
+
+
+@pytest.mark.parametrize(
+    ("pattern", "name", "value"),
+    [
+        ("Main.r?f", "Main.ref", {"x": 11, "y": 1.5}),
+        ("Main.scale.*", "Main.scale.data", [10, 11, 30, 40]),
+        ("Main.dr*", "Main.drive", "Drive"),
+        ("Main.lo*e", "Main.loose", None),
+    ],
+)
+def test_a_pattern_finds_the_value_that_a_name_has(plc: Simulator, pattern: str, name: str, value: object) -> None:
+    assert plc.read(pattern)[name] == value
+
+
+def test_a_pattern_that_also_matches_does_not_change_what_a_name_shows(plc: Simulator) -> None:
+    assert plc.read("Main.ref", "Main.r*")["Main.ref"] == {"x": 11, "y": 1.5}
+
+
+def test_a_name_that_leads_nowhere_is_an_error_beside_a_pattern_that_matches_it(plc: Simulator) -> None:
+    with pytest.raises(DeviceError, match=r"Main\.loose is NULL"):
+        plc.read("Main.lo*e", "Main.loose")

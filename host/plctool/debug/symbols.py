@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from plctool.debug.bounds import BoundsCheck, Read, what_was_outside
 from plctool.debug.trace import Trace
-from plctool.debug.variables import Symbol, Units, constant_symbol, walk
+from plctool.debug.variables import Symbol, Units, constant_symbol, shown, walk
 from plctool.errors import UsageError
 from plctool.files import write_atomically
 from plctool.iec.addresses import parse_address
@@ -177,9 +177,16 @@ class SymbolTable:
                 found[name] = self.resolve(name)
         return found
 
+    def scalars(self, names: Sequence[str]) -> dict[str, Symbol]:
+        """The same by their own names, and of structures and arrays all values that they consist of."""
+        leaves = (leaf for symbol in self.select(names).values() for leaf in symbol.leaves())
+        found = {leaf.name: shown(leaf, self._units) for leaf in leaves}
+        return {name: symbol for name, symbol in found.items() if not isinstance(symbol.type, OpenArrayType)}
+
     def _matching(self, pattern: str) -> dict[str, Symbol]:
-        kinds_without_value = StructType | OpenArrayType
-        found = {s.name: s for s in self.find([pattern]) if not isinstance(s.type, kinds_without_value)}
+        with_parts = (s for s in self.find([pattern]) if not isinstance(s.type, StructType))
+        every = (shown(symbol, self._units) for symbol in with_parts)
+        found = {s.name: s for s in every if not isinstance(s.type, OpenArrayType)}
         if not found:
             raise UsageError(f"No variable matches {pattern}; 'plctool symbols' lists them.", "unknown-variable")
         return found

@@ -185,23 +185,31 @@ def walk(symbol: Symbol, text: str, at: int, units: Units) -> Symbol:
             raise UsageError(f"{symbol.name} is a BOOL and has no parts.", "no-part")
         at = match.end()
         symbol = _step(symbol.followed(), match, text[:at], units)
-    symbol = symbol.followed()
-    if isinstance(symbol.type, InterfaceType) and units.classes:
-        return symbol.target(symbol.name, ClassType(symbol.type.name, ELEMENTARY["UDINT"], units.classes))
+    symbol = shown(symbol, units)
     if isinstance(symbol.type, OpenArrayType):
         raise _open_array(symbol)
     return symbol
 
 
+def shown(symbol: Symbol, units: Units) -> Symbol:
+    """What has the value that is shown for a variable, however it was found: as in ST, what a REFERENCE TO or
+    VAR_IN_OUT refers to; of an interface variable the class of its instance."""
+    symbol = symbol.followed()
+    if isinstance(symbol.type, InterfaceType) and units.classes:
+        return symbol.target(symbol.name, ClassType(symbol.type.name, ELEMENTARY["UDINT"], units.classes))
+    return symbol
+
+
 def _step(symbol: Symbol, match: re.Match[str], name: str, units: Units) -> Symbol:
+    """A part by `name`, as typed; the part has the name as declared."""
     member, indices, bit, dereference = match.groups()
     if member:
         return _member(symbol, member, name, units)
     if bit:
-        return _bit(symbol, int(bit), name)
+        return _bit(symbol, int(bit))
     if dereference:
-        return _target(symbol, name)
-    return _element(symbol, indices, name)
+        return _target(symbol)
+    return _element(symbol, indices)
 
 
 def _member(symbol: Symbol, member: str, name: str, units: Units) -> Symbol:
@@ -217,29 +225,30 @@ def _member(symbol: Symbol, member: str, name: str, units: Units) -> Symbol:
         raise UsageError(f"{name} is a property: only the program can read it, by a call.", "property")
     if found is None:
         raise units.no_variable(name, t.name, [f"{symbol.name}.{f.name}" for f in t.fields])
-    return symbol.part(name, found.offset, found.type)
+    return symbol.part(f"{symbol.name}.{found.name}", found.offset, found.type)
 
 
-def _target(symbol: Symbol, name: str) -> Symbol:
+def _target(symbol: Symbol) -> Symbol:
     t = symbol.type
     if not isinstance(t, PointerType) or isinstance(t, InterfaceType):
         raise UsageError(f"{symbol.name} is a {t}, not a pointer; leave out the ^.", "no-part")
-    return symbol.target(name, t.target)
+    return symbol.target(f"{symbol.name}^", t.target)
 
 
-def _bit(symbol: Symbol, bit: int, name: str) -> Symbol:
+def _bit(symbol: Symbol, bit: int) -> Symbol:
     base = base_of(symbol.type)
     if not isinstance(base, Elementary) or base.kind not in (Kind.BIT, Kind.INT) or bit >= base.bits:
         raise UsageError(f"{symbol.name} is a {symbol.type} and has no bit {bit}.", "no-part")
-    return replace(symbol, name=name, bit=bit)
+    return replace(symbol, name=f"{symbol.name}.{bit}", bit=bit)
 
 
-def _element(symbol: Symbol, text: str, name: str) -> Symbol:
+def _element(symbol: Symbol, text: str) -> Symbol:
     t = symbol.type
     try:
         indices = [int(part) for part in text.split(",")]
     except ValueError:
         raise UsageError(f"'{text}' is not an index; write a number as in {symbol.name}[1].", "syntax") from None
+    name = f"{symbol.name}[{','.join(map(str, indices))}]"
     if isinstance(t, StringType) and len(indices) == 1:
         if not 0 <= indices[0] <= t.length:
             raise UsageError(f"{symbol.name} has the characters 0 to {t.length - 1}, not {indices[0]}.", "no-part")
@@ -290,10 +299,11 @@ class Reading:
         """The values as ST writes them."""
         return {name: self.symbols[name].literal(value) for name, value in self.values.items()}
 
-    def check(self, read: Callable[[Symbol], bytes | None]) -> None:
-        """Raises DeviceError when a pointer does not lead to a variable. An interface variable may be NULL."""
-        for name, data in self.contents.items():
-            if data is None:
+    def check(self, names: Iterable[str], read: Callable[[Symbol], bytes | None]) -> None:
+        """Raises DeviceError when a pointer to one of these does not lead to a variable. An interface variable may be
+        NULL."""
+        for name in names:
+            if self.contents[name] is None:
                 error = unreachable(self.symbols[name], read)
                 if error.code != "null" or not isinstance(self.symbols[name].type, ClassType):
                     raise error
