@@ -9,7 +9,7 @@ from math import ceil
 from typing import Any
 
 from plctool.core import lib
-from plctool.debug.variables import Symbol
+from plctool.debug.variables import ClassType, Symbol
 from plctool.sim import Simulator
 
 _STEP_MS = 10  # between two lines if the first task is not cyclic
@@ -18,13 +18,15 @@ _STEP_MS = 10  # between two lines if the first task is not cyclic
 def trace_csv(plc: Simulator, names: Sequence[str], cycles: int | None, time_ms: float | None) -> Iterator[str]:
     """Lets a program run, and gives the lines of the file: names, and after each cycle of the first task (with
     `time_ms`: of those in this time) the virtual time and the values. Structures and arrays have a column for
-    each value, BOOL is 0 or 1. Ends with the line after which the program has stopped with an exception."""
+    each value, BOOL is 0 or 1, and what a pointer does not lead to is empty. Ends with the line after which the program
+    has stopped with an exception."""
     table = plc.symbols()
-    columns = [leaf for symbol in table.select(names).values() for leaf in symbol.leaves()]
-    yield _line(["time_ms", *(column.name for column in columns)])
+    columns = table.scalars(names)
+    yield _line(["time_ms", *columns])
     for _ in _cycles(plc, cycles or 1) if time_ms is None else _intervals(plc, time_ms):
-        reading = plc.sample([column.name for column in columns])
-        yield _line([f"{plc.now_ns / 1e6:.10g}", *map(_cell, columns, reading.values.values(), reading.texts.values())])
+        reading = plc.sample_symbols(table, columns)
+        cells = map(_cell, columns.values(), *(x.values() for x in (reading.contents, reading.values, reading.texts)))
+        yield _line([f"{plc.now_ns / 1e6:.10g}", *cells])
         if plc.raw_status().exception:
             return
 
@@ -53,8 +55,11 @@ def _line(cells: Sequence[str]) -> str:
     return text.getvalue()
 
 
-def _cell(column: Symbol, value: Any, text: str) -> str:
-    """Numbers as such, so that they can be plotted; all else as ST writes it."""
+def _cell(column: Symbol, content: bytes | None, value: Any, text: str) -> str:
+    """Numbers as such, so that they can be plotted; all else as ST writes it. Only an interface variable that leads to
+    nothing has a value, NULL."""
+    if content is None and not isinstance(column.type, ClassType):
+        return ""
     if isinstance(value, bool):
         return str(int(value))
     return str(value) if isinstance(value, int | float | str) else text

@@ -1,0 +1,63 @@
+"""`run --trace`: a column for each variable, by whatever names it was asked for, and a cell for each row."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+MAIN = """
+FUNCTION_BLOCK Adder
+VAR_IN_OUT io : INT; END_VAR
+io := io + 1;
+END_FUNCTION_BLOCK
+TYPE Point : STRUCT x : INT := 4; y : INT; END_STRUCT; END_TYPE
+PROGRAM Main
+VAR
+    i : INT; a : ARRAY[1..3] OF INT := [1, 2, 3]; acc : Adder; ref : REFERENCE TO INT; p : REFERENCE TO Point;
+    point : Point;
+END_VAR
+i := i + 1;
+IF i > 1 THEN acc(io := a[1]); ref REF= a[2]; p REF= point; END_IF;
+END_PROGRAM
+"""
+
+
+@pytest.fixture
+def program(tool: Any, scratch: Path) -> Path:
+    (scratch / "main.st").write_text(MAIN)
+    assert tool("build", "main.st").status == 0
+    return scratch
+
+
+@pytest.mark.parametrize(
+    ("names", "columns"),
+    [
+        ("Main.a[3] Main.a", "Main.a[3] Main.a[1] Main.a[2]"),
+        ("Main.a Main.a[ 3 ]", "Main.a[1] Main.a[2] Main.a[3]"),
+        ("Main.i main.I", "Main.i"),
+        ("Main.point.x Main.POINT.X", "Main.point.x"),
+        ("main.A Main.a", "Main.a[1] Main.a[2] Main.a[3]"),
+        ("Main.i Main.?", "Main.i Main.a[1] Main.a[2] Main.a[3] Main.p.x Main.p.y"),
+    ],
+)
+def test_a_variable_has_one_column_where_it_is_named_first(tool: Any, program: Path, names: str, columns: str) -> None:
+    words = names.replace("[ 3 ]", "[_3_]").split()
+    done = tool("run", "app.cdl", "--trace", *(word.replace("_", " ") for word in words), "-o", "-")
+    header, values = csv.reader(done.out.splitlines())
+    assert header == ["time_ms", *columns.split()]
+    assert len(values) == len(header)
+
+
+def test_a_reference_within_a_block_is_followed(tool: Any, program: Path) -> None:
+    done = tool("run", "app.cdl", "--cycles", "2", "--trace", "Main.acc", "-o", "-")
+    assert done.out == "time_ms,Main.acc.io\n0,\n10,2\n"
+
+
+def test_what_is_not_bound_yet_is_an_empty_cell(tool: Any, program: Path) -> None:
+    done = tool("run", "app.cdl", "--cycles", "3", "--trace", "Main.*", "-o", "-")
+    rows = list(csv.DictReader(done.out.splitlines()))
+    assert [(row["Main.acc.io"], row["Main.ref"]) for row in rows] == [("", ""), ("2", "2"), ("3", "2")]
+    assert [row["Main.i"] for row in rows] == ["1", "2", "3"]
