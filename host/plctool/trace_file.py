@@ -62,4 +62,4 @@ def _cell(column: Symbol, content: bytes | None, value: Any, text: str) -> str:
         return ""
     if isinstance(value, bool):
         return str(int(value))
-    return str(value) if isinstance(value, int | float | str) else text
+    return str(value) if isinstance(value, int | str) else text

@@ -61,3 +61,14 @@ def test_what_is_not_bound_yet_is_an_empty_cell(tool: Any, program: Path) -> Non
     rows = list(csv.DictReader(done.out.splitlines()))
     assert [(row["Main.acc.io"], row["Main.ref"]) for row in rows] == [("", ""), ("2", "2"), ("3", "2")]
     assert [row["Main.i"] for row in rows] == ["1", "2", "3"]
+
+
+def test_a_real_that_is_no_number_is_a_word(tool: Any, scratch: Path) -> None:
+    (scratch / "main.st").write_text("PROGRAM Main VAR r : REAL; list : ARRAY[1..2] OF LREAL; END_VAR END_PROGRAM")
+    assert tool("build", "main.st").status == 0
+    values = ("--set", "Main.r=NaN", "--set", "Main.list=[Infinity, -Infinity]")
+    done = tool("run", "app.cdl", *values, "--get", "Main.*", "--json")
+    assert done.json["values"] == {"Main.r": "NaN", "Main.list": ["Infinity", "-Infinity"]}
+    assert tool("run", "app.cdl", *values, "--get", "Main.*").out.startswith("Main.r = NaN\nMain.list = [Infinity, -")
+    traced = tool("run", "app.cdl", *values, "--trace", "Main.*", "-o", "-")
+    assert traced.out.splitlines()[1] == "0,NaN,Infinity,-Infinity"

@@ -35,6 +35,7 @@ VAR
     points : ARRAY[1..3] OF Point;
     to_point : REF_TO Point;
     leads : BOOL;
+    ratio : REAL;
 END_VAR
 VAR CONSTANT limit : DINT := 42; END_VAR
 VAR RETAIN kept : DINT := 7; END_VAR
@@ -128,6 +129,13 @@ def test_what_is_written_is_read_again(plc: Controller) -> None:
     plc.write(values)
     assert plc.read_all(list(values)) == values
     assert plc.read("Main.flags") == 1 << 9
+
+
+@pytest.mark.parametrize("value", [float("inf"), float("-inf"), float("nan")])
+def test_a_real_is_a_float_also_where_it_is_no_number(plc: Controller, value: float) -> None:
+    plc.write({"Main.ratio": value})
+    read = plc.read("Main.ratio")
+    assert isinstance(read, float) and str(read) == str(value)
 
 
 def test_a_sample_is_of_one_moment(plc: Controller) -> None:

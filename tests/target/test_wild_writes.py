@@ -143,7 +143,7 @@ def test_mathematics_that_overflows_writes_nothing_of_its_own(full: Board, build
     with Plc(Connection(full.line())) as plc:
         plc.flash(build(text).path)
         eventually(lambda: plc.read("Main.n") > 3)
-        assert plc.read("Main.big") == "Infinity"
+        assert plc.read("Main.big") == float("inf")
         assert plc.status().state is AppState.RUN
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 from collections.abc import Iterable, Sequence
@@ -16,8 +17,20 @@ _BOLD, _RED, _MAGENTA, _GREEN, _PLAIN = "\33[1m", "\33[1;31m", "\33[1;35m", "\33
 
 
 def as_json(document: Any) -> str:
-    """One line of JSON."""
-    return json.dumps(document, allow_nan=False)
+    """One line of JSON. It has no numbers that are infinite or NaN: these are strings."""
+    return json.dumps(_for_json(document), allow_nan=False)
+
+
+def _for_json(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _for_json(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_for_json(item) for item in value]
+    if not isinstance(value, float) or math.isfinite(value):
+        return value
+    from plctool.iec.value_texts import real_text
+
+    return real_text(value)
 
 
 def wants_colour(stream: TextIO) -> bool:

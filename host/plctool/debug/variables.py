@@ -291,7 +291,7 @@ class Reading:
 
     @property
     def values(self) -> dict[str, Any]:
-        """Ready for JSON. None if a pointer on the way leads to no variable."""
+        """None if a pointer on the way leads to no variable."""
         return {name: None if data is None else self.symbols[name].decode(data) for name, data in self.contents.items()}
 
     @property

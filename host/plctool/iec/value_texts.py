@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 import re
 from typing import Any
 
@@ -61,7 +62,16 @@ def literal(t: Type, value: Any) -> str:
         return "TRUE" if value else "FALSE"
     if base.kind is Kind.CHAR:
         return quoted(value or "\0", base.size == 2)
+    if base.kind is Kind.REAL:
+        return real_text(value)
     return f"16#{value:0{2 * base.size}X}" if base.kind is Kind.BIT else str(value)
+
+
+def real_text(value: float) -> str:
+    """A REAL or LREAL; one that is not a number, or infinite, in words that `float` reads again."""
+    if math.isfinite(value):
+        return str(value)
+    return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 
 def _list(t: ArrayType, value: Any) -> str:

@@ -1,4 +1,4 @@
-"""Values of variables: bytes in memory <-> Python values, which are ready for JSON.
+"""Values of variables: bytes in memory <-> Python values.
 
 TIME and dates are strings such as 'T#1s500ms', those of TIME with a `timedelta` for Python; values of enumerations are
 their names, a REAL is the number with the fewest digits that reads back as the same. How strings look is in
@@ -31,7 +31,7 @@ from plctool.iec.value_texts import bad_value, format_date, format_time, parse_v
 
 
 def decode(t: Type, data: bytes) -> Any:
-    """The value of `t` in memory as bool, int, float, str, list or dict, ready for JSON."""
+    """The value of `t` in memory as bool, int, float, str, list or dict."""
     if isinstance(t, ArrayType):
         size = t.element.size
         items = [decode(t.element, data[i * size : (i + 1) * size]) for i in range(t.count)]
@@ -72,11 +72,9 @@ def _nest(items: list[Any], counts: list[int]) -> list[Any]:
     return items
 
 
-def _decode_real(base: Elementary, data: bytes) -> float | str:
+def _decode_real(base: Elementary, data: bytes) -> float:
     value: float = struct.unpack("<f" if base.bits == 32 else "<d", data[: base.size])[0]
-    if not math.isfinite(value):
-        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
-    if base.bits == 32:
+    if base.bits == 32 and math.isfinite(value):
         for digits in range(6, 10):
             short = float(f"{value:.{digits}g}")
             if struct.pack("<f", short) == data[:4]:
