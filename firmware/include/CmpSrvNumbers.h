@@ -376,7 +376,8 @@ enum {
     TAG_SHELL_PART = 0x81, /* more follow */
     TAG_SHELL_LAST = 0x82,
     TAG_SHELL_TEXT = 0x20,
-    SHELL_MAX_COMMAND = 33, /* bytes, with NUL */
+    TAG_SHELL_RESULT = 0x21, /* u16, of a command that is refused; ours */
+    SHELL_MAX_COMMAND = 33,  /* bytes, with NUL */
 };
 
 #endif

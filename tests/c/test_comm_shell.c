@@ -17,6 +17,7 @@ static CLIENT client;
 static REPLY reply;
 static char text[8192];
 static RTS_UI32 parts;
+static RTS_UI32 refused; /* the error, 0 when it was done */
 
 static void setup(void)
 {
@@ -47,6 +48,8 @@ static RTS_UI32 ask_part(const char *command, RTS_UI32 block)
     CHECK_EQUAL(BTagReadContainer(&reply.tags, &head, &part), ERR_OK);
     CHECK_EQUAL(BTagFind(&part, TAG_SHELL_TEXT, 1, sizeof(reply.message), &tag), ERR_OK);
     strncat(text, (const char *)tag.data, tag.size);
+    refused = 0;
+    CHECK_EQUAL(BTagFindOptional(&part, TAG_SHELL_RESULT, &refused), ERR_OK);
     return head.id;
 }
 
@@ -77,6 +80,7 @@ static void an_unknown_command_says_where_the_list_is(void)
 {
     setup();
     CHECK(strcmp(ask("mem"), "There is no such command; ? lists them.\r\n") == 0);
+    CHECK_EQUAL(refused, ERR_NO_OBJECT);
     CHECK(strcmp(ask("startprgx"), text) == 0);
     CHECK_EQUAL(fakes.starts, 0);
 }
@@ -105,7 +109,9 @@ static void commands_that_change_something_need_the_right_to(void)
     setup();
     ChannelGetClient(0)->session.rights = RIGHT_VIEW;
     CHECK(strcmp(ask("startprg"), "You may not do this.\r\n") == 0);
+    CHECK_EQUAL(refused, ERR_NO_ACCESS_RIGHTS);
     CHECK(strcmp(ask("applist"), "Application\r\n") == 0);
+    CHECK_EQUAL(refused, 0);
     CHECK_EQUAL(fakes.starts, 0);
 }
 
@@ -130,6 +136,7 @@ static void an_error_is_said(void)
     fakes.control_result = ERR_INVALID_STATE;
     ask("startprg");
     CHECK(strncmp(text, "startprg: error 0x", 18) == 0);
+    CHECK_EQUAL(refused, ERR_INVALID_STATE);
 }
 
 static void it_needs_a_login(void)

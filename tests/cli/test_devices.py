@@ -159,6 +159,24 @@ def test_the_shell_takes_its_command_as_words(tool: Any, running: FakePlc) -> No
     assert tool("shell", *PORT, "?", "--json").json == {"command": "?", "answer": "You said ?\nand now\nall is said."}
 
 
+@pytest.mark.parametrize(
+    ("words", "result", "message"),
+    [
+        ("There is no such command; ? lists them.", lib.ERR_NO_OBJECT, "There is no such command; ? lists them."),
+        ("You may not do this.", lib.ERR_NO_ACCESS_RIGHTS, "You may not do this."),
+        ("go: error 0x504", lib.ERR_APP_NOT_LOADED, "There is no application on the device; flash one first."),
+        ("go: error 0x2", lib.ERR_INVALID_STATE, "The device refused the go: it stopped with an exception, reset it"),
+    ],
+)
+def test_a_command_that_the_shell_refuses_exits_1(
+    tool: Any, running: FakePlc, words: str, result: int, message: str
+) -> None:
+    running.shell_refusals["go"] = words, result
+    done = tool("shell", *PORT, "go")
+    assert (done.status, done.out) == (1, "")
+    assert done.err.startswith(f"plctool: {message}")
+
+
 def test_log_entries_come_with_class_component_and_place(tool: Any, running: FakePlc) -> None:
     running.log = [
         (1, 1_500_000_000, lib.LOG_INFO, "CmpApp", "started"),

@@ -89,6 +89,19 @@ def test_the_shell_stops_and_starts_the_program(tool, plcrt, counter):
     assert answers == ["Application", "stopprg: done", "stop", "startprg: done", "run"]
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("nix", "plctool: There is no such command; ? lists them.\n"),
+        ("startprg now", "plctool: There is no such command; ? lists them.\n"),
+        ("startprg", "plctool: There is no application on the device; flash one first.\n"),
+    ],
+)
+def test_what_the_shell_refuses_is_an_error(tool, plcrt, words, message):
+    done = tool("shell", "--port", plcrt.port, *words.split())
+    assert (done.status, done.out, done.err) == (1, "", message)
+
+
 def test_scan_finds_the_device(tool, plcrt, eventually):
     found = eventually(lambda: (done := tool("scan", "--port", plcrt.port, "--json")).status == 0 and done.json)
     assert len(found["devices"]) == 1

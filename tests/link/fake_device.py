@@ -338,6 +338,7 @@ class FakePlc:
         self.received = bytearray()
         self.refuse = ""  # reason to refuse the next complete image for
         self.log: list[tuple[int, int, int, str, str]] = []  # handle, time, class, component, text
+        self.shell_refusals: dict[str, tuple[str, int]] = {}  # words and error, by command
         self.tasks: list[tuple[list[int], str]] = []
         self.requests: list[tuple[int, int]] = []
         self.writes = 0
@@ -558,6 +559,11 @@ class FakePlc:
         return int.from_bytes(code[1 : 1 + size], "little"), code[1 + size :]
 
     def _shell(self, tags: bintag.Tags) -> list[bintag.Tag]:
+        if refusal := self.shell_refusals.get(tags.text(lib.TAG_SHELL_COMMAND)):
+            words, result = refusal
+            text = bintag.text(lib.TAG_SHELL_TEXT, f"{words}\r\n")
+            error = bintag.raw(lib.TAG_SHELL_RESULT, result.to_bytes(2, "little"))
+            return [bintag.container(lib.TAG_SHELL_LAST, text, error)]
         lines = [f"You said {tags.text(lib.TAG_SHELL_COMMAND)}\r\n", "and now\r\n", "all is said.\r\n"]
         block = tags.u32(lib.TAG_SHELL_BLOCK)
         head = lib.TAG_SHELL_PART if block + 1 < len(lines) else lib.TAG_SHELL_LAST

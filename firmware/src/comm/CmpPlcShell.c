@@ -237,26 +237,32 @@ static const SHELL_COMMAND *find_command(const BTAG *name)
     return NULL;
 }
 
-static void run(const SHELL_COMMAND *command, const COMM_CLIENT *client, bool first, SHELL_OUTPUT *out)
+/* The error if it is refused. */
+static RTS_RESULT run(const SHELL_COMMAND *command, const COMM_CLIENT *client, bool first, SHELL_OUTPUT *out)
 {
+    RTS_RESULT result = ERR_OK;
+
     if (command == NULL) {
         print(out, "There is no such command; ? lists them.");
+        result = ERR_NO_OBJECT;
     } else if ((client->session.rights & command->right) == 0) {
         print(out, "You may not do this.");
+        result = ERR_NO_ACCESS_RIGHTS;
     } else if (command->print != NULL) {
         command->print(out);
     } else if (first) {
-        RTS_RESULT result = command->change();
+        result = command->change();
         if (result == ERR_OK)
             print(out, "%s: done", command->name);
         else
             print(out, "%s: error 0x%X", command->name, (unsigned)result);
     }
+    return result;
 }
 
 static RTS_RESULT execute(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
-    enum { OVERHEAD = 24 }; /* heads of the two elements, NUL, padding */
+    enum { OVERHEAD = 32 }; /* heads of the two elements, NUL, padding, result */
     BTAG name;
     BTAG_WRITER start = *reply;
     RTS_UI32 block = 0;
@@ -272,10 +278,12 @@ static RTS_RESULT execute(SRV_REQUEST *request, BTAG_WRITER *reply)
     SHELL_OUTPUT out = {reply, block < UINT32_MAX / room ? block * room : UINT32_MAX, room, false};
     BTagOpen(reply, TAG_SHELL_LAST, BTAG_ALIGN_0);
     BTagOpen(reply, TAG_SHELL_TEXT, BTAG_ALIGN_0);
-    run(find_command(&name), request->client, block == 0, &out);
+    result = run(find_command(&name), request->client, block == 0, &out);
     BTagAppendZeros(reply, 1);
     BTagPad(reply);
     BTagClose(reply);
+    if (result != ERR_OK)
+        BTagWrite16(reply, TAG_SHELL_RESULT, (RTS_UI32)result);
     BTagClose(reply);
     if (out.more) /* the same, said to be a part */
         start.data[start.size] = TAG_SHELL_PART;

@@ -6,12 +6,12 @@ Every function takes a `Session`; requests that were lost with their channel are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
 
-from plctool.core import exception_name, lib
+from plctool.core import error_name, exception_name, lib
 from plctool.debug.trace import Trace
 from plctool.errors import DeviceError
 from plctool.image.file import image_crc
@@ -22,7 +22,7 @@ from plctool.link.connection import ERASE_PATIENCE, SLOW_PATIENCE
 from plctool.link.names import version_text
 from plctool.link.packing import Packer
 from plctool.link.passwords import verifier_of
-from plctool.link.session import Request, Session
+from plctool.link.session import Request, Session, no_application
 from plctool.link.wire import Layout, signed32
 
 _DOWNLOAD_TRIES = 4  # without any progress
@@ -485,7 +485,7 @@ class _Transfer:
 
 
 def run_shell(session: Session, command: str) -> str:
-    """The answer of a device to a command of its PLC shell. Raises DeviceError when it has none."""
+    """The answer of a device to a command of its PLC shell. Raises DeviceError when it has none, or refuses it."""
     answer, block = "", 0
     while True:
         content = [
@@ -495,10 +495,23 @@ def run_shell(session: Session, command: str) -> str:
         ]
         tags = session.call(lib.SG_PLCSHELL, lib.SRV_SHELL_EXECUTE, content)
         parts = tags.containers(lib.TAG_SHELL_PART)
-        text = "".join(part.text(lib.TAG_SHELL_TEXT) for part in parts or tags.containers(lib.TAG_SHELL_LAST))
+        last = parts or tags.containers(lib.TAG_SHELL_LAST)
+        text = "".join(part.text(lib.TAG_SHELL_TEXT) for part in last)
+        _check_shell(command, last, text.strip())
         answer, block = answer + text, block + 1
         if not parts or not text:
             return answer.replace("\r\n", "\n").rstrip("\n")
+
+
+def _check_shell(command: str, parts: Sequence[bintag.Tags], text: str) -> None:
+    """Raises DeviceError if a part of the answer has the error of a command that is refused."""
+    results = [part.u16(lib.TAG_SHELL_RESULT) for part in parts if part.find(lib.TAG_SHELL_RESULT) is not None]
+    for result in results:
+        if result == lib.ERR_APP_NOT_LOADED:
+            raise no_application()
+        if result in (lib.ERR_NO_OBJECT, lib.ERR_NO_ACCESS_RIGHTS):  # the device says it in words
+            raise DeviceError(text, l7.slug(error_name(result)), result)
+        l7.check_result(result, command)
 
 
 # ---- log -------------------------------------------------------------------------------------------------------------
