@@ -27,6 +27,7 @@ from typing import IO, Any, NoReturn
 
 IMPORTED = (
     "plctool.__main__",
+    "plctool.cli.main",
     "plctool.compiler.build",
     "plctool.compiler.library",
     "plctool.device",

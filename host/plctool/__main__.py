@@ -6,13 +6,22 @@ import gc
 import os
 import sys
 
-from plctool.cli.main import main
+from plctool.errors import EXIT_INTERRUPTED
 
 _SHORT_LIVED = ("build", "check", "export")  # commands of which all that they make is needed until they end
 
 
 def run() -> int:
     """Runs the command of the command line; returns the exit status of the process."""
+    try:
+        return _run()
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+
+
+def _run() -> int:
+    from plctool.cli.main import main  # late, as Ctrl-C may come meanwhile
+
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # it was closed by who started this
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+EXIT_INTERRUPTED = 130  # as shells say it of a process that Ctrl-C ended
+
 
 class PlcError(Exception):
     """Base of all errors a user may see. `code` is a short slug; `exit_code` is the command's exit status."""

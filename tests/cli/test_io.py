@@ -113,6 +113,16 @@ def test_plant_in_a_file_is_attached(tool, program: Path) -> None:  # type: igno
     assert found["values"]["Bench.level"] == 9
 
 
+@pytest.mark.parametrize("words", [("--json",), ("--trace", "Main.level", "-o", "-")])
+def test_a_plant_that_prints_does_not_disturb_what_is_for_machines(tool, program: Path, words) -> None:  # type: ignore[no-untyped-def]
+    (program / "plant.py").write_text("print('made')\ndef step(plc):\n    print('stepped')\n")
+    tool("build", "main.st")
+    done = tool("run", "app.cdl", "--cycles", "2", "--plant", "plant.py", *words)
+    assert done.out.startswith(("{", "time_ms,")) and done.err.startswith("made\nstepped\n")
+    assert "stepped" not in done.out
+    assert tool("run", "app.cdl", "--plant", "plant.py").out.startswith("made\n")
+
+
 def test_plant_in_st_is_compiled_and_attached(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
     (program / "plant").mkdir()
     (program / "plant" / "p.st").write_text("PROGRAM P\nVAR level : INT; END_VAR\nlevel := level + 1;\nEND_PROGRAM\n")

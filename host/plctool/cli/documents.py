@@ -13,7 +13,7 @@ from plctool.cli import io_documents
 from plctool.cli.io_documents import Document
 from plctool.cli.overwriting import check_not_read, check_output
 from plctool.cli.plants import attached, files_of_plant, plan_faults
-from plctool.errors import LinkError, PlcError, UsageError
+from plctool.errors import EXIT_INTERRUPTED, LinkError, PlcError, UsageError
 from plctool.files import STDOUT, read_image, write_atomically, write_output
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ Texts = dict[str, str]
 class Interrupted(PlcError):
     """The user ended an operation by Ctrl-C; the message says what it has left."""
 
-    exit_code = 130
+    exit_code = EXIT_INTERRUPTED
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -346,9 +346,11 @@ def run(
     plant: Path | None = None,
     trace: TraceFile | None = None,
     faults: Sequence[Fault] = (),
+    aside: bool = False,
 ) -> tuple[Document, Texts]:
     """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
-    values as users read them. `plant`: what the inputs and outputs are connected to; `faults`: what happens to that.
+    values as users read them. `plant`: what the inputs and outputs are connected to, which prints to stderr if `aside`;
+    `faults`: what happens to that.
 
     Raises DeviceError when the program stops with an exception; what was traced until then is in its file.
     """
@@ -359,7 +361,7 @@ def run(
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
         plan_faults(plc, faults)
-        with attached(plc, plant) if plant is not None else nullcontext():
+        with attached(plc, plant, aside) if plant is not None else nullcontext():
             if trace:
                 _run_traced(plc, cycles, time_ms, trace)
             elif time_ms is None:

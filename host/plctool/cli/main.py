@@ -19,7 +19,7 @@ from plctool.cli.arguments import pairs, parser
 from plctool.cli.io_documents import Document
 from plctool.cli.links import all_serial_ports, find_link, link_of
 from plctool.cli.unknown_commands import check_command
-from plctool.errors import InternalError, PlcError, UsageError
+from plctool.errors import EXIT_INTERRUPTED, InternalError, PlcError, UsageError
 from plctool.files import STDOUT, path_error
 from plctool.link.transports import Link
 from plctool.project import IMAGE_SUFFIX
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 ShowProgress = Callable[[int, int], None]
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
-EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 130, 141
+EXIT_BROKEN_PIPE = 141
 
 
 # ---- commands on files -----------------------------------------------------------------------------------------------
@@ -107,7 +107,15 @@ def _run(args: argparse.Namespace) -> int:
     trace = documents.TraceFile(args.trace, args.output or Path("trace.csv")) if args.trace else None
     faults = [parse_fault(text) for text in args.fault]
     document, texts = documents.run(
-        _program_to_run(args), args.cycles, args.time, pairs(args.set), args.get, args.plant, trace, faults
+        _program_to_run(args),
+        args.cycles,
+        args.time,
+        pairs(args.set),
+        args.get,
+        args.plant,
+        trace,
+        faults,
+        aside=args.json or args.output == STDOUT,
     )
     return _show(args, document, lambda d: output.run_text(d, texts), _beside_output(args))
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import runpy
+import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stdout
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,11 +22,11 @@ _LONGEST_MS = 1e9
 
 
 @contextmanager
-def attached(plc: Simulator, path: Path) -> Iterator[None]:
-    """The plant in a file is connected to a simulator: Python with a function `step`, or a program in ST. Raises
-    UsageError, with file and line, when Python code of the plant fails."""
+def attached(plc: Simulator, path: Path, aside: bool = False) -> Iterator[None]:
+    """The plant in a file is connected to a simulator: Python with a function `step`, or a program in ST. `aside`: what
+    it prints goes to stderr. Raises UsageError, with file and line, when Python code of the plant fails."""
     if path.suffix == ".py":
-        plc.attach(*_python_plant(path))
+        plc.attach(*_python_plant(path, aside))
         yield
         return
     from plctool.sim_plant import PlantProgram
@@ -71,9 +72,9 @@ def _compiled_plant(path: Path) -> PlantProgram:
     return PlantProgram(built.image, built.symbols)
 
 
-def _python_plant(path: Path) -> tuple[Callable[[Simulator], None], float]:
+def _python_plant(path: Path, aside: bool) -> tuple[Callable[[Simulator], None], float]:
     """Its function, and how often it is called [ms]."""
-    with _said_with_its_line(path):
+    with _said_with_its_line(path), _prints(aside):
         names = runpy.run_path(str(path))
     step, every = names.get("step"), names.get("EVERY_MS", 1)
     if not callable(step):
@@ -82,10 +83,14 @@ def _python_plant(path: Path) -> tuple[Callable[[Simulator], None], float]:
         raise UsageError(f"EVERY_MS in {path} is not a number of milliseconds above 0.", "no-plant")
 
     def guarded(plc: Simulator) -> None:
-        with _said_with_its_line(path):
+        with _said_with_its_line(path), _prints(aside):
             step(plc)
 
     return guarded, every
+
+
+def _prints(aside: bool) -> AbstractContextManager[object]:
+    return redirect_stdout(sys.stderr) if aside else nullcontext()
 
 
 @contextmanager
