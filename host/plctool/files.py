@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shlex
 import sys
 import tempfile
 from pathlib import Path
@@ -112,9 +113,8 @@ def read_image(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except IsADirectoryError:
-        raise UsageError(
-            f"{path} is a folder; make an image of its sources first: plctool build {path} -o app.cdl.", "no-image"
-        ) from None
+        build = f"plctool build {shlex.quote(str(path))} -o app.cdl"
+        raise UsageError(f"{path} is a folder; make an image of its sources first: {build}.", "no-image") from None
     except OSError as error:
         raise UsageError(f"The image {path} cannot be read: {error.strerror}.", "no-image") from None
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
+
+from plctool.cli.file_documents import source_text
 
 MEANT = [
     ("compile", "'compile' is not a command; did you mean build?"),
@@ -20,6 +23,17 @@ MEANT = [
     ("test --coverage", "--coverage is followed by DIR; see 'plctool test --help'."),
     ("build -o", "--output is followed by IMAGE; see 'plctool build --help'."),
 ]
+
+
+@pytest.mark.parametrize("words", [("my plant.st",), ("my plant.cdl",), ("info", "my plant")])
+def test_what_is_to_be_typed_is_quoted_for_the_shell(tool: Any, scratch: Path, words: tuple[str, ...]) -> None:
+    (scratch / "my plant").mkdir()
+    assert " 'my plant" in tool(*words).err.rpartition("plctool")[2]
+
+
+def test_the_command_that_makes_the_same_image_is_quoted() -> None:
+    document = {"folder": "source", "files": ["a"], "build": ["my plant/main.st", "-O2"]}
+    assert source_text(document).endswith("plctool build 'my plant/main.st' -O2")
 
 
 @pytest.mark.parametrize(("words", "message"), MEANT)

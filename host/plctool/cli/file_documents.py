@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -102,5 +103,5 @@ def list_text(document: Document) -> str:
 
 
 def source_text(document: Document) -> str:
-    words = " ".join(document["build"])
+    words = shlex.join(document["build"])
     return f"{len(document['files'])} files in {document['folder']}. The same image again, there: plctool build {words}"

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+import shlex
 from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
 
@@ -127,7 +128,8 @@ def missing_text(document: dict[str, Any]) -> str:
 def new_text(document: dict[str, Any]) -> str:
     """What was made, and what to type next."""
     files = "\n".join(f"  {file}" for file in document["files"])
-    return f"{files}\nNext: cd {document['folder']}, then 'plctool test', 'plctool run --time T#5s', 'plctool build'."
+    folder = shlex.quote(document["folder"])
+    return f"{files}\nNext: cd {folder}, then 'plctool test', 'plctool run --time T#5s', 'plctool build'."
 
 
 def build_text(document: dict[str, Any]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -36,9 +37,9 @@ def _meant(word: str, commands: Mapping[str, object]) -> str:
     if word in _OTHER_NAMES:
         return f"; did you mean {_OTHER_NAMES[word]}?"
     if Path(word).suffix.lower() == IMAGE_SUFFIX:
-        return f"; did you mean plctool run {word}?"
+        return f"; did you mean plctool run {shlex.quote(word)}?"
     if _is_source(word):
-        return f"; did you mean plctool build {word}?"
+        return f"; did you mean plctool build {shlex.quote(word)}?"
     return did_you_mean(word, commands) or "; 'plctool --help' lists the commands"
 
 

@@ -6,6 +6,7 @@ All layouts are the structs of firmware/include/CompactDownload.h, reached throu
 from __future__ import annotations
 
 import re
+import shlex
 import time
 import zlib
 from collections.abc import Iterator
@@ -363,7 +364,7 @@ def _other_file(path: Path, data: bytes) -> BadImage | None:
     if path.suffix.lower() == SYMBOL_SUFFIX:
         return BadImage("it has the symbols of one", f"name {path.with_suffix(IMAGE_SUFFIX)}", str(path))
     if data and not _NO_TEXT.search(data[:_HEAD]):
-        advice = f"make an image of it first: plctool build {path} -o {path.stem}{IMAGE_SUFFIX}"
+        advice = f"make an image of it first: plctool build {shlex.join([str(path), '-o', path.stem + IMAGE_SUFFIX])}"
         return BadImage("it is text, such as a source", advice, str(path))
     return None
 
