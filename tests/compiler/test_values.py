@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from datetime import timedelta
+from datetime import UTC, date, datetime, time, timedelta
 
 import pytest
 from hypothesis import given, settings
@@ -19,9 +19,11 @@ from plctool.iec.types import (
     DINT,
     DT,
     INT,
+    LDATE,
     LDT,
     LREAL,
     LTIME,
+    LTOD,
     LWORD,
     REAL,
     SINT,
@@ -124,10 +126,57 @@ def test_any_ltime_is_read_as_it_is_shown(ns: int) -> None:
 
 @pytest.mark.parametrize(
     ("text", "ms"),
-    [("T#1.5s", 1500), ("time#2m_30s", 150_000), ("80ms", 80), ("T#0.25h", 900_000), ("T#1s200us", 1000)],
+    [("T#1.5s", 1500), ("time#2m_30s", 150_000), ("80ms", 80), ("T#0.25h", 900_000), ("T#1s2000us", 1002)],
 )
 def test_durations_may_be_typed_in_many_ways(text: str, ms: int) -> None:
     assert parse_time(text) == ms
+
+
+OUTSIDE = [
+    (TIME, "T#25d", "it takes T#-24d20h31m23s648ms to T#24d20h31m23s647ms"),
+    (TIME, timedelta(25), "it takes T#-24d20h31m23s648ms to T#24d20h31m23s647ms"),
+    (TIME, 2_160_000_000, "it takes T#-24d20h31m23s648ms to T#24d20h31m23s647ms"),
+    (TIME, "T#1.0001s", "it takes a whole number of milliseconds, LTIME shorter ones"),
+    (TIME, timedelta(microseconds=1), "it takes a whole number of milliseconds, LTIME shorter ones"),
+    (
+        LTIME,
+        "LTIME#200000d",
+        "it takes LTIME#-106751d23h47m16s854ms775us808ns to LTIME#106751d23h47m16s854ms775us807ns",
+    ),
+    (LTIME, "LTIME#0.5ns", "it takes a whole number of nanoseconds"),
+    (DATE, "D#1969-12-31", "it takes D#1970-01-01 to D#2106-02-07"),
+    (DATE, date(2107, 1, 1), "it takes D#1970-01-01 to D#2106-02-07"),
+    (DATE, datetime(2024, 2, 29), "give a datetime.date without a time zone"),
+    (DT, "DT#2107-01-01-00:00:00", "it takes DT#1970-01-01-00:00:00 to DT#2106-02-07-06:28:15"),
+    (DT, "DT#2024-02-29-12:30:15.5", "it takes a whole number of seconds, LDT shorter ones"),
+    (DT, datetime(2024, 2, 29, tzinfo=UTC), "give a datetime.datetime without a time zone"),
+    (TOD, "TOD#12:30:15.0001", "it takes a whole number of milliseconds, LTOD shorter ones"),
+    (TOD, time(12, 30, 15, 1), "it takes a whole number of milliseconds, LTOD shorter ones"),
+    (TOD, 2**32, "it takes TOD#00:00:00 to TOD#23:59:59.999"),
+]
+
+
+@pytest.mark.parametrize(("t", "value", "hint"), OUTSIDE, ids=str)
+def test_a_time_that_is_outside_or_finer_than_its_type_is_refused_as_written(t: Type, value: object, hint: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        encode(t, parse_value(t, value) if isinstance(value, str) else value)
+    assert caught.value.message == f"'{value}' is not a value of {t}; {hint}."
+
+
+@pytest.mark.parametrize(
+    ("t", "value", "shown"),
+    [
+        (DATE, date(2024, 2, 29), "D#2024-02-29"),
+        (TOD, time(12, 30, 15, 500_000), "TOD#12:30:15.500"),
+        (DT, datetime(2024, 2, 29, 12, 30, 15), "DT#2024-02-29-12:30:15"),
+        (LTOD, time(12, 30, 15, 1), "LTOD#12:30:15.000001"),
+        (LDT, datetime(2024, 2, 29, 12, 30, 15, 1), "LDT#2024-02-29-12:30:15.000001"),
+        (LDATE, date(2300, 1, 1), "LDATE#2300-01-01"),
+    ],
+    ids=str,
+)
+def test_dates_and_times_of_python_are_written(t: Type, value: object, shown: str) -> None:
+    assert decode(t, encode(t, value)) == shown
 
 
 @pytest.mark.parametrize("text", ["", "T#", "T#5", "T#5x", "5 s", "T#1.2.3s", "T#s"])

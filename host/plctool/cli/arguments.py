@@ -477,10 +477,10 @@ def _percent(text: str) -> float:
     return _seconds(text.removesuffix("%")) / 100
 
 
-def _duration_ms(text: str) -> int:
-    from plctool.iec.value_texts import parse_time
+def _duration_ms(text: str) -> float:
+    from plctool.iec.value_texts import parse_milliseconds
 
-    milliseconds = parse_time(text)
+    milliseconds = parse_milliseconds(text)
     if milliseconds < 0:
         raise argparse.ArgumentTypeError(f"'{text}' is in the past")
     return milliseconds

@@ -340,7 +340,7 @@ def built_for_here(settings: Settings) -> tuple[Built, list[str]]:
 def run(
     program: Path | Built,
     cycles: int | None,
-    time_ms: int | None,
+    time_ms: float | None,
     sets: Mapping[str, str],
     gets: Sequence[str],
     plant: Path | None = None,
@@ -396,7 +396,7 @@ def _simulator(program: Path | Built) -> Simulator:
     return Simulator(program.image, program.symbols)
 
 
-def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: TraceFile) -> None:
+def _run_traced(plc: Simulator, cycles: int | None, time_ms: float | None, trace: TraceFile) -> None:
     """As `run`, in steps."""
     from plctool.trace_file import trace_csv
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import datetime
 import math
 import re
+from fractions import Fraction
 from typing import Any
 
 from plctool.errors import UsageError
@@ -21,11 +22,13 @@ from plctool.iec.types import (
     PointerType,
     StringType,
     StructType,
+    SubrangeType,
     Type,
     base_of,
 )
 
 _DATE_UNITS_NS = {"DATE": 1_000_000_000, "DT": 1_000_000_000, "TOD": 1_000_000}
+_UNIT_NAMES = {1_000_000_000: "seconds", 1_000_000: "milliseconds", 1: "nanoseconds"}
 _DAY = r"(?P<y>\d{4})-(?P<mo>\d{1,2})-(?P<d>\d{1,2})"
 _CLOCK = r"(?P<h>\d{1,2}):(?P<mi>\d{1,2})(?::(?P<s>\d{1,2})(?:\.(?P<f>\d{1,9}))?)?"
 _DATE_FORMS = {"DATE": re.compile(_DAY), "TOD": re.compile(_CLOCK), "DT": re.compile(f"{_DAY}-{_CLOCK}")}
@@ -38,6 +41,47 @@ _TYPED = re.compile(r"^(?P<type>[A-Za-z]\w*)#(?P<rest>.+)$")
 def bad_value(text: object, t: Type, hint: str) -> UsageError:
     """The error about a value that does not fit its type."""
     return UsageError(f"'{text}' is not a value of {t}; {hint}.", "bad-value")
+
+
+def limits(t: Type) -> tuple[int, int]:
+    """The least and the largest value of a type that counts."""
+    if isinstance(t, SubrangeType):
+        return t.low, t.high
+    base = base_of(t)
+    assert isinstance(base, Elementary)
+    high = 1 if base.kind is Kind.BOOL else (1 << (base.bits - base.signed)) - 1
+    return -(1 << (base.bits - 1)) if base.signed else 0, high
+
+
+def limits_text(t: Type) -> str:
+    """The end of a sentence about a value that is outside."""
+    base = base_of(t)
+    low, high = limits(t)
+    if base.name == "TOD":  # it counts further than a day
+        high = UNITS_NS["d"] // _DATE_UNITS_NS["TOD"] - 1
+    return f"it takes {decoded(base, low)} to {decoded(base, high)}"
+
+
+def decoded(base: Type, number: int) -> Any:
+    """What is shown for a number in memory."""
+    assert isinstance(base, Elementary)
+    if base.kind is Kind.DATE:
+        return format_date(number, base)
+    return format_time(number, base) if base.kind is Kind.TIME else number
+
+
+def _units(text: object, t: Type, nanoseconds: Fraction) -> int:
+    """In the unit of a type. Raises UsageError for what is finer, or outside of the type."""
+    base = base_of(t)
+    unit = 1 if base.size == 8 else _DATE_UNITS_NS.get(base.name, 1_000_000)
+    units = nanoseconds / unit
+    if units.denominator != 1:
+        shorter = "" if base.size == 8 else f", L{base.name} shorter ones"
+        raise bad_value(text, t, f"it takes a whole number of {_UNIT_NAMES[unit]}{shorter}")
+    low, high = limits(t)
+    if not low <= units <= high:
+        raise bad_value(text, t, limits_text(t))
+    return int(units)
 
 
 # ---- value -> text -------------------------------------------------------------------------------------------------
@@ -142,20 +186,29 @@ def format_date(value: int, t: Type) -> str:
 
 def parse_time(text: str, t: Type = ELEMENTARY["TIME"]) -> int:
     """A duration such as 'T#1.5s', 'LTIME#20us' or '80ms', in the unit of `t`: ms for TIME, ns for LTIME. Raises
-    UsageError."""
+    UsageError, also if it does not fit."""
+    return _units(text, t, _duration(text, t))
+
+
+def parse_milliseconds(text: str) -> float:
+    """A duration of any length. Raises UsageError."""
+    return float(_duration(text, ELEMENTARY["TIME"]) / UNITS_NS["ms"])
+
+
+def _duration(text: str, t: Type) -> Fraction:
+    """In nanoseconds."""
     body = re.sub(r"(?i)^l?t(ime)?#", "", text.strip()).replace("_", "").lower()
     sign = -1 if body.startswith("-") else 1
     parts = body.removeprefix("-")
     matches = list(_PART.finditer(parts))
     if not matches or "".join(m.group(0) for m in matches) != parts:
         raise bad_value(text, t, "write a duration such as T#1s500ms")
-    nanoseconds = sum(_scaled(m.group(1), UNITS_NS[m.group(2)]) for m in matches)
-    return sign * (nanoseconds if base_of(t).size == 8 else nanoseconds // 1_000_000)
+    return sign * sum((Fraction(m.group(1)) * UNITS_NS[m.group(2)] for m in matches), Fraction())
 
 
 def parse_date(text: str, t: Type) -> int:
     """A date or time of day such as 'D#2024-02-29', '12:30:15.5' or 'LDT#2024-02-29-12:30:15', in the unit of `t`.
-    Raises UsageError."""
+    Raises UsageError, also if it does not fit."""
     name = base_of(t).name
     kind = name.removeprefix("L")
     body = text.strip().rpartition("#")[2].replace("_", "")
@@ -172,12 +225,26 @@ def parse_date(text: str, t: Type) -> int:
     seconds = (clock.hour * 60 + clock.minute) * 60 + clock.second
     total = (day - EPOCH).days * UNITS_NS["d"] + seconds * UNITS_NS["s"]
     total += int(part["f"].ljust(9, "0")) if kind != "DATE" else 0
-    return total // _DATE_UNITS_NS.get(name, 1)
+    return _units(text, t, Fraction(total))
 
 
-def _scaled(number: str, unit: int) -> int:
-    whole, _, fraction = number.partition(".")
-    return int(whole) * unit + (int(fraction) * unit // 10 ** len(fraction) if fraction else 0)
+def units_of(t: Type, value: datetime.timedelta | datetime.date | datetime.time) -> int:
+    """A duration, date or time of Python in the unit of a type. Raises UsageError unless it is exactly one of its
+    values."""
+    if isinstance(value, datetime.timedelta):
+        return _units(value, t, Fraction(value // datetime.timedelta(microseconds=1)) * UNITS_NS["us"])
+    kind = base_of(t).name.removeprefix("L")
+    wanted = {"DATE": datetime.date, "TOD": datetime.time, "DT": datetime.datetime}[kind]
+    if type(value) is not wanted or getattr(value, "tzinfo", None) is not None:
+        raise bad_value(value, t, f"give a datetime.{wanted.__name__} without a time zone")
+    if isinstance(value, datetime.time):
+        return _units(value, t, Fraction(_clock_ns(value)))
+    days = Fraction((value.toordinal() - EPOCH.toordinal()) * UNITS_NS["d"])
+    return _units(value, t, days + (_clock_ns(value) if isinstance(value, datetime.datetime) else 0))
+
+
+def _clock_ns(clock: datetime.time | datetime.datetime) -> int:
+    return ((clock.hour * 60 + clock.minute) * 60 + clock.second) * UNITS_NS["s"] + clock.microsecond * UNITS_NS["us"]
 
 
 def parse_value(t: Type, text: str) -> Any:
@@ -200,9 +267,9 @@ def parse_value(t: Type, text: str) -> Any:
     if isinstance(t, EnumType):
         return _parse_enum(t, text)
     if base.kind is Kind.TIME:
-        return parse_time(text, base)
+        return parse_time(text, t)
     if base.kind is Kind.DATE:
-        return parse_date(text, base)
+        return parse_date(text, t)
     if base.kind is Kind.CHAR:
         return _parse_character(base, text)
     typed = _TYPED.match(text)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
-from datetime import timedelta
+from datetime import date, time, timedelta
 from typing import Any, SupportsFloat, SupportsIndex
 
 from plctool.errors import UsageError
@@ -21,11 +21,10 @@ from plctool.iec.types import (
     PointerType,
     StringType,
     StructType,
-    SubrangeType,
     Type,
     base_of,
 )
-from plctool.iec.value_texts import bad_value, format_date, format_time, parse_value
+from plctool.iec.value_texts import bad_value, decoded, limits, limits_text, parse_value, units_of
 
 # ---- bytes -> value ------------------------------------------------------------------------------------------------
 
@@ -51,11 +50,9 @@ def decode(t: Type, data: bytes) -> Any:
         return next((name for name, value in t.values.items() if value == number), number)
     if base.kind is Kind.BOOL:
         return number != 0
-    if base.kind is Kind.DATE:
-        return format_date(number, base)
     if base.kind is Kind.CHAR:
         return chr(number) if number else ""
-    return format_time(number, base) if base.kind is Kind.TIME else number
+    return decoded(base, number)
 
 
 def _decode_text(t: StringType, data: bytes) -> str:
@@ -86,8 +83,9 @@ def _decode_real(base: Elementary, data: bytes) -> float:
 
 
 def encode(t: Type, value: Any) -> bytes:
-    """The bytes of a Python value; for all but STRINGs also of 'T#80ms' or '16#FF' (see `parse_value`),
-    for durations also of a timedelta. Raises UsageError when it does not fit the type."""
+    """The bytes of a Python value; for all but STRINGs also of 'T#80ms' or '16#FF' (see `parse_value`), for durations
+    also of a timedelta, for DATE, TOD and DT of a date, time and datetime. Raises UsageError when it does not fit the
+    type."""
     if isinstance(t, ArrayType):
         return b"".join(encode(t.element, item) for item in _flat(t, value))
     if isinstance(t, StructType):
@@ -104,8 +102,10 @@ def encode(t: Type, value: Any) -> bytes:
         return bytes(t.size)
     base = base_of(t)
     assert isinstance(base, Elementary)
-    if base.kind is Kind.TIME and isinstance(value, timedelta):
-        value = _time_units(t, base, value)
+    if (base.kind is Kind.TIME and isinstance(value, timedelta)) or (
+        base.kind is Kind.DATE and isinstance(value, date | time)
+    ):
+        value = units_of(t, value)
     if not _is_number(value):
         raise bad_value(value, t, "give True or False" if base.kind is Kind.BOOL else "give a number")
     if base.kind is Kind.REAL:
@@ -118,20 +118,6 @@ def encode(t: Type, value: Any) -> bytes:
 def _is_number(value: Any) -> bool:
     """Also those of other packages; complex numbers are none."""
     return isinstance(value, SupportsFloat | SupportsIndex)
-
-
-def _time_units(t: Type, base: Elementary, value: timedelta) -> int:
-    """In the unit of the type: ns for LTIME, ms for TIME."""
-    if base.size == 8:
-        units, rest = value // timedelta(microseconds=1) * 1000, timedelta()
-    else:
-        units, rest = divmod(value, timedelta(milliseconds=1))
-    if rest:
-        raise bad_value(value, t, "it takes a whole number of milliseconds, LTIME shorter ones")
-    low, high = _limits(t, base)
-    if not low <= units <= high:
-        raise bad_value(value, t, f"it takes {format_time(low, t)} to {format_time(high, t)}")
-    return units
 
 
 def _flat(t: ArrayType, value: Any) -> list[Any]:
@@ -174,18 +160,10 @@ def _encode_real(base: Elementary, value: Any) -> bytes:
         raise bad_value(value, base, "it is too large") from None
 
 
-def _limits(t: Type, base: Elementary) -> tuple[int, int]:
-    """The least and the largest value of a type."""
-    if isinstance(t, SubrangeType):
-        return t.low, t.high
-    high = 1 if base.kind is Kind.BOOL else (1 << (base.bits - base.signed)) - 1
-    return -(1 << (base.bits - 1)) if base.signed else 0, high
-
-
 def _encode_integer(t: Type, base: Elementary, value: int) -> bytes:
-    low, high = _limits(t, base)
+    low, high = limits(t)
     if isinstance(t, EnumType) and value not in t.values.values():
         raise bad_value(value, t, f"choose one of {t.choices}")
     if not low <= value <= high:
-        raise bad_value(value, t, f"it takes {low} to {high}")
+        raise bad_value(value, t, limits_text(t))
     return value.to_bytes(base.size, "little", signed=base.signed)

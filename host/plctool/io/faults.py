@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from plctool.core import lib
 from plctool.errors import UsageError
-from plctool.iec.value_texts import parse_time
+from plctool.iec.value_texts import parse_milliseconds
 
 FAULTS = {
     "absent": int(lib.IO_SIM_ABSENT),
@@ -28,7 +28,7 @@ class Fault:
     device: str
     fault: str
     value: int
-    at_ms: int
+    at_ms: float
 
 
 def parse_fault(text: str) -> Fault:
@@ -42,7 +42,7 @@ def parse_fault(text: str) -> Fault:
     check_name(fault)
     if colon and int(value) > _MOST:
         raise UsageError(f"The value of a fault is at most {_MOST}, not {value}.", "bad-value")
-    at_ms = parse_time(time) if at else 0
+    at_ms = parse_milliseconds(time) if at else 0
     if at_ms < 0:
         raise UsageError(f"The time of a fault is counted from the beginning, so it is not negative ({time}).", "time")
     return Fault(device, fault, int(value) if colon else 1, at_ms)

@@ -139,14 +139,14 @@ class Table:
         if found is None:
             return default_us
         try:
-            us = parse_time(found, LTIME) // 1000
+            us, rest_ns = divmod(parse_time(found, LTIME), 1000)
         except UsageError:
             self.error(f"'{found}' is not a duration; write for example \"T#200ms\"", key)
             return default_us
         if not low_us <= us <= high_us:
             self.error(f"{key} is {found}; it can be {_duration(low_us)} to {_duration(high_us)}", key)
             return default_us
-        if us % 1000:
+        if us % 1000 or rest_ns:
             self.error(f"{key} is {found}; it has to be whole milliseconds", key)
             return default_us
         return us

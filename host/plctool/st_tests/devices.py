@@ -48,7 +48,7 @@ class Devices:
 
     def _begin_faults(self) -> None:
         begin = self._clock_ns()
-        planned = [(begin + fault.at_ms * _NS_PER_MS, fault) for fault in self._case.faults]
+        planned = [(begin + round(fault.at_ms * _NS_PER_MS), fault) for fault in self._case.faults]
         self._planned = sorted(planned, key=lambda entry: entry[0])
         self._set_faults(begin)
 
