@@ -101,6 +101,16 @@ class OtherTool:
         return f"{self.tool} (pid {self.pid})"
 
 
+class Closed:
+    """In place of what a controller that is closed has no more."""
+
+    def __init__(self, message: str) -> None:
+        self._message = message
+
+    def __getattr__(self, name: str) -> Any:
+        raise UsageError(self._message, "closed")
+
+
 class Controller(ABC):
     """One controller. Use it as a context manager."""
 
@@ -283,6 +293,10 @@ class Controller(ABC):
     def read(self, *names: str) -> Any:
         """The value of one variable, or the values of several by the names given; also of those that match a pattern
         such as `Main.*`."""
+        if not names:
+            raise UsageError('Name a variable; write for example plc.read("Main.speed").')
+        if not all(isinstance(name, str) for name in names):
+            raise UsageError('Write the names one by one, as in plc.read("Main.a", "Main.b"); read_all takes a list.')
         values = self.read_all(names)
         return values if len(names) > 1 or is_pattern(names[0]) else values[names[0]]
 
@@ -297,6 +311,8 @@ class Controller(ABC):
         Raises UsageError for a name that is unknown, DeviceError when a pointer leads to no variable; what a pattern
         finds is None then.
         """
+        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+            raise UsageError(f'This takes a list of names, such as ["Main.a", "Main.b"], not {names!r}.')
         table = self.symbols()
         reading = self.sample_symbols(table, table.select(names))
         typed = [name for name in names if not is_pattern(name)]
@@ -312,6 +328,8 @@ class Controller(ABC):
         """Sets variables, at once if they fit a message; strings such as 'T#80ms' are understood. Writing one bit keeps
         the others of its byte. Raises UsageError, and writes nothing, when a value does not fit or is a
         constant; DeviceError when a pointer leads to no variable."""
+        if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
+            raise UsageError(f'This takes names with values, such as {{"Main.speed": 5}}, not {values!r}.')
         table = self.symbols()
         named = [(table.resolve(name), value) for name, value in values.items()]
         for symbol, _ in named:

@@ -10,9 +10,9 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from plctool.controller import Controller, OtherTool
+from plctool.controller import Closed, Controller, OtherTool
 from plctool.core import lib
 from plctool.debug.symbols import SymbolTable, load_symbols
 from plctool.debug.variables import Change, Reading, Symbol, unreachable
@@ -82,7 +82,7 @@ def scan(
 
 def _open_link(text: str | Link, gateway: bool | None, tool: str | None, ask_password: AskPassword) -> MessageLink:
     """A way to the device, through a gateway where that is possible and wanted."""
-    link = parse_link(text) if isinstance(text, str) else text
+    link = text if isinstance(text, Link) else parse_link(text)
     if link.is_shared:
         if gateway is None:
             gateway = os.environ.get("PLCTOOL_GATEWAY", "on").lower() not in ("off", "no", "0")
@@ -129,7 +129,8 @@ class Plc(Controller):
     ) -> None:
         super().__init__()
         self._connection = connection
-        self._session = (
+        self._closed = False
+        self._session: Session = (
             GatewaySession(connection)
             if isinstance(connection, GatewayConnection)
             else Session(connection, ask_password)
@@ -138,7 +139,10 @@ class Plc(Controller):
         self._prepared: services.Prepared | None = None  # of the download that follows
 
     def close(self) -> None:
-        self._connection.close()
+        if not self._closed:
+            self._closed = True
+            self._connection.close()
+            self._session = self._connection = cast("Any", Closed("The connection is closed; connect again."))
 
     def others(self) -> list[OtherTool]:
         if not isinstance(self._connection, GatewayConnection):

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
 from itertools import repeat
+from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
 
-from plctool.controller import Controller
+from plctool.controller import Closed, Controller
 from plctool.core import error_name, give_back_core, lib, take_core
 from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.debug.trace import Trace
@@ -139,7 +140,9 @@ class Simulator(Controller):
             self._functions.disconnect(self._core)
             if self._limited:
                 self._lib.SimSetCycleLimit(0)
-            self._lib = self._ffi = _Closed()  # before another one has the runtime
+            self._lib = self._ffi = Closed(
+                "The simulator is closed; make another one."
+            )  # before another one has the runtime
             give_back_core(self._core)
 
     # ---- the program ----
@@ -275,14 +278,16 @@ class Simulator(Controller):
     def attach(self, step: Callable[[Simulator], None], every_ms: float = 1) -> None:
         """A plant: `step(plc)` is called each `every_ms` of virtual time, from now on, while time passes. It reads
         outputs and sets inputs. With `run_cycles` it is called after the cycles in which its time came."""
-        every = round(every_ms * 1e6)
+        _check_callable(step)
+        every = _ns(every_ms)
         if every <= 0:
             raise UsageError("A plant needs a step of more than 0 ms.", "time")
         self._plants.append(_Plant(step, every, self.now_ns + every))
 
     def at(self, after_ms: float, step: Callable[[Simulator], None]) -> None:
         """`step(plc)` is called once, when so much virtual time has passed; never, if there is a `restart` before."""
-        self._plants.append(_Plant(step, 2 * MAX_NS, self.now_ns + round(after_ms * 1e6)))
+        _check_callable(step)
+        self._plants.append(_Plant(step, 2 * MAX_NS, self.now_ns + _ns(after_ms)))
 
     def _step_plants(self) -> None:
         """Calls the plants whose time has come."""
@@ -304,8 +309,8 @@ class Simulator(Controller):
     def run_cycles(self, count: int, *, check: bool = True) -> None:
         """Runs until the first task has made `count` more cycles. Raises ProgramStopped when the program stopped with
         an exception; without `check`, `status()` has it."""
-        if count > _MAX_CYCLES:
-            raise UsageError(f"At most {_MAX_CYCLES} cycles are run at once.", "cycles")
+        if not isinstance(count, SupportsIndex) or not 0 <= count <= _MAX_CYCLES:
+            raise UsageError(f"At most {_MAX_CYCLES} cycles are run at once, and at least 0, not {count!r}.", "cycles")
         for step in repeat(1, count) if self._plants else (count,):
             self._run_cycles(step)
             self._step_plants()
@@ -329,7 +334,7 @@ class Simulator(Controller):
         if not isinstance(ms, int | float | timedelta):
             raise UsageError(f"run_for takes milliseconds or a timedelta, not {ms!r}.", "time")
         passed = ms / timedelta(milliseconds=1) if isinstance(ms, timedelta) else ms
-        ns = round(passed * 1e6 + seconds * 1e9)
+        ns = _ns(passed, seconds)
         if not 0 <= ns < MAX_NS:
             raise UsageError(f"Time passes forwards, and for at most {MAX_NS // 10**9} s.", "time")
         end = self.now_ns + ns
@@ -415,13 +420,6 @@ class Simulator(Controller):
         return area[0], offset[0] + symbol.offset
 
 
-class _Closed:
-    """Instead of the runtime of a simulator that has none any more."""
-
-    def __getattr__(self, name: str) -> Any:
-        raise UsageError("The simulator is closed; make another one.", "closed")
-
-
 @dataclass
 class _Plant:
     """`due_ns`: when `step` is called next."""
@@ -429,6 +427,19 @@ class _Plant:
     step: Callable[[Simulator], None]
     every_ns: int
     due_ns: int
+
+
+def _ns(ms: float, seconds: float = 0) -> int:
+    """Raises UsageError for what is infinite or not a number."""
+    for part in (ms, seconds):
+        if not isinstance(part, SupportsFloat) or not isfinite(part):
+            raise UsageError(f"{part!r} is not a length of time.", "time")
+    return round(ms * 1e6 + seconds * 1e9)
+
+
+def _check_callable(step: object) -> None:
+    if not callable(step):
+        raise UsageError(f"A plant is a function that gets the simulator, not {step!r}.", "plant")
 
 
 def _check(result: int, what: str) -> None:

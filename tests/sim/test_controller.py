@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -136,6 +137,38 @@ def test_a_real_is_a_float_also_where_it_is_no_number(plc: Controller, value: fl
     plc.write({"Main.ratio": value})
     read = plc.read("Main.ratio")
     assert isinstance(read, float) and str(read) == str(value)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda plc: plc.read(), "Name a variable"),
+        (lambda plc: plc.read(["Main.n"]), "read_all takes a list"),
+        (lambda plc: plc.read(None), "Write the names one by one"),
+        (lambda plc: plc.read_all("Main.n"), "takes a list of names"),
+        (lambda plc: plc.read_all([1]), "takes a list of names"),
+        (lambda plc: plc.write("Main.n"), "takes names with values"),
+        (lambda plc: plc.write({1: 2}), "takes names with values"),
+    ],
+)
+def test_arguments_of_other_kinds_are_refused_with_what_to_write(
+    plc: Controller, call: Callable[[Any], object], words: str
+) -> None:
+    with pytest.raises(UsageError, match=words):
+        call(plc)
+
+
+def test_a_closed_one_says_so(plc: Controller) -> None:
+    plc.close()
+    plc.close()
+    for call in (lambda: plc.read("Main.n"), plc.start, plc.status, plc.tasks, lambda: plc.write({"Main.n": 1})):
+        with pytest.raises(UsageError, match="is closed"):
+            call()
+
+
+def test_what_is_no_link_is_not_connected_to() -> None:
+    with pytest.raises(UsageError, match="A link is a string"):
+        plctool.connect(None)  # type: ignore[arg-type]
 
 
 def test_a_sample_is_of_one_moment(plc: Controller) -> None:

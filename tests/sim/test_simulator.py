@@ -174,3 +174,24 @@ def test_two_builds_of_the_same_sources_give_the_same_image(built, tmp_path: Pat
     path = tmp_path / "main.st"
     path.write_text(MAIN)
     assert compile_sources([path]).image == built.image
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda plc: plc.run_cycles(-1), "cycles are run at once, and at least 0"),
+        (lambda plc: plc.run_cycles(1.5), "cycles are run at once, and at least 0"),
+        (lambda plc: plc.run_for(ms=float("nan")), "nan is not a length of time"),
+        (lambda plc: plc.run_for(seconds=float("inf")), "inf is not a length of time"),
+        (lambda plc: plc.run_for(seconds="1"), "'1' is not a length of time"),
+        (lambda plc: plc.attach(None), "A plant is a function"),
+        (lambda plc: plc.attach(print, None), "None is not a length of time"),
+        (lambda plc: plc.at(1, None), "A plant is a function"),
+        (lambda plc: plc.at(float("nan"), print), "nan is not a length of time"),
+    ],
+)
+def test_arguments_that_mean_nothing_are_refused(plc, call, words):
+    with pytest.raises(UsageError, match=words):
+        call(plc)
+    plc.run_cycles(1)
+    assert plc.read("Main.n") == 1

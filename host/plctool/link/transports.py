@@ -262,6 +262,8 @@ def parse_link(text: str) -> Link:
     A place may have a question mark of its own, as pyserial's URLs do: only what names options of the link is taken for
     them.
     """
+    if not isinstance(text, str):
+        raise UsageError(f'A link is a string such as "serial:/dev/ttyS0", not {text!r}.', "no-such-link")
     scheme, colon, rest = text.partition(":")
     if not colon or scheme not in TRANSPORTS:
         raise _no_link(text)
