@@ -3,8 +3,10 @@ shells."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
+_AN = re.compile(r"[AEIO]|L(REAL|WORD|INT|TIME|DATE|TOD|DT)\b", re.IGNORECASE)
 EXIT_INTERRUPTED = 130  # as shells say it of a process that Ctrl-C ended
 
 
@@ -67,6 +69,11 @@ def listed(words: Iterable[str], conjunction: str = "and") -> str:
 def counted(count: int, what: str) -> str:
     """`1 test`, `2 tests`."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def with_article(name: object) -> str:
+    """`a BOOL`, `an INT`, `an LREAL`."""
+    return f"{'an' if _AN.match(str(name)) else 'a'} {name}"
 
 
 def did_you_mean(name: str, candidates: Iterable[str], likeness: float = 0.7) -> str:

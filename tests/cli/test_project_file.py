@@ -183,6 +183,7 @@ def test_inputs_and_outputs_are_those_that_the_project_names(tool: Any, project:
         ("[options]\nchecks = 7", '2:10: error: checks can be "all", "none" or a list'),
         ('[options]\nno-warn = ["unusd"]', "2:12: error: there is no warning 'unusd'; did you mean unused?"),
         ('[options]\nwerror = "yes"', "2:10: error: werror is a text in quotes; it has to be true or false"),
+        ('[information]\nname = "a\\nb"', "2:8: error: name has a line break or another character that cannot be seen"),
         ('[information]\nauthor = "J\u00fcrgen"', "2:10: error: author goes into the image, which takes ASCII only"),
         (f'[information]\nauthor = "{"x" * 256}"', "2:10: error: author has 256 characters; it can have 255"),
         ("options = 1", "1:11: error: options is a number; it has to be a table"),

@@ -280,3 +280,18 @@ def test_a_pattern_that_also_matches_does_not_change_what_a_name_shows(plc: Simu
 def test_a_name_that_leads_nowhere_is_an_error_beside_a_pattern_that_matches_it(plc: Simulator) -> None:
     with pytest.raises(DeviceError, match=r"Main\.loose is NULL"):
         plc.read("Main.lo*e", "Main.loose")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Main.list[1].x", "Main.list[1] is an INT and has no member x"),
+        ("Main.list.x", "Main.list is an ARRAY[1..4] OF INT and has no member x"),
+        ("Main.pause.3", "Main.pause is an LTIME and has no bit 3"),
+        ("Main.n[2]", "Main.n is a UDINT and cannot be indexed"),
+    ],
+)
+def test_a_type_has_its_article(plc: Simulator, name: str, words: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        plc.read(name)
+    assert caught.value.message.startswith(words)

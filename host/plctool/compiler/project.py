@@ -244,7 +244,9 @@ def _information(folder: Path, table: Table) -> ApplicationInfo:
 def _shown(table: Table, key: str) -> str:
     """A text that the image carries."""
     text = table.text(key) or ""
-    if not text.isascii() or not text.isprintable():
+    if text.isascii() and not text.isprintable():
+        table.error(f"{key} has a line break or another character that cannot be seen; write it in one line", key)
+    elif not text.isascii():
         table.error(f"{key} goes into the image, which takes ASCII only; write other letters with those", key)
     elif len(text) > _MAX_TEXT:
         table.error(f"{key} has {len(text)} characters; it can have {_MAX_TEXT}", key)

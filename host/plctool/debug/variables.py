@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from plctool.errors import DeviceError, UsageError
+from plctool.errors import DeviceError, UsageError, with_article
 from plctool.iec.areas import Area
 from plctool.iec.types import (
     ELEMENTARY,
@@ -219,7 +219,7 @@ def _member(symbol: Symbol, member: str, name: str, units: Units) -> Symbol:
     if isinstance(t, PointerType):
         raise UsageError(f"{symbol.name} is a pointer; write {symbol.name}^.{member} for what it leads to.", "pointer")
     if not isinstance(t, StructType):
-        raise UsageError(f"{symbol.name} is a {t} and has no member {member}.", "no-part")
+        raise UsageError(f"{symbol.name} is {with_article(t)} and has no member {member}.", "no-part")
     found = t.member(member)
     if found is None and member.casefold() in map(str.casefold, t.properties):
         raise UsageError(f"{name} is a property: only the program can read it, by a call.", "property")
@@ -231,14 +231,14 @@ def _member(symbol: Symbol, member: str, name: str, units: Units) -> Symbol:
 def _target(symbol: Symbol) -> Symbol:
     t = symbol.type
     if not isinstance(t, PointerType) or isinstance(t, InterfaceType):
-        raise UsageError(f"{symbol.name} is a {t}, not a pointer; leave out the ^.", "no-part")
+        raise UsageError(f"{symbol.name} is {with_article(t)}, not a pointer; leave out the ^.", "no-part")
     return symbol.target(f"{symbol.name}^", t.target)
 
 
 def _bit(symbol: Symbol, bit: int) -> Symbol:
     base = base_of(symbol.type)
     if not isinstance(base, Elementary) or base.kind not in (Kind.BIT, Kind.INT) or bit >= base.bits:
-        raise UsageError(f"{symbol.name} is a {symbol.type} and has no bit {bit}.", "no-part")
+        raise UsageError(f"{symbol.name} is {with_article(symbol.type)} and has no bit {bit}.", "no-part")
     return replace(symbol, name=f"{symbol.name}.{bit}", bit=bit)
 
 
@@ -258,7 +258,7 @@ def _element(symbol: Symbol, text: str) -> Symbol:
     if isinstance(t, OpenArrayType):
         raise _open_array(symbol)
     if not isinstance(t, ArrayType) or len(indices) != len(t.bounds):
-        raise UsageError(f"{symbol.name} is a {t} and cannot be indexed with [{text}].", "no-part")
+        raise UsageError(f"{symbol.name} is {with_article(t)} and cannot be indexed with [{text}].", "no-part")
     flat = 0
     for index, (low, high) in zip(indices, t.bounds, strict=True):
         if not low <= index <= high:

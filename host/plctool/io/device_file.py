@@ -35,7 +35,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from plctool.errors import UsageError
+from plctool.errors import UsageError, with_article
 from plctool.files import Pos
 from plctool.iec.types import BOOL, DEFAULT_STRING_LENGTH, ELEMENTARY, Elementary, Kind, StringType, Type
 from plctool.iec.values import encode
@@ -377,7 +377,7 @@ def _problem(parameter: ModuleParameter, value: Any) -> str:
 def _text_problem(t: Elementary, value: Any) -> str:
     """The same for a duration, a date or a character."""
     if not isinstance(value, str):
-        return f"has to be a text such as a {t} has in ST"
+        return f"has to be a text such as {with_article(t)} has in ST"
     try:
         encode(t, value)
     except UsageError as error:

@@ -15,7 +15,7 @@ from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.ast import ACCESS, Modifier, Section
-from plctool.errors import listed
+from plctool.errors import listed, with_article
 
 
 class Kind(StrEnum):
@@ -237,20 +237,16 @@ def _kind(decl: ast.PouDecl) -> Kind:
     return Kind.PROPERTY if decl.is_property else Kind(decl.keyword)
 
 
-def _with_article(kind: Kind) -> str:
-    return f"{'an' if kind[0] in 'AI' else 'a'} {kind}"
-
-
 def _wrong_section(kind: Kind, keyword: Section) -> str:
     advice = _INSTEAD_OF_SECTION.get((kind, keyword)) or f"it has {listed(SECTIONS[kind] or ['no variables'])}"
-    return f"{_with_article(kind)} has no {keyword}; {advice}"
+    return f"{with_article(kind)} has no {keyword}; {advice}"
 
 
 def _wrong_modifier(kind: Kind, word: str) -> str:
     if kind in _IN_INTERFACE.values():
         return f"what an INTERFACE declares is PUBLIC and to be implemented; leave out {word}"
     allowed = sorted(MODIFIERS[kind])
-    return f"{_with_article(kind)} cannot be {word}; it may be {listed(allowed, 'or')}"
+    return f"{with_article(kind)} cannot be {word}; it may be {listed(allowed, 'or')}"
 
 
 def _wrong_qualifier(kind: Kind, keyword: Section, word: str) -> str:
@@ -270,7 +266,7 @@ def _wrong_access(kind: Kind, keyword: Section, word: str) -> str:
     if keyword is Section.VAR_GLOBAL:
         return f"a VAR_GLOBAL may be PUBLIC or INTERNAL, not {word}"
     return (
-        f"{word} is for the VAR of a FUNCTION_BLOCK or CLASS; only {_with_article(kind)} itself sees this; leave it out"
+        f"{word} is for the VAR of a FUNCTION_BLOCK or CLASS; only {with_article(kind)} itself sees this; leave it out"
     )
 
 
