@@ -60,6 +60,14 @@ def test_no_output_replaces_a_file_of_the_project(tool: Any, project: Path, word
     assert contents(project) == before
 
 
+@pytest.mark.parametrize("words", [("run", "--trace", "Main.n", "-o"), ("test", "--junit")])
+def test_an_image_is_replaced_by_build_alone(tool: Any, project: Path, words: tuple[str, ...]) -> None:
+    assert tool("build", "-o", "line.cdl").status == 0
+    before = contents(project)
+    assert refused(tool(*words, "line.cdl"), "line.cdl has the name of an image")
+    assert contents(project) == before
+
+
 def test_outputs_beside_the_files_of_a_project_are_written(tool: Any, project: Path) -> None:
     assert tool("build", "-o", "src/app.cdl").status == 0
     assert tool("build", "-o", "src/app.cdl").status == 0

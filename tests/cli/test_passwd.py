@@ -120,7 +120,7 @@ def test_the_present_one_is_asked_for_first(tool: Any, locked: FakePlc, types: A
     assert tool("passwd", *PORT).status == 0
     assert asked[0].startswith("Password of the device")
     types(OTHER)
-    assert tool("passwd", "--remove", *PORT).out == "The password is removed.\n"
+    assert tool("passwd", "--remove", *PORT).out == "The device has no password now.\n"
     assert not any(locked.password)
 
 

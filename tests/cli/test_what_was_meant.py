@@ -17,6 +17,13 @@ MEANT = [
     ("help", "'help' is not a command; write plctool --help."),
     ("xyzzy", "'xyzzy' is not a command; 'plctool --help' lists the commands."),
     ("--verison", "Unrecognized arguments: --verison (did you mean --version?); see 'plctool --help'."),
+    ("status x", "Unrecognized arguments: x; see 'plctool status --help'."),
+    ("read Main.n --xyzzy", "Unrecognized arguments: --xyzzy; see 'plctool read --help'."),
+    (
+        "watch Main.n --intreval 1",
+        "Unrecognized arguments: --intreval 1 (did you mean --interval?); see 'plctool watch --help'.",
+    ),
+    ("files list x", "Unrecognized arguments: x; see 'plctool files list --help'."),
     ("build blink.st out.cdl", "out.cdl is not a source; to name the image that is built, write -o out.cdl."),
     ("gateway", "The following arguments are required: status|stop; see 'plctool gateway --help'."),
     ("reset", "The following arguments are required: warm|cold|origin; see 'plctool reset --help'."),

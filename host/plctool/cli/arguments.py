@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from plctool.errors import UsageError, did_you_mean
 from plctool.files import file_path, usable_path
@@ -26,6 +26,13 @@ _ONE_DOCUMENT = "print one JSON document and nothing else"
 
 class _Parser(argparse.ArgumentParser):
     """Reports wrong arguments as UsageError, like all other wrong use."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Of what a command does not know, it says so itself."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
 
     def error(self, message: str) -> NoReturn:
         message = self._without_value(message) or message + self._meant(message)

@@ -57,7 +57,7 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
 
     output = settings.output
     inputs = settings.every_file
-    check_output(output, inputs(), f"-o {output.stem}.cdl")
+    check_output(output, inputs(), f"-o {output.stem}.cdl", is_image=True)
     check_not_read(symbol_path(output), inputs(), f"-o {output.stem}-image.cdl")
     result = _compile(settings, settings.target)
     if settings.own_folder:

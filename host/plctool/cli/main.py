@@ -376,7 +376,9 @@ def _passwd(args: argparse.Namespace) -> int:
         plc.raw_status()  # asks for the present one first
         return documents.passwd(plc, None if args.remove else new_password(args.new_password_file))
 
-    return _on_device(args, change, lambda d: "The password is set." if d["password"] else "The password is removed.")
+    return _on_device(
+        args, change, lambda d: "The password is set." if d["password"] else "The device has no password now."
+    )
 
 
 def _files(args: argparse.Namespace) -> int:

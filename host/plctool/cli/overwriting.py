@@ -6,18 +6,19 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from plctool.errors import UsageError
-from plctool.project import SYMBOL_SUFFIX
+from plctool.errors import UsageError, with_article
+from plctool.project import IMAGE_SUFFIX, SYMBOL_SUFFIX
 
+_IMAGE = "image"
 _PROJECTS = (".plcproj", ".tsproj")
 
 
-def check_output(output: Path, inputs: Iterable[Path], better: str) -> None:
-    """Refuses an output with the name of a source, a symbol file or a settings file, and one that is among `inputs`,
-    which are looked at only if the file exists. `better`: what to type instead."""
+def check_output(output: Path, inputs: Iterable[Path], better: str, is_image: bool = False) -> None:
+    """Refuses an output with the name of a source, a symbol file, a settings file or, unless it is one, an image; and
+    one that is among `inputs`, which are looked at only if the file exists. `better`: what to type instead."""
     kind = _kind(output)
-    if kind:
-        raise UsageError(f"{output} has the name of a {kind}; write for example {better}.", "bad-output")
+    if kind and not (is_image and kind == _IMAGE):
+        raise UsageError(f"{output} has the name of {with_article(kind)}; write for example {better}.", "bad-output")
     check_not_read(output, inputs, better)
 
 
@@ -36,7 +37,12 @@ def _kind(output: Path) -> str:
     suffix = output.suffix.lower()
     if suffix in SUFFIXES:
         return "source"
-    kinds = {SYMBOL_SUFFIX: "symbol file", ".toml": "settings file", **dict.fromkeys(_PROJECTS, "project")}
+    kinds = {
+        IMAGE_SUFFIX: _IMAGE,
+        SYMBOL_SUFFIX: "symbol file",
+        ".toml": "settings file",
+        **dict.fromkeys(_PROJECTS, "project"),
+    }
     return kinds.get(suffix, "")
 
 
