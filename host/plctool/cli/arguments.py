@@ -116,7 +116,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 
     symbols = command("symbols", "list the variables of an image with their types")
     _add_image(symbols)
-    symbols.add_argument("patterns", nargs="*", metavar="PATTERN", help="names with * and ?: 'Main.pump.*'")
+    symbols.add_argument("patterns", nargs="*", type=_text, metavar="PATTERN", help="names with * and ?: 'Main.pump.*'")
 
     new = command("new", "make a project that builds, runs and has a passing test")
     new.add_argument(
@@ -138,10 +138,20 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     length.add_argument("--cycles", type=_count, metavar="N", help="number of cycles of the first task; default: 1")
     length.add_argument("--time", type=_duration_ms, metavar="T#10s", help="how much virtual time, instead of cycles")
     run.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="set before the first cycle; may be repeated"
+        "--set",
+        action="append",
+        default=[],
+        type=_text,
+        metavar="NAME=VALUE",
+        help="set before the first cycle; may be repeated",
     )
     run.add_argument(
-        "--get", action="append", default=[], metavar="NAME", help="print after the last cycle; may be repeated"
+        "--get",
+        action="append",
+        default=[],
+        type=_text,
+        metavar="NAME",
+        help="print after the last cycle; may be repeated",
     )
 
     run.add_argument(
@@ -154,11 +164,12 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "--fault",
         action="append",
         default=[],
+        type=_text,
         metavar="DEVICE=FAULT",
         help="of a simulated device, with value and time: Tank=late:150@T#5s (docs/io.md); may be repeated",
     )
     run.add_argument(
-        "--trace", nargs="+", action="extend", default=[], metavar="NAME",
+        "--trace", nargs="+", action="extend", default=[], type=_text, metavar="NAME",
         help="write the values after each cycle to a CSV file; may be repeated",
     )  # fmt: skip
     run.add_argument(
@@ -175,6 +186,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "-k",
         "--filter",
         default="*",
+        type=_text,
         metavar="PATTERN",
         help="only tests whose name contains PATTERN (or matches it, with * and ?)",
     )
@@ -238,7 +250,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(command("log", "print the log of a device"))
     shell = command("shell", "send a command to the PLC shell of a device; ? lists them")
     _add_link(shell)
-    shell.add_argument("words", nargs="+", metavar="COMMAND", help="for example ?, rtsinfo, tasklist, plcload")
+    shell.add_argument(
+        "words", nargs="+", type=_text, metavar="COMMAND", help="for example ?, rtsinfo, tasklist, plcload"
+    )
 
     passwd = command("passwd", "set, change or remove the password of a device")
     _add_link(passwd)
@@ -268,7 +282,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_names(read)
     _add_link(read, symbols=True)
     write = command("write", "set variables")
-    write.add_argument("values", nargs="+", metavar="NAME=VALUE", help="value as 'read' shows it: Main.pause=T#2s")
+    write.add_argument(
+        "values", nargs="+", type=_text, metavar="NAME=VALUE", help="value as 'read' shows it: Main.pause=T#2s"
+    )
     _add_link(write, symbols=True)
     watch = command(
         "watch", "print values of variables periodically", json="print a JSON document a line for each reading"
@@ -290,7 +306,7 @@ def _add_file_actions(command: Callable[..., argparse.ArgumentParser]) -> None:
     action = _actions(command("files", "list, get, put and delete the files of a device"))
     _add_link(action("list", "list the files"))
     get = action("get", "copy a file from the device")
-    get.add_argument("name", metavar="NAME", help="as 'plctool files list' shows it")
+    get.add_argument("name", type=_text, metavar="NAME", help="as 'plctool files list' shows it")
     get.add_argument(
         "-o", "--output", type=usable_path, metavar="FILE",
         help="- for the standard output; default: its name, in this folder",
@@ -298,10 +314,10 @@ def _add_file_actions(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_link(get)
     put = action("put", "copy a file to the device, in place of the previous one of its name")
     put.add_argument("file", type=usable_path, metavar="FILE")
-    put.add_argument("--name", metavar="NAME", help="on the device; default: that of the file")
+    put.add_argument("--name", type=_text, metavar="NAME", help="on the device; default: that of the file")
     _add_link(put)
     delete = action("delete", "delete a file of the device")
-    delete.add_argument("name", metavar="NAME", help="as 'plctool files list' shows it")
+    delete.add_argument("name", type=_text, metavar="NAME", help="as 'plctool files list' shows it")
     _add_link(delete)
 
     action = _actions(command("source", "keep the sources of the program on the device, and get them back"))
@@ -338,15 +354,15 @@ def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     init.add_argument("--device", type=usable_path, metavar="FILE.toml", help="what the vendor says of the board")
     _add_link(action("status", "show how the devices of the running program are"))
     scan = action("scan", "list what is on a bus")
-    scan.add_argument("io_device", metavar="BUS", help="its name in 'plctool io status'")
+    scan.add_argument("io_device", type=_text, metavar="BUS", help="its name in 'plctool io status'")
     _add_link(scan)
     identify = action("identify", "let a device show itself")
-    identify.add_argument("io_device", metavar="DEVICE", help="its name in 'plctool io status'")
+    identify.add_argument("io_device", type=_text, metavar="DEVICE", help="its name in 'plctool io status'")
     _add_link(identify)
     param = action("param", "read or set a parameter of a device, until the program is loaded again")
     param.add_argument("verb", choices=["get", "set"], metavar="get|set")
-    param.add_argument("io_device", metavar="DEVICE", help="its name in 'plctool io status'")
-    param.add_argument("parameter", metavar="NAME|ID[=VALUE]", help="set: with its value")
+    param.add_argument("io_device", type=_text, metavar="DEVICE", help="its name in 'plctool io status'")
+    param.add_argument("parameter", type=_text, metavar="NAME|ID[=VALUE]", help="set: with its value")
     param.add_argument("--type", metavar="TYPE", help="of one that the description does not have; default: UDINT")
     _add_link(param, symbols=True)
 
@@ -396,7 +412,9 @@ def _add_image(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_names(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("names", nargs="+", metavar="NAME", help="such as Main.lamp, Main.list[3], Main.pump.*")
+    parser.add_argument(
+        "names", nargs="+", type=_text, metavar="NAME", help="such as Main.lamp, Main.list[3], Main.pump.*"
+    )
 
 
 def _add_dialect(parser: argparse.ArgumentParser) -> None:
@@ -457,6 +475,17 @@ def _option_helps() -> dict[str, str]:
         ]
         helps[name] += "; " + ", ".join(texts) if any(of_kinds) else ""
     return helps
+
+
+def _text(text: str) -> str:
+    """What is no path. The bytes that the encoding of the locale does not have came as surrogates: they are UTF-8."""
+    if text.isascii():
+        return text
+    try:
+        return text.encode("utf-8", "surrogateescape").decode("utf-8")
+    except UnicodeError:
+        shown = text.encode("ascii", "backslashreplace").decode()
+        raise UsageError(f"{shown} is not UTF-8; type it in the encoding of this terminal.", "usage") from None
 
 
 def _count(text: str) -> int:

@@ -625,8 +625,9 @@ def _internal_error(error: Exception, as_json: bool) -> int:
 
 def _show_every_character() -> None:
     """A character that the terminal or pipe cannot show becomes an escape, like `\\u65e5`, and is not an error."""
-    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
-        sys.stdout.reconfigure(errors="backslashreplace")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors in ("strict", "surrogateescape"):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _complete() -> None:
