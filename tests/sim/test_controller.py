@@ -37,12 +37,14 @@ VAR
     to_point : REF_TO Point;
     leads : BOOL;
     ratio : REAL;
+    loose, bound : REFERENCE TO DINT;
 END_VAR
 VAR CONSTANT limit : DINT := 42; END_VAR
 VAR RETAIN kept : DINT := 7; END_VAR
 VAR PERSISTENT counted : DINT := 8; END_VAR
 n := n + 1 / divisor;
 twice := 2 * n;
+bound REF= kept;
 IF leads THEN to_point := REF(points[2]); END_IF
 END_PROGRAM
 CONFIGURATION C
@@ -164,6 +166,12 @@ def test_a_closed_one_says_so(plc: Controller) -> None:
     for call in (lambda: plc.read("Main.n"), plc.start, plc.status, plc.tasks, lambda: plc.write({"Main.n": 1})):
         with pytest.raises(UsageError, match="is closed"):
             call()
+
+
+def test_a_pattern_follows_references(plc: Controller) -> None:
+    let_pass(plc)
+    assert plc.read("Main.*o*nd") == {"Main.bound": 7}
+    assert plc.read("Main.loos?") == {"Main.loose": None}
 
 
 def test_what_is_no_link_is_not_connected_to() -> None:
