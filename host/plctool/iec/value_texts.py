@@ -192,7 +192,12 @@ def parse_time(text: str, t: Type = ELEMENTARY["TIME"]) -> int:
 
 def parse_milliseconds(text: str) -> float:
     """A duration of any length. Raises UsageError."""
-    return float(_duration(text, ELEMENTARY["TIME"]) / UNITS_NS["ms"])
+    return float(parse_nanoseconds(text) / UNITS_NS["ms"])
+
+
+def parse_nanoseconds(text: str) -> Fraction:
+    """A duration of any length. Raises UsageError."""
+    return _duration(text, ELEMENTARY["TIME"])
 
 
 def _duration(text: str, t: Type) -> Fraction:

@@ -14,8 +14,7 @@ from typing import Any, TypeVar
 
 from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import Pos
-from plctool.iec.types import LTIME
-from plctool.iec.value_texts import parse_time
+from plctool.iec.value_texts import parse_nanoseconds
 from plctool.io.mistakes import Mistakes
 from plctool.io.positions import Path, TomlText
 
@@ -139,14 +138,14 @@ class Table:
         if found is None:
             return default_us
         try:
-            us, rest_ns = divmod(parse_time(found, LTIME), 1000)
+            us, rest = divmod(parse_nanoseconds(found), 1000)
         except UsageError:
             self.error(f"'{found}' is not a duration; write for example \"T#200ms\"", key)
             return default_us
         if not low_us <= us <= high_us:
             self.error(f"{key} is {found}; it can be {_duration(low_us)} to {_duration(high_us)}", key)
             return default_us
-        if us % 1000 or rest_ns:
+        if us % 1000 or rest:
             self.error(f"{key} is {found}; it has to be whole milliseconds", key)
             return default_us
         return us
