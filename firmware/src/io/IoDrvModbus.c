@@ -72,6 +72,7 @@ static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int 
     if (is_running)
         write_last_outputs();
     is_running = false;
+    map_count = 0;
     ModbusCallsBegin(NULL, NULL);
     ModbusScanEnd();
     ModbusGiveBack(&setup);

@@ -104,7 +104,7 @@ _FUNCTIONS = {
         __floatdidf(LINT):LREAL                             32    80
         __floatundidf(ULINT):LREAL                          32    48
         __extendsfdf2(REAL):LREAL                           32    48
-        __truncdfsf2(LREAL):REAL                            16    16""",
+        __truncdfsf2(LREAL):REAL                            48    16""",
 }
 """By component: the interface of each function, and the bytes of stack that a call takes on Cortex-M and on RISC-V.
 Those of the last three are for LLVM, and have the names of the GNU compiler runtime, which libgcc and compiler-rt
