@@ -18,6 +18,7 @@ from plctool.iec.types import (
     DATE,
     DINT,
     DT,
+    ELEMENTARY,
     INT,
     LDATE,
     LDT,
@@ -44,7 +45,7 @@ from plctool.iec.types import (
     SubrangeType,
     Type,
 )
-from plctool.iec.value_texts import format_time, literal, parse_time, parse_value
+from plctool.iec.value_texts import format_time, literal, parse_milliseconds, parse_time, parse_value
 from plctool.iec.values import decode, encode
 
 
@@ -96,6 +97,30 @@ def test_reals_are_shown_with_the_fewest_digits_that_read_back(value: float) -> 
 def test_a_real_that_is_no_number_has_a_word(t: Elementary, text: str) -> None:
     assert literal(t, decode(t, encode(t, float(text)))) == text
     assert literal(t, parse_value(t, text)) == text
+
+
+TYPED = {
+    "TIME": "T#{}d",
+    "LTIME": "LTIME#{}d",
+    "DINT": "{}",
+    "ULINT": "16#{}",
+    "BOOL": "{}",
+    "REAL": "{}",
+    "LREAL": "1e{}",
+    "DATE": "D#{}-01-01",
+    "TOD": "TOD#{}:00:00",
+}
+
+
+@pytest.mark.parametrize("digits", [290, 400, 5000])
+@pytest.mark.parametrize("name", TYPED)
+def test_what_is_far_too_large_is_refused(name: str, digits: int) -> None:
+    text = TYPED[name].format("9" * digits)
+    with pytest.raises(UsageError, match=f"is not a value of {name}"):
+        encode(ELEMENTARY[name], parse_value(ELEMENTARY[name], text))
+    if digits > 300 and text.startswith("T#"):
+        with pytest.raises(UsageError, match="characters"):
+            parse_milliseconds(text)
 
 
 @given(st.floats(allow_nan=False))

@@ -35,6 +35,7 @@ _DATE_FORMS = {"DATE": re.compile(_DAY), "TOD": re.compile(_CLOCK), "DT": re.com
 _PART = re.compile(r"(\d+(?:\.\d+)?)(ms|us|ns|d|h|m|s)")
 _PUNCTUATION = re.compile(r"""'(?:\$.|[^$'])*'|"(?:\$.|[^$"])*"|[][(),]""")  # strings hide what is in them
 _REPEATED = re.compile(r"(?P<count>\d+)\s*\((?P<items>.*)\)", re.DOTALL)
+_LONGEST = 300  # characters of a number, date or duration that is typed
 _TYPED = re.compile(r"^(?P<type>[A-Za-z]\w*)#(?P<rest>.+)$")
 
 
@@ -202,6 +203,7 @@ def parse_nanoseconds(text: str) -> Fraction:
 
 def _duration(text: str, t: Type) -> Fraction:
     """In nanoseconds."""
+    _check_length(text, t)
     body = re.sub(r"(?i)^l?t(ime)?#", "", text.strip()).replace("_", "").lower()
     sign = -1 if body.startswith("-") else 1
     parts = body.removeprefix("-")
@@ -271,6 +273,7 @@ def parse_value(t: Type, text: str) -> Any:
     assert isinstance(base, Elementary)
     if isinstance(t, EnumType):
         return _parse_enum(t, text)
+    _check_length(text, t)
     if base.kind is Kind.TIME:
         return parse_time(text, t)
     if base.kind is Kind.DATE:
@@ -284,10 +287,19 @@ def parse_value(t: Type, text: str) -> Any:
         return _parse_bool(t, text)
     if base.kind is Kind.REAL:
         try:
-            return float(text.replace("_", ""))
+            value = float(text.replace("_", ""))
         except ValueError:
             raise bad_value(text, t, "write a number such as 1.5 or -2e3") from None
+        if math.isinf(value) and any(map(str.isdigit, text)):
+            raise bad_value(text, t, "it is too large")
+        return value
     return _parse_integer(t, text)
+
+
+def _check_length(text: str, t: Type) -> None:
+    """None that is shown is longer, and Python does not convert those that are much longer."""
+    if len(text) > _LONGEST:
+        raise bad_value(f"{text[:20]}...", t, f"it has {len(text)} characters")
 
 
 def _parse_text(t: Type, text: str, wide: bool) -> str:
