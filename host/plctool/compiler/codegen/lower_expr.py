@@ -348,19 +348,20 @@ def selected(frame: Frame, e: IntrinsicCall) -> Ref:
     """SEL and MUX choose an address."""
     if _is_lazy(e):
         ways = _each_way(frame, e, partial(_address_and_capacity, frame))
-        pointer = _phi(frame, "ptr", [(address, block) for (address, _), block in ways])
-        capacities = [capacity for (_, capacity), _ in ways]
-        if any(c != capacities[0] for c in capacities):
-            capacity = _phi(frame, "i32", [(capacity, block) for (_, capacity), block in ways])
-            return Ref(pointer, 0, e.type, capacity=capacity)
-        return Ref(pointer, 0, e.type, capacity=capacities[0])
-    choice = truth(frame, e.args[0]) if e.intrinsic is Intrinsic.SELECT else frame.value(e.args[0])
-    pairs = [_address_and_capacity(frame, arg) for arg in e.args[1:]]
-    pointer = _pick(frame, e, choice, [address for address, _ in pairs], "ptr")
-    capacity = pairs[0][1]
-    if any(c != capacity for _, c in pairs):
-        capacity = _pick(frame, e, choice, [c for _, c in pairs], "i32")
-    return Ref(pointer, 0, e.type, capacity=capacity)
+        pairs, blocks = [pair for pair, _ in ways], [block for _, block in ways]
+    else:
+        choice = truth(frame, e.args[0]) if e.intrinsic is Intrinsic.SELECT else frame.value(e.args[0])
+        pairs, blocks = [_address_and_capacity(frame, arg) for arg in e.args[1:]], []
+
+    def chosen(values: list[Value], text: str) -> Value:
+        if blocks:
+            return _phi(frame, text, list(zip(values, blocks, strict=True)))
+        return _pick(frame, e, choice, values, text)
+
+    pointer = chosen([address for address, _ in pairs], "ptr")
+    capacities = [capacity for _, capacity in pairs]
+    same = all(capacity == capacities[0] for capacity in capacities)
+    return Ref(pointer, 0, e.type, capacity=capacities[0] if same else chosen(capacities, "i32"))
 
 
 def _address_and_capacity(frame: Frame, e: Expr) -> tuple[Value, Value]:

@@ -41,25 +41,24 @@ from plctool.iec.types import ArrayType, OpenArrayType
 def passed_bounds(loop: For) -> Iterator[tuple[Pos, str]]:
     """What to say, and where, of each index that runs past the bounds of its array. Only what every iteration does
     counts; of a loop that may be left early, only its first one."""
-    values = _values(loop)
+    values = known_values(loop.start, loop.stop, loop.step)
     if not values or not isinstance(loop.var, VarPlace) or _may_be_set(loop.var.var, loop.body):
         return
     certain = values[:1] if _may_be_left(loop.body) else (values[0], values[-1])
     for node in _certain_nodes(loop.body):
-        if not isinstance(node, IndexPlace) or not isinstance(node.base.type, ArrayType):
+        array = node.base.type if isinstance(node, IndexPlace) else None
+        if not isinstance(node, IndexPlace) or not isinstance(array, ArrayType) or isinstance(array, OpenArrayType):
             continue
-        if isinstance(node.base.type, OpenArrayType):
-            continue
-        for index, (low, high) in zip(node.indices, node.base.type.bounds, strict=True):
+        for index, (low, high) in zip(node.indices, array.bounds, strict=True):
             reached = (_index_at(index, loop.var.var, value) for value in certain)
             outside = next((n for n in reached if n is not None and not low <= n <= high), None)
             if outside is not None:
                 yield index.pos, f"the loop comes to the index {outside}, outside of {low}..{high}"
 
 
-def _values(loop: For) -> range:
-    """The values of the variable; none when they are not known."""
-    ends = [e.value for e in (loop.start, loop.stop, loop.step) if isinstance(e, Const) and isinstance(e.value, int)]
+def known_values(*limits: Expr) -> range:
+    """The values of a variable with this start, stop and step; none when they are not known."""
+    ends = [e.value for e in limits if isinstance(e, Const) and isinstance(e.value, int)]
     if len(ends) < 3 or ends[2] == 0:
         return range(0)
     first, stop, step = ends

@@ -13,7 +13,7 @@ from plctool.compiler.semantics.checker import Checker, checks_statement
 from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary, is_untyped
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.labels import Labels
-from plctool.compiler.semantics.loop_bounds import passed_bounds
+from plctool.compiler.semantics.loop_bounds import known_values, passed_bounds
 from plctool.compiler.semantics.pitfalls import has_exit
 from plctool.compiler.semantics.rules.jumps import note_loops, report_leaving, report_repeated
 from plctool.compiler.semantics.rules.places import changeable_place
@@ -301,12 +301,7 @@ def _report_never_run(c: Checker, node: ast.For, start: Expr, stop: Expr, step: 
 
 def _report_left_subrange(c: Checker, node: ast.For, t: SubrangeType, start: Expr, stop: Expr, step: Expr) -> None:
     """An end that is outside, when the loop comes to it for certain."""
-    first, last, by = (
-        e.value if isinstance(e, Const) and isinstance(e.value, int) else None for e in (start, stop, step)
-    )
-    if first is None or last is None or not by:
-        return
-    reached = range(first, last + (1 if by > 0 else -1), by)
+    reached = known_values(start, stop, step)
     if reached and not t.low <= reached[-1] <= t.high:
         c.error(node.stop.pos, "range", f"the loop counts to {reached[-1]}, outside of {t.name} ({t.low}..{t.high})")
 
