@@ -60,6 +60,7 @@ class Plant:
     plcrt: Plcrt
     plc: Plc
     other: Path
+    wire: Wire
     drive: Devices
     pump: Devices
 
@@ -78,7 +79,7 @@ def plant(tmp_path: Path) -> Iterator[Plant]:
         drive, pump = Devices([1], tcp=port), Devices([3], serial=wire.other, baud=38400)
         with drive, pump, Plcrt(tmp_path / "flash") as plcrt, plctool.connect(f"serial:{plcrt.port}") as plc:
             plc.flash(tmp_path / "main.cdl")
-            yield Plant(plcrt, plc, other / "other.cdl", drive, pump)
+            yield Plant(plcrt, plc, other / "other.cdl", wire, drive, pump)
 
 
 def registers(devices: Devices, unit: int, count: int) -> list[int]:
@@ -105,3 +106,12 @@ def test_devices_get_what_outputs_are_when_the_program_goes(plant: Plant, way: s
     WAYS[way](plant)
     eventually(lambda: registers(plant.drive, 1, 2) == [0, 1500])
     eventually(lambda: registers(plant.pump, 3, 1) == [7])
+
+
+def test_a_device_that_does_not_reply_holds_up_neither_the_end_nor_the_others(plant: Plant) -> None:
+    eventually(lambda: registers(plant.drive, 1, 1) == [1500] and registers(plant.pump, 3, 1) == [1500])
+    plant.wire.pulled = True
+    plant.plc.close()
+    assert plant.plcrt.stop() == 0
+    eventually(lambda: registers(plant.drive, 1, 1) == [0])
+    assert registers(plant.pump, 3, 1) == [1500]
