@@ -86,6 +86,14 @@ class Model:
         def replaced() -> None:
             self._assign(x, (t(y)[:k] + t(z) + t(y)[k + n :])[:LONGEST_RESULT])
 
+        def spliced(text: str, removed: int) -> None:
+            self._assign(x, (t(x)[:k] + text + t(x)[k + removed :])[:LONGEST_RESULT])
+
+        def put_in_after_a_change() -> None:  # of x itself, perhaps: IN1 is as it was
+            before = t(x)
+            self._assign(y, "changed")
+            self._assign(x, (before[:k] + "*" + before[k:])[:LONGEST_RESULT])
+
         def found() -> None:
             self._assign(x, str(t(y).find(literal) + 1 if literal else 0))
 
@@ -112,7 +120,15 @@ class Model:
                 (f"{x} := MID({y}, {n}, {k + 1});", lambda: self._assign(x, t(y)[k : k + n])),
                 (f"{x} := DELETE({x}, {n}, {k + 1});", lambda: self._assign(x, (t(x)[:k] + t(x)[k + n :])[:255])),
                 (f"{x} := DELETE({y}, {n}, {k + 1});", lambda: self._assign(x, (t(y)[:k] + t(y)[k + n :])[:255])),
-                (f"{x} := INSERT({x}, {y}, {k});", lambda: self._assign(x, (t(x)[:k] + t(y) + t(x)[k:])[:255])),
+                (f"{x} := DELETE({x}, {-n}, {k + 1});", lambda: spliced("", 0)),
+                (f"{x} := DELETE({x}, {n}, {-k});", lambda: self._assign(x, t(x)[n:][:LONGEST_RESULT])),
+                *[(f"{x} := INSERT({x}, {y}, {k});", lambda: spliced(t(y), 0))] * 2,
+                (f"{x} := INSERT({x}, '{literal}', {-k});", lambda: self._assign(x, (literal + t(x))[:255])),
+                (f"{x} := INSERT({x}, Change({y}), {k});", put_in_after_a_change),
+                (f"to_{x} := ADR({x}); {x} := INSERT({x}, to_{x}^, {k});", lambda: spliced(t(x), 0)),
+                *[(f"{x} := REPLACE({x}, {y}, {n}, {k + 1});", lambda: spliced(t(y), n))] * 2,
+                (f"{x} := REPLACE({x}, '{literal}', LEN({y}), {k + 1});", lambda: spliced(literal, len(t(y)))),
+                (f"{x} := REPLACE({x}, Twice({y}), {-n}, {k + 1});", lambda: spliced((t(y)[:80] * 2)[:9], 0)),
                 (f"to_{y} := ADR({y}); {x} := CONCAT({z}, to_{y}^);", lambda: self._assign(x, appended(z, y))),
                 (f"to_{x} := ADR({x}); {x} := CONCAT({z}, to_{x}^);", lambda: self._assign(x, appended(z, x))),
                 (f"to_{x} := ADR({x}); to_{x}^ := {y};", lambda: self._assign(x, t(y))),

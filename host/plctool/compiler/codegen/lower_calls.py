@@ -16,7 +16,7 @@ from plctool.compiler.codegen.lengths import (
 from plctool.compiler.codegen.lower_arith import convert, is_bool, to_bool
 from plctool.compiler.codegen.lower_frame import Body, Frame, Ref
 from plctool.compiler.codegen.lower_places import materialised
-from plctool.compiler.codegen.lower_string import append_string, copy_string, move_characters
+from plctool.compiler.codegen.lower_string import append_string, copy_string, least, move_characters
 from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import CONTEXT, parameter_types, returned_type, returned_variable
 from plctool.compiler.typed import (
@@ -61,14 +61,14 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
         arguments.append(f"ptr {frame.address(result)}")
         arguments += [f"i32 {_result_capacity(frame, pou, result)}"] if pou.cuts_result else []
     given = [
-        _operand(frame, pou, parameter, argument, write_back, e.args[n:])
+        operand(frame, pou, parameter, argument, write_back, e.args[n:])
         for n, (parameter, argument) in enumerate(zip(pou.parameters, e.args, strict=True), 1)
     ]
     if takes_lengths(pou) and all(frame.length(ref) for ref in given if isinstance(ref, Ref)):
         form = Form.MEASURED
-    for parameter, operand in zip(pou.parameters, given, strict=True):
+    for parameter, passed in zip(pou.parameters, given, strict=True):
         types = parameter_types(pou, parameter, form)
-        values = _values(frame, operand, form)
+        values = _values(frame, passed, form)
         arguments += [f"{text} {value}" for text, value in zip(types, values, strict=True)]
     known = frame.lengths() if _leaves_strings(frame, e) else {}
     length = _appended(frame, e, result, given)
@@ -105,7 +105,7 @@ def _without_scanning(frame: Frame, e: Call) -> Value | None:
         return _measured(frame, length)
     start, most = (frame.value(argument) for argument in e.args[-2:] if isinstance(argument, Expr))
     left = frame.fn.value(f"sub i32 {length}, {start}")
-    count = frame.fn.value(f"call i32 @llvm.umin.i32(i32 {left}, i32 {most})")
+    count = least(frame, left, most)
     if is_spanning(e.function):
         return frame.fn.value(f"add i32 {start}, {count}")
     target, position = e.args[:2]
@@ -115,10 +115,8 @@ def _without_scanning(frame: Frame, e: Call) -> Value | None:
 
 def _measured(frame: Frame, length: Value) -> Value:
     """What LEN gives."""
-    if length.constant is not None:
-        return number(min(length.constant, _LONGEST))
-    least = frame.fn.value(f"call i32 @llvm.umin.i32(i32 {length}, i32 {_LONGEST})")
-    return frame.fn.value(f"trunc i32 {least} to i16")
+    shown = least(frame, length, number(_LONGEST))
+    return shown if shown.constant is not None else frame.fn.value(f"trunc i32 {shown} to i16")
 
 
 def _appended(frame: Frame, e: Call, result: Ref | None, given: list[Operand]) -> Value | None:
@@ -145,9 +143,7 @@ def _result_capacity(frame: Frame, pou: Pou, result: Ref) -> Value:
     assert pou.result is not None
     assert isinstance(pou.result.type, StringType)
     declared = pou.result.type.length
-    if result.capacity.constant is not None:
-        return number(min(declared, result.capacity.constant))
-    return frame.fn.value(f"call i32 @llvm.umin.i32(i32 {declared}, i32 {result.capacity})")
+    return least(frame, result.capacity, number(declared))
 
 
 def _call_instruction(
@@ -168,7 +164,7 @@ def _call_instruction(
     return None
 
 
-def _operand(
+def operand(
     frame: Frame,
     pou: Pou,
     parameter: Parameter,
@@ -210,7 +206,11 @@ def lasting(frame: Frame, ref: Ref, *later: Expr | Place | None) -> Ref:
     """A string, array or structure as it is now: a copy, if what is worked out later may write variables and it is
     known how large it is."""
     parts = (part for node in later if node is not None for part in walk(node))
-    if is_scalar(ref.type) or isinstance(ref.type, OpenArrayType) or not any(_writes(frame, part) for part in parts):
+    if (
+        is_scalar(ref.type)
+        or isinstance(ref.type, OpenArrayType)
+        or not any(is_changing(frame, part) for part in parts)
+    ):
         return ref
     if not isinstance(ref.type, StringType):
         copy = frame.temporary(ref.type)
@@ -223,7 +223,7 @@ def lasting(frame: Frame, ref: Ref, *later: Expr | Place | None) -> Ref:
     return copy
 
 
-def _writes(frame: Frame, node: object) -> bool:
+def is_changing(frame: Frame, node: object) -> bool:
     """Whether it may change variables that are not its own."""
     if not isinstance(node, Call):
         return isinstance(node, AssignedValue)

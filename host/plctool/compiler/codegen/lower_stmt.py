@@ -10,6 +10,7 @@ from plctool.compiler.codegen.lower_calls import call_function
 from plctool.compiler.codegen.lower_expr import truth
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Body, Ref, rule
 from plctool.compiler.codegen.lower_init import initialise
+from plctool.compiler.codegen.lower_splice import may_splice, splice
 from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import SELF, result_in_memory
 from plctool.compiler.typed import (
@@ -52,6 +53,8 @@ def assign(frame: Body, s: Assign) -> None:
         frame.store(ref, value)
         if value.constant is not None and isinstance(target, VarPlace) and ref.pointer == SELF:
             _fill_word(frame, ref)
+    elif isinstance(s.value, Call) and _may_splice(frame, target, s.value):
+        splice(frame, frame.ref(target), s.value)
     elif isinstance(s.value, Call) and _may_write_directly(frame, target, s.value):
         call_function(frame, s.value, frame.ref(target))
     else:
@@ -79,6 +82,15 @@ def _may_write_directly(frame: Body, target: Place, call: Call) -> bool:
         call.args[1:] if pou.in_place and _is_whole(call.args[0], root) and _is_whole(target, root) else call.args
     )
     return root is not None and all(_is_apart(frame.pou, node, root) for node in walk(arguments))
+
+
+def _may_splice(frame: Body, target: Place, call: Call) -> bool:
+    """Whether a call changes a string that is its first argument, and is not read by the others."""
+    root = root_of(target)
+    if root is None or not (call.args and _is_whole(target, root) and _is_whole(call.args[0], root)):
+        return False
+    apart = all(_is_apart(frame.pou, node, root) for node in walk(call.args[1:]))
+    return apart and may_splice(frame, frame.ref(target), call)
 
 
 def _is_apart(pou: Pou | None, node: Node, target: Variable) -> bool:

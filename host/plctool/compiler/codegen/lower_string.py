@@ -34,7 +34,7 @@ def copy_string(frame: Frame, target: Ref, source: Ref) -> None:
         if length * _unit(target) <= (inline if known is None else min(inline, _SHORT_COPY)):
             frame.copy(target, source, length * _unit(target))
             _terminate(frame, target, length)
-            frame.note_length(target, None if known is None else _least(frame, known, length), lengths)
+            frame.note_length(target, None if known is None else least(frame, known, number(length)), lengths)
             return
     frame.note_length(target, append_string(frame, target, number(0), target.capacity, source), lengths)
 
@@ -54,16 +54,35 @@ def move_characters(frame: Frame, target: Ref, position: Value, source: Ref, sta
     return _copy(frame, "move", target, position, source, start, count)
 
 
+def splice_characters(frame: Frame, target: Ref, position: Value, text: Ref, start: Value, count: Value) -> Value:
+    """Puts all of `text`, whose length is known, into a string at `position`, and after it `count` characters of the
+    string itself from `start` on, which are there, and ends it there. Returns its new length."""
+    assert isinstance(target.type, StringType) and target.capacity.constant is not None
+    tail = frame.temporary(StringType(target.capacity.constant, target.type.wide))
+    frame.unit.helper(_helper("move", target))  # which the other one calls
+    arguments = [f"ptr {frame.address(target)}", f"i32 {target.capacity}", f"i32 {position}"]
+    arguments += [f"ptr {frame.address(text)}", f"i32 {text.capacity}", f"i32 {text.length}"]
+    arguments += [f"i32 {start}", f"i32 {count}", f"ptr {frame.address(tail)}"]
+    return frame.fn.call_value("i32", frame.unit.helper(_helper("splice", target)), ["ptr null", *arguments])
+
+
 def _copy(frame: Frame, helper: str, target: Ref, position: Value, source: Ref, start: Value, count: Value) -> Value:
     arguments = [f"ptr {frame.address(target)}", f"i32 {target.capacity}", f"i32 {position}"]
     arguments += [f"ptr {frame.address(source)}", f"i32 {source.capacity}", f"i32 {start}", f"i32 {count}"]
     return frame.fn.call_value("i32", frame.unit.helper(_helper(helper, target)), ["ptr null", *arguments])
 
 
-def _least(frame: Frame, one: Value, limit: int) -> Value:
-    if one.constant is not None:
-        return number(min(one.constant, limit))
-    return frame.fn.value(f"call i32 @llvm.umin.i32(i32 {one}, i32 {limit})")
+def span(frame: Frame, ref: Ref) -> Value:
+    """How many characters a string has, found by looking for its end."""
+    arguments = ["ptr null", f"ptr {frame.address(ref)}", f"i32 {ref.capacity}", "i32 0", f"i32 {ref.capacity}"]
+    return frame.fn.call_value("i32", frame.unit.helper(_helper("span", ref)), arguments)
+
+
+def least(frame: Frame, one: Value, other: Value) -> Value:
+    """The lower of two numbers of characters."""
+    if one.constant is not None and other.constant is not None:
+        return number(min(one.constant, other.constant))
+    return frame.fn.value(f"call i32 @llvm.umin.i32(i32 {one}, i32 {other})")
 
 
 def copy_literal(frame: Frame, target: Ref, text: str) -> None:

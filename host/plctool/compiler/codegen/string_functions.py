@@ -99,18 +99,35 @@ class _Strings:
     def marks(self, fn: Function, chunk: Value) -> Value:
         """Which characters of a chunk are NUL; of integers the lowest mark only is sure."""
         if self.target.vectors:
-            found = fn.value(f"icmp eq {self._chunk_type} {chunk}, zeroinitializer")
-            return fn.value(f"bitcast <{self.chunk} x i1> {found} to i{self.chunk}")
+            return self._like(fn, chunk, "zeroinitializer")
         ones, highs = (int.from_bytes(bytes([byte]) * self.chunk, "little") for byte in (0x01, 0x80))
         less = fn.value(f"sub {self._integer} {chunk}, {ones}")
         inverted = fn.value(f"xor {self._integer} {chunk}, -1")
         under = fn.value(f"and {self._integer} {less}, {inverted}")
         return fn.value(f"and {self._integer} {under}, {highs}")
 
-    def marks_of(self, fn: Function, chunk: Value, pattern: Value) -> Value:
-        """The first characters of a chunk that are NUL, or the one that the pattern is made of."""
-        other = fn.value(f"xor {self._chunk_type} {chunk}, {pattern}")
-        return fn.value(f"or {self._marks_type} {self.marks(fn, chunk)}, {self.marks(fn, other)}")
+    def marks_of(self, fn: Function, chunk: Value, first: Value | None = None, second: Value | None = None) -> Value:
+        """The first characters of a chunk that are NUL, or those that the pattern `first` is made of. Of a vector only
+        those that the character of `second` may follow, which is any if it is 0."""
+        ends = self.marks(fn, chunk)
+        if first is None:
+            return ends
+        if not self.target.vectors:
+            found = self.marks(fn, fn.value(f"xor {self._chunk_type} {chunk}, {first}"))
+        else:
+            found = self._like(fn, chunk, first)
+        if self.target.vectors and second is not None:
+            any_follows = self._like(fn, second, "zeroinitializer")
+            follow = fn.value(f"or {self._marks_type} {self._like(fn, chunk, second)}, {any_follows}")
+            before = fn.value(f"lshr {self._marks_type} {follow}, 1")
+            before = fn.value(f"or {self._marks_type} {before}, {1 << (self.chunk - 1)}")  # what follows the last one?
+            found = fn.value(f"and {self._marks_type} {found}, {before}")
+        return fn.value(f"or {self._marks_type} {ends}, {found}")
+
+    def _like(self, fn: Function, chunk: Value, other: Value | str) -> Value:
+        """Which characters of two vectors are the same."""
+        same = fn.value(f"icmp eq {self._chunk_type} {chunk}, {other}")
+        return fn.value(f"bitcast <{self.chunk} x i1> {same} to {self._marks_type}")
 
     def pattern(self, fn: Function, character: str) -> Value:
         """A chunk of one character."""
@@ -222,22 +239,23 @@ def _span(fn: Function, strings: _Strings) -> None:
 
 
 def _seek(fn: Function, strings: _Strings) -> None:
-    """SEEK__ of stdlib/strings.st: the index of the first character %c from `start` on, or of the end."""
+    """SEEK__ of stdlib/strings.st: the index of the first character %c from `start` on that %d may follow, or of the
+    end."""
     left = fn.value("sub i32 %cap, %start")
-    _scan(fn, strings, left, left, "%c")
+    _scan(fn, strings, left, left, ("%c", "%d"))
 
 
-def _scan(fn: Function, strings: _Strings, left: Value, count: Value, sought: str | None) -> None:
-    """Returns the index at most `count` of the `left` characters after `start`, of the end or a character `sought`."""
+def _scan(fn: Function, strings: _Strings, left: Value, count: Value, sought: tuple[str, str] | None) -> None:
+    """Returns the index at most `count` of the `left` characters after `start`, of the end or the first one `sought`,
+    which the second one may follow."""
     room = fn.value(f"add i32 {left}, 1")
     base = strings.at(fn, "%s", strings.index(fn, "%start"))
     start = None
     if strings.chunk:
-        pattern = None if sought is None else strings.pattern(fn, sought)
+        patterns = [strings.pattern(fn, character) for character in sought or ()]
 
         def marks(index: Value) -> Value:
-            chunk = strings.load_chunk(fn, strings.at(fn, base, index))
-            return strings.marks(fn, chunk) if pattern is None else strings.marks_of(fn, chunk, pattern)
+            return strings.marks_of(fn, strings.load_chunk(fn, strings.at(fn, base, index)), *patterns)
 
         start, length = _walk_chunks(fn, strings, room, count, marks)
         fn.terminate(f"ret i32 {fn.value(f'add i32 %start, {length}')}")
@@ -245,7 +263,7 @@ def _scan(fn: Function, strings: _Strings, left: Value, count: Value, sought: st
         fn.branch("loop")
     i, _, character = _walk_characters(fn, strings, base, count, start)
     if sought is not None:
-        fn.branch_if(fn.value(f"icmp eq {strings.character} {character}, {sought}"), "done", "other")
+        fn.branch_if(fn.value(f"icmp eq {strings.character} {character}, {sought[0]}"), "done", "other")
         fn.begin_detached("other")
     _next_character(fn, i)
     fn.begin_detached("done")
@@ -381,6 +399,32 @@ def _move_chunks(
     return after
 
 
+def _splice(fn: Function, strings: _Strings) -> None:
+    """Puts `len` characters of another string into one at `pos`, and after them `count` of its own from `start` on. In
+    %tail, which has room for them, they wait; a few of them in a vector, where there is room for one."""
+    move = "@str.wmove" if strings.wide else "@str.move"
+
+    def moved(target: str, pos: str | Value, source: str, cap: str, start: str, want: str) -> Value:
+        target, source = f"ptr {target}, i32 %dcap, i32 {pos}", f"ptr {source}, i32 {cap}, i32 {start}"
+        return fn.value(f"call i32 {move}(ptr null, {target}, {source}, i32 {want})")
+
+    if strings.chunk and strings.target.vectors:
+        inner = fn.value(f"call i32 @llvm.usub.sat.i32(i32 %dcap, i32 {strings.chunk - 2})")
+        put = fn.value("add i32 %pos, %len")
+        few = fn.value(f"icmp ult i32 %count, {strings.chunk}")
+        room = fn.value(f"icmp ult i32 {fn.value(f'call i32 @llvm.umax.i32(i32 %start, i32 {put})')}, {inner}")
+        fn.branch_if(fn.value(f"and i1 {few}, {room}"), "few", "many")
+        fn.begin_detached("few")
+        tail = strings.load_chunk(fn, strings.at(fn, "%d", strings.index(fn, Value("%start"))))
+        end = moved("%d", "%pos", "%s", "%scap", "0", "%len")
+        strings.store_chunk(fn, strings.cut(fn, tail, Value("%count")), strings.at(fn, "%d", strings.index(fn, end)))
+        fn.terminate(f"ret i32 {fn.value(f'add i32 {end}, %count')}")
+        fn.begin_detached("many")
+    moved("%tail", "0", "%d", "%dcap", "%start", "%count")
+    end = moved("%d", "%pos", "%s", "%scap", "0", "%len")
+    fn.terminate(f"ret i32 {moved('%d', end, '%tail', '%dcap', '0', '%count')}")
+
+
 # ---- comparing ----
 
 
@@ -441,11 +485,16 @@ def _compare(fn: Function, strings: _Strings) -> None:
     fn.terminate(f"ret i32 {fn.value(f'sub i32 {left}, {right}')}")
 
 
-_BODIES = {"str.span": _span, "str.seek": _seek, "str.copy": _copy, "str.move": _move, "str.compare": _compare}
+_BODIES = {
+    "str.span": _span, "str.seek": _seek, "str.copy": _copy, "str.move": _move, "str.splice": _splice,
+    "str.compare": _compare,
+}  # fmt: skip
 _PARAMETERS = {
     "str.span": "ptr %ctx, ptr %s, i32 %cap, i32 %start, i32 %want",
-    "str.seek": "ptr %ctx, ptr %s, i32 %cap, i32 %start, {character} %c",
+    "str.seek": "ptr %ctx, ptr %s, i32 %cap, i32 %start, {character} %c, {character} %d",
     "str.copy": "ptr %ctx, ptr %d, i32 %dcap, i32 %pos, ptr %s, i32 %scap, i32 %start, i32 %want",
     "str.move": "ptr %ctx, ptr %d, i32 %dcap, i32 %pos, ptr %s, i32 %scap, i32 %start, i32 %want",
+    "str.splice": "ptr %ctx, ptr %d, i32 %dcap, i32 %pos, ptr %s, i32 %scap, i32 %len, i32 %start, i32 %count, "
+    "ptr %tail",
     "str.compare": "ptr %a, i32 %acap, ptr %b, i32 %bcap",
 }
