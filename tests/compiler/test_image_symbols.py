@@ -90,7 +90,7 @@ def table() -> SymbolTable:
         CodeUnit("Node", 0, 0, "a.st", 5, ["Swap"]),
         CodeUnit("Other", 116, 20, "b.st", 1),
     ]
-    lines = [(0, -1, 0), (16, 0, 11), (20, 0, 4), (24, 0, 0), (40, 0, 12), (116, 1, 3), (136, -1, 0)]
+    lines = [(0, -1, 0), (16, 0, 11), (20, 0, 4), (24, 0, 0), (40, 0, 12), (116, 1, 3), (130, 1, 0), (136, -1, 0)]
     return SymbolTable(
         0xCAFE, "x86_64-linux", "demo", ["task"], symbols, units, lines, ["a.st", "b.st"],
         {"x": "GVL.x", "gone": "GVL.gone"}, {"Motor": 1, "Pump": 2},
@@ -351,9 +351,10 @@ def test_symbols_of_another_image_are_refused(tmp_path: Path, monkeypatch: pytes
         (16, SourceLine("Main", "a.st", 11)),
         (19, SourceLine("Main", "a.st", 11)),
         (20, SourceLine("Fb", "a.st", 4)),  # inlined into Main
-        (30, SourceLine("Fb", "a.st", 4)),  # without a line of its own
+        (30, SourceLine("Main", "a.st", 12)),  # without a line of its own
         (100, SourceLine("Main", "a.st", 12)),
         (120, SourceLine("Other", "b.st", 3)),
+        (132, SourceLine("Other", "b.st", 3)),  # nor is there one after it
         (5, None),
         (140, None),
     ],

@@ -196,14 +196,26 @@ class SymbolTable:
     def address_to_line(self, code_offset: int) -> SourceLine | None:
         """The source line of a code offset; None when it is not the program's own code."""
         unit = next((u for u in self.pous if u.offset <= code_offset < u.offset + u.size), None)
-        i = bisect_right(self.lines, (code_offset, 1 << 30, 0)) - 1
-        first = unit.offset if unit else code_offset
-        while i >= 0 and self.lines[i][2] == 0 and self.lines[i][0] > first:
-            i -= 1  # code without a line of its own belongs to what comes before it
+        i = self._row_of(code_offset, unit)
         if i < 0 or self.lines[i][1] < 0:
             return SourceLine(unit.name, unit.file, unit.line) if unit else None
         _, file_index, line = self.lines[i]
         return SourceLine(self._pou_at(self.files[file_index], line, unit), self.files[file_index], line)
+
+    def _row_of(self, code_offset: int, unit: CodeUnit | None) -> int:
+        """The row of the line table. Code without a line of its own, such as what is loaded again at the beginning of
+        a loop, belongs to what comes after it in the unit; at the end to what comes before."""
+        i = bisect_right(self.lines, (code_offset, 1 << 30, 0)) - 1
+        first, end = (unit.offset, unit.offset + unit.size) if unit else (code_offset, code_offset)
+        if i < 0 or self.lines[i][1] < 0 or self.lines[i][2]:
+            return i
+        rows = range(i + 1, len(self.lines))
+        after = next((n for n in rows if self.lines[n][2] or self.lines[n][1] < 0), i)
+        if self.lines[after][2] and self.lines[after][0] < end:
+            return after
+        while i >= 0 and self.lines[i][2] == 0 and self.lines[i][0] > first:
+            i -= 1
+        return i
 
     def call_stack(self, code_offset: int | None, trace: Trace) -> list[SourceLine]:
         """Where the program was at a code offset (None: not in its own code), and the calls that led there, the
