@@ -24,7 +24,7 @@ from plctool.gateway.place import NoGateway
 from plctool.iec.types import Type
 from plctool.iec.values import decode, encode
 from plctool.link import file_services, io_services, services
-from plctool.link.connection import SCAN_SECONDS, Choice, Connection, MessageLink, no_answer
+from plctool.link.connection import SCAN_SECONDS, Choice, Connection, MessageLink, no_answer, patience_factor
 from plctool.link.file_services import SYMBOLS_NAME, FileList, Progress
 from plctool.link.io_services import IoDevice, IoModule
 from plctool.link.monitoring import APP_CHANGED, AreaRange, Contents, Write, read_memory, write_memory
@@ -69,10 +69,11 @@ def _asking(password: str | AskPassword | None) -> AskPassword:
 def scan(
     link: str | Link, seconds: float = SCAN_SECONDS, *, gateway: bool | None = None, tool: str | None = None
 ) -> list[Node]:
-    """The controllers that answer on a link within `seconds`. Raises LinkError when there are none."""
+    """The controllers that answer on a link within `seconds`, times PLCTOOL_PATIENCE. Raises LinkError when there are
+    none."""
     connection = _open_link(link, gateway, tool, no_password)
     try:
-        nodes = connection.scan(seconds)
+        nodes = connection.scan(patience_factor() * seconds)
         if not nodes:
             raise no_answer(connection.name)
         return nodes

@@ -22,11 +22,13 @@ from fake_device import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from plctool import device
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError
 from plctool.link import bintag, file_services, l7, monitoring, services
 from plctool.link.connection import Connection
 from plctool.link.monitoring import AreaRange, Write
+from plctool.link.names import Node
 from plctool.link.services import AppException, AppState
 from plctool.link.session import Request, Session
 
@@ -179,6 +181,18 @@ def test_a_scan_finds_the_device() -> None:
     assert (node.node_name, node.device_name, node.vendor_name) == (NODE_NAME, DEVICE_NAME, VENDOR_NAME)
     assert (node.serial_number, node.version, node.address_text) == (SERIAL, "1.2.3.4", "0001")
     assert node.target_id == lib.TARGET_ID_CORTEX_M3
+
+
+def test_a_scan_waits_as_many_times_as_long_as_patience_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    def scan() -> list[Node]:
+        slow = Connection(FakeLine(FakeDevice(), latency=1.0))
+        monkeypatch.setattr(device, "_open_link", lambda *_: slow)
+        return device.scan("serial:slow")
+
+    with pytest.raises(LinkError, match="No device answers"):
+        scan()
+    monkeypatch.setenv("PLCTOOL_PATIENCE", "3")
+    assert [node.node_name for node in scan()] == [NODE_NAME]
 
 
 def test_identity() -> None:
