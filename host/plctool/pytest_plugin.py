@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from plctool.st_tests import TestProgram
     from plctool.st_tests.report import Failure
 
-_TEST = re.compile(rb"^\s*TEST\s+['\"]", re.IGNORECASE | re.MULTILINE)
+_WORD = re.compile(rb"T\0?E\0?S\0?T", re.IGNORECASE)
+_TEST = re.compile(r"^(?:\s|\{[^}]*\})*TEST\s*['\"]", re.IGNORECASE | re.MULTILINE)
 _PROGRAMS: pytest.StashKey[dict[tuple[Path, ...], TestProgram]] = pytest.StashKey()
 _PROJECTS: pytest.StashKey[dict[Path, ProgramFiles]] = pytest.StashKey()
 
@@ -33,9 +34,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """A file of Structured Text with a TEST in it; only this is looked for, so that other files cost nothing."""
-    if file_path.suffix.lower() == ".st" and _TEST.search(file_path.read_bytes()):
+    if file_path.suffix.lower() == ".st" and _has_test(file_path.read_bytes()):
         return StFile.from_parent(parent, path=file_path)
     return None
+
+
+def _has_test(data: bytes) -> bool:
+    if not _WORD.search(data):
+        return False
+    from plctool.compiler.source_files import decode
+
+    return _TEST.search(decode(data)) is not None
 
 
 class StFile(pytest.File):
@@ -52,16 +61,25 @@ class StFile(pytest.File):
 
     def _program(self) -> TestProgram:
         """Each program is checked and compiled once."""
+        from plctool.compiler import program_files
         from plctool.st_tests import TestProgram
 
-        sources = tuple(self.config.getini("plc_sources")) or (self._project() or self.path.parent,)
+        sources = tuple(self.config.getini("plc_sources")) or self._sources()
         programs = self.config.stash.setdefault(_PROGRAMS, {})
         if sources not in programs:
-            projects = self.config.stash.setdefault(_PROJECTS, {})
-            files = projects.get(sources[0])
-            dialect = files.project.dialect if files and files.project else None
-            programs[sources] = TestProgram(files or sources, dialect=dialect)
+            files = self.config.stash.setdefault(_PROJECTS, {}).get(sources[0]) or program_files(sources)
+            programs[sources] = TestProgram(files, dialect=files.project.dialect if files.project else None)
         return programs[sources]
+
+    def _sources(self) -> tuple[Path, ...]:
+        """The project of this file, or all sources of its folder, which may have the project of others."""
+        from plctool.compiler.source_files import find_sources
+        from plctool.project import PROJECT_FILE
+
+        folder = self.path.parent
+        if project := self._project():
+            return (project,)
+        return tuple(find_sources(folder)) if (folder / PROJECT_FILE).exists() else (folder,)
 
     def _project(self) -> Path | None:
         """The project file of the nearest folder that has one, if this file is one of its sources. It is read once."""

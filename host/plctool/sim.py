@@ -368,18 +368,25 @@ class Simulator(Controller):
         return Contents([self._content(symbol) for symbol in symbols], consistent=True)
 
     def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> None:
+        for symbol, _ in changes:
+            self._writable(symbol)  # all or none are written
         for symbol, change in changes:
-            place = self._place(symbol)
-            symbol.check_writable(symbol.area if place is None else place[0])
-            memory = self._memory(symbol)
-            if memory is None:
-                raise unreachable(symbol, self._content)
+            memory = self._writable(symbol)
             part = slice(change.offset, change.offset + len(change.data))
             both = zip(change.data, memory[part], strict=True)
             memory[part] = bytes(new & change.mask | old & ~change.mask for new, old in both)
             if is_input(symbol) and table.io:
                 first = symbol.offset * 8 + (symbol.bit or 0)
                 self.follow_inputs(first, first + (1 if symbol.bit is not None else symbol.size * 8))
+
+    def _writable(self, symbol: Symbol) -> Any:
+        """Its memory. Raises DeviceError if a pointer leads to none, UsageError if it is a constant."""
+        place = self._place(symbol)
+        symbol.check_writable(symbol.area if place is None else place[0])
+        memory = self._memory(symbol)
+        if memory is None:
+            raise unreachable(symbol, self._content)
+        return memory
 
     def follow_inputs(self, first_bit: int, end_bit: int) -> None:
         """These bits of the inputs were written: the devices measure that from now on."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -33,7 +34,11 @@ class PlantProgram:
         self._symbols = symbols
         self._names: dict[str, tuple[bool, str]] | None = None  # by channel: whether it is an output, and the variable
         self._now_ns = 0
-        interval_us = self._ask({"image": image.hex(), "symbols": symbols.to_json()})["interval_us"]
+        try:
+            interval_us = self._ask({"image": image.hex(), "symbols": symbols.to_json()})["interval_us"]
+        except BaseException:
+            self.close()
+            raise
         self.every_ms = interval_us / 1000
 
     @classmethod
@@ -51,7 +56,8 @@ class PlantProgram:
     def close(self) -> None:
         """Ends its process; harmless when repeated."""
         if self._process.stdin and self._process.stdout:
-            self._process.stdin.close()
+            with suppress(BrokenPipeError):  # it has ended, and a request is left
+                self._process.stdin.close()
             self._process.wait(timeout=10)
             self._process.stdout.close()
 
@@ -73,7 +79,7 @@ class PlantProgram:
         for name, symbol in self._symbols.variables.items():
             own.setdefault((_last(name), isinstance(symbol.type, StructType)), name)
         found = {}
-        for c in plc.io.channels:
+        for c in (c for c in plc.io.channels if c.enabled):
             name, whole = _last(c.name), isinstance(c.symbol.type, StructType)
             variable = own.get((f"{c.device}_{name}".casefold(), whole)) or own.get((name, whole))
             if variable is not None:

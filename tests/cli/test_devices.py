@@ -408,6 +408,14 @@ def test_an_option_of_another_kind_of_link_exits_2(tool: Any) -> None:
     assert (done.status, done.err) == (2, "plctool: A tcp link has no option 'baud'; it has none.\n")
 
 
+@pytest.mark.parametrize("name", ["place", "scheme"])
+def test_what_is_no_option_of_a_link_exits_2(tool: Any, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.setenv("PLC_LINK", f"tcp:localhost?{name}=x")
+    done = tool("status")
+    assert done.status == 2
+    assert f"A tcp link has no option '{name}'; it has none." in done.err
+
+
 @pytest.fixture
 def opened(plc: FakePlc, serial_opened_by: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The serial links that are opened."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -86,6 +87,14 @@ def test_a_password_file_that_cannot_be_used(
         (scratch / "password").write_bytes(content)
     done = tool("status", *PORT, "--password-file", "password")
     assert done.status == 2 and words in done.err
+
+
+def test_a_password_in_the_environment_that_is_no_text(
+    tool: Any, locked: FakePlc, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PLC_PASSWORD", os.fsdecode(b"schl\xfcssel"))
+    done = tool("status", *PORT)
+    assert done.status == 2 and "The password is not UTF-8" in done.err
 
 
 def test_without_a_terminal_the_error_says_what_to_do(tool: Any, locked: FakePlc) -> None:

@@ -83,3 +83,49 @@ def test_program_of_a_test_is_the_project_that_has_it(tmp_path: Path, template: 
     new_project(tmp_path / "pump", template)
     done = run_pytest(tmp_path)
     assert "1 passed" in done.stdout, done.stdout
+
+
+PROJECT = "sources = ['src']\n[options]\ndialect = 'codesys'\n"
+LIMIT = """TEST 'limit of a FOR is looked at each time'
+VAR i, n, k : INT; END_VAR
+n := 3;
+FOR i := 1 TO n DO n := 5; k := k + 1; END_FOR
+ASSERT_EQ(k, 5);
+END_TEST
+"""
+
+
+@pytest.fixture
+def pump(scratch: Path) -> Path:
+    """A folder with a project, whose sources are in a folder of their own."""
+    (scratch / "src").mkdir()
+    (scratch / "plc.toml").write_text(PROJECT)
+    (scratch / "src" / "main.st").write_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\n" + LIMIT)
+    return scratch
+
+
+def test_a_file_beside_the_project_that_is_none_of_its_sources_is_collected(pump: Path) -> None:
+    (pump / "smoke.st").write_text("TEST 'smoke' ASSERT_EQ(1, 1); END_TEST\n")
+    assert "2 passed" in run_pytest(pump).stdout
+
+
+@pytest.mark.parametrize("named", ["", "plc_sources = ."])
+def test_the_dialect_is_that_of_the_project(pump: Path, named: str) -> None:
+    (pump / "pytest.ini").write_text(f"[pytest]\n{named}\n")
+    done = run_pytest(pump)
+    assert "1 passed" in done.stdout, done.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        ("TEST 'a' ASSERT_EQ(1, 1); END_TEST", "utf-8-sig"),
+        ("TEST 'a' ASSERT_EQ(1, 1); END_TEST", "utf-16"),
+        ("{warning 'none'} TEST 'a' ASSERT_EQ(1, 1); END_TEST", "utf-8"),
+        ("test'a' ASSERT_EQ(1, 1); END_TEST", "utf-8"),
+    ],
+)
+def test_a_test_is_found_however_it_is_written(scratch: Path, text: str, encoding: str) -> None:
+    (scratch / "only.st").write_text(text, encoding)
+    done = run_pytest(scratch)
+    assert "1 passed" in done.stdout, done.stdout

@@ -240,6 +240,14 @@ def test_teardown_runs_after_a_failure_which_stays_the_one_that_counts(tool: Too
     assert failure(tool, "", before)["message"] == "teardown"
 
 
+def test_each_test_starts_on_fresh_variables_whatever_is_kept_on_a_device(tool: Tool) -> None:
+    kept = "VAR_GLOBAL PERSISTENT p : INT := 1; END_VAR VAR_GLOBAL RETAIN r : INT := 2; END_VAR\n"
+    same = "ASSERT_EQ(p, 1); ASSERT_EQ(r, 2); p := 5; r := 6;"
+    path = write(f"{kept}TEST 'first'\n{same}\nEND_TEST\nTEST 'second'\n{same}\nEND_TEST\n")
+    done = tool("test", str(path))
+    assert done.status == 0, done.out
+
+
 def test_setup_belongs_to_its_file(tool: Tool) -> None:
     write("SETUP VAR x : INT; END_VAR END_SETUP TEST 'a' ASSERT_EQ(x, 0); END_TEST", "a.st")
     write("TEST 'b' ASSERT_EQ(x, 0); END_TEST", "b.st")

@@ -85,7 +85,14 @@ class Served:
     def guest(self, **hello: Any) -> Pipe:
         """What has a socket and may do anything with it. It says hello unless `hello` is None."""
         pipe = self.stranger()
-        document = {"protocol": PROTOCOL, "baud": BAUD, "pid": os.getpid(), "tool": "a guest", **hello}
+        document = {
+            "protocol": PROTOCOL,
+            "scheme": "serial",
+            "baud": BAUD,
+            "pid": os.getpid(),
+            "tool": "a guest",
+            **hello,
+        }
         pipe.send(document_frame(Kind.HELLO, 1, document), PATIENCE)
         assert pipe.receive(PATIENCE).kind is Kind.DONE
         return pipe

@@ -16,7 +16,8 @@ from plctool.gateway.frames import MAX_PAYLOAD, PROTOCOL, Frame, Kind, Pipe, Req
 
 Eventually = Callable[[Callable[[], Any]], Any]
 
-HELLO = encode(document_frame(Kind.HELLO, 1, {"protocol": PROTOCOL, "baud": BAUD, "tool": "bad", "pid": 1}))
+SAID = {"protocol": PROTOCOL, "scheme": "serial", "baud": BAUD, "tool": "bad", "pid": 1}
+HELLO = encode(document_frame(Kind.HELLO, 1, SAID))
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=9), inner, max_size=3),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from served import BAUD, PATIENCE, Gate, Served
+from served import BAUD, PATIENCE, PORT, Gate, Served
 
 from plctool.errors import LinkError
 from plctool.gateway import server
@@ -121,7 +121,7 @@ def test_it_ends_though_a_request_is_under_way(
 def hello(served: Served, **said: Any) -> None:
     pipe = connect(served.place)
     assert pipe
-    greet(pipe, served.place, {"baud": BAUD, "tool": "x", **said}, PATIENCE)
+    greet(pipe, served.place, {"scheme": "serial", "baud": BAUD, "tool": "x", **said}, PATIENCE)
 
 
 def test_another_baud_rate_is_refused_in_words_while_there_are_tools(served: Served) -> None:
@@ -132,6 +132,14 @@ def test_another_baud_rate_is_refused_in_words_while_there_are_tools(served: Ser
     assert watching.read("Main.count") == 0
 
 
+def test_another_kind_of_link_on_the_line_is_refused_in_words_while_there_are_tools(served: Served) -> None:
+    watching = served.connect("plctool watch Main.x")
+    with pytest.raises(LinkError, match=rf"in use as --port {PORT} by plctool watch Main.x \(pid") as e:
+        hello(served, scheme="modbus", unit=3)
+    assert e.value.code == "other-scheme"
+    assert watching.read("Main.count") == 0
+
+
 def test_another_version_is_refused_in_words_while_there_are_tools(served: Served) -> None:
     watching = served.connect("plctool watch Main.x")
     with pytest.raises(LinkError, match=r"is of another plctool.*serves plctool watch Main.x.*plctool gateway stop"):
@@ -139,7 +147,7 @@ def test_another_version_is_refused_in_words_while_there_are_tools(served: Serve
     assert watching.read("Main.count") == 0
 
 
-@pytest.mark.parametrize("said", [{"protocol": 99}, {"baud": 9600}, {"baud": None}])
+@pytest.mark.parametrize("said", [{"protocol": 99}, {"scheme": "modbus"}, {"baud": 9600}, {"baud": None}])
 def test_without_tools_it_makes_room_for_one_that_does_not_fit(
     served: Served, said: dict[str, Any], eventually: Eventually
 ) -> None:

@@ -47,6 +47,30 @@ def test_controller_keeps_the_level_of_the_plant(tmp_path: Path) -> None:
     assert min(levels[10:]) == pytest.approx(30, abs=3)
 
 
+def test_a_device_that_is_not_enabled_is_no_concern_of_the_plant(tmp_path: Path) -> None:
+    spare = "[[sim]]\nname = 'Spare'\nenabled = false\nin = { level = 'Main.other' }\n"
+    text = PROGRAM.replace("pump : BOOL;", "other : REAL; pump : BOOL;")
+    built = build(tmp_path, text, DESCRIPTION + spare)
+    with plant(tmp_path, PLANT) as tank, Simulator(built.image, built.symbols) as plc:
+        plc.attach(tank, tank.every_ms)
+        plc.run_for(200)
+        assert plc.read("Main.other") == 0.0
+        assert plc.read("Main.level") > 20.0
+
+
+def test_a_plant_that_is_killed_is_told_of(tmp_path: Path) -> None:
+    built = build(tmp_path, PROGRAM, DESCRIPTION)
+    with (
+        pytest.raises(DeviceError, match="The plant failed: its process ended"),
+        plant(tmp_path, PLANT) as tank,
+        Simulator(built.image, built.symbols) as plc,
+    ):
+        plc.attach(tank, tank.every_ms)
+        tank._process.kill()
+        tank._process.wait()
+        plc.run_for(200)
+
+
 MODBUS = """\
 [[modbus.tcp]]
 host = "127.0.0.1"

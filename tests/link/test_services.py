@@ -414,6 +414,20 @@ def test_long_values_through_pointers_are_read_in_pieces() -> None:
     assert contents.values == [bytes(bench.plc.memory[1][104:2104])]
 
 
+@pytest.mark.parametrize("hops", [(), (4,)])
+@pytest.mark.parametrize("offset", [0, 65_000])
+def test_values_longer_than_a_message_are_written_in_parts(offset: int, hops: tuple[int, ...]) -> None:
+    bench = Bench(buffer_size=232)
+    bench.plc.memory[1][0:8] = pointer(0, offset)
+    value = bytes(n % 251 for n in range(1500))
+    where = AreaRange(1, 0, 1500, hops) if hops else AreaRange(0, offset, 1500)
+    monitoring.write_memory(bench.session, bench.crc, [Write(AreaRange(2, 0, 1), b"\x07"), Write(where, value)])
+    begin = offset + sum(hops)
+    assert bench.plc.memory[0][begin : begin + 1500] == value
+    assert bench.plc.memory[0][begin + 1500 : begin + 1600] == bytes(100)
+    assert bench.plc.memory[2][0] == 7
+
+
 def test_values_are_written_through_pointers() -> None:
     bench = Bench()
     bench.plc.memory[0][0:8] = pointer(1, 100)

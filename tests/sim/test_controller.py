@@ -206,10 +206,12 @@ def test_what_cannot_be_written_is_refused_before_anything_is(
 
 
 def test_a_pointer_to_nothing_is_an_error_and_to_a_variable_is_followed(plc: Controller) -> None:
-    for action in (lambda: plc.read("Main.to_point^.x"), lambda: plc.write({"Main.to_point^.x": 1})):
+    to_nothing = {"Main.name": "no", "Main.to_point^.x": 1}
+    for action in (lambda: plc.read("Main.to_point^.x"), lambda: plc.write(to_nothing)):
         with pytest.raises(DeviceError) as caught:
             action()
         assert caught.value.code == "null"
+    assert plc.read("Main.name") == ""
     plc.write({"Main.leads": True})
     let_pass(plc)
     plc.write({"Main.to_point^.x": 11})

@@ -57,20 +57,23 @@ class BuildResult:
         write_atomically(path, self.image)
 
 
-def build_program(program: TypedProgram, options: Options, info: ApplicationInfo | None = None) -> BuildResult:
-    """Compiles a checked program. Raises UsageError when the target cannot run it."""
+def build_program(
+    program: TypedProgram, options: Options, info: ApplicationInfo | None = None, *, keeps: bool = True
+) -> BuildResult:
+    """Compiles a checked program. `keeps`: whether RETAIN and PERSISTENT variables outlive a start. Raises UsageError
+    when the target cannot run it."""
     with no_collection():
-        return _build(program, options, info or ApplicationInfo())
+        return _build(program, options, info or ApplicationInfo(), keeps)
 
 
-def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> BuildResult:
+def _build(program: TypedProgram, options: Options, info: ApplicationInfo, keeps: bool) -> BuildResult:
     target = options.target
     with room_for_nesting():
         lowered = lower(program, options)
     objects = emit_objects(lowered.parts, options)
     linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], lowered.imports)
     symbols = _symbols(program, lowered, linked, target, info.project)
-    kept = kept_parts(v for v in program.globals if v.area is Area.RETAIN)
+    kept = kept_parts(v for v in program.globals if keeps and v.area is Area.RETAIN)
     code, io = linked.code, None
     if program.io is not None and program.io.connectors:
         assign_tasks(program, program.io)

@@ -69,7 +69,7 @@ def _attach(link: Link, words: str) -> tuple[Place, Pipe]:
         place = find_place(link.place)
         try:
             pipe = connect(place) or _start_once(place, link)
-            greet(pipe, place, {**link.options, "tool": words})
+            greet(pipe, place, {"scheme": link.scheme, **link.options, "tool": words})
             return place, pipe
         except Ended:
             if time.monotonic() >= end:

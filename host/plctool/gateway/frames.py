@@ -24,7 +24,7 @@ from plctool.link.channel import MAX_REQUESTS
 BUSY = "downloading"  # code of the error while another tool keeps the device to itself
 ENDING = "gateway-ending"  # code of a refusal: the gateway ends, and another one may be started
 LOST = "link-lost"  # code of the error when the line is gone, and the gateway ends with it
-PROTOCOL = 3  # of the gateway; a tool and a gateway work together when theirs are equal
+PROTOCOL = 4  # of the gateway; a tool and a gateway work together when theirs are equal
 AHEAD = MAX_REQUESTS + 1  # messages of a stream that the gateway may have: one waits there for its time
 MAX_PAYLOAD = 0x8000  # bytes; the longest message of the link with its head, or the longest list of tools, fits
 _HEAD = struct.Struct("<IBI")

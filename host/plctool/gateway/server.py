@@ -38,7 +38,7 @@ from plctool.gateway.frames import (
 from plctool.gateway.shared import CLAIM_SILENCE, SharedDevice, Tool
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import Connection
-from plctool.link.transports import Link
+from plctool.link.transports import TRANSPORTS, Link
 from plctool.version import plctool_version
 
 MAX_TOOLS = 32
@@ -57,7 +57,7 @@ class Gateway:
 
     def __init__(self, connection: Connection, listener: socket.socket, *, link: Link, idle: float) -> None:
         self.line = connection.name
-        self.options = link.options
+        self.scheme, self.options = link.scheme, link.options
         self.device = SharedDevice(connection)
         self._listener = listener
         self._idle = idle
@@ -156,6 +156,9 @@ class Gateway:
                 f"serves {users}; end that first, or the gateway with 'plctool gateway stop'.",
                 "gateway-version",
             )
+        if hello.get("scheme") != self.scheme:
+            flag = f"--{TRANSPORTS[self.scheme].flag} {self.line}"
+            return LinkError(f"{self.line} is in use as {flag} by {users}; say that, or end it first.", "other-scheme")
         for name, value in self.options.items():
             if hello.get(name) != value:
                 return LinkError(

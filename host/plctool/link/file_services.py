@@ -134,8 +134,11 @@ def delete_file(session: Session, name: str) -> None:
     _check_name(name)
     look(session)
     named = bintag.text(lib.TAG_FILE_NAME, name)
-    reply = session.recover(partial(_call, session, lib.SRV_FILE_DELETE, named, patience=SLOW_PATIENCE))
-    _check(reply, f"deleting of {name}")
+
+    def delete() -> None:
+        _check(_call(session, lib.SRV_FILE_DELETE, named, patience=SLOW_PATIENCE), f"deleting of {name}")
+
+    session.finish(delete, lib.ERR_NO_OBJECT)
 
 
 def _check_name(name: str) -> None:

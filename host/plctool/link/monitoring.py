@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -16,6 +16,7 @@ from plctool.link.wire import Layout
 APP_CHANGED = "app-changed"  # code of the error when the application is not the one of the symbols
 _VALUE_HEAD = Layout("MON2_VALUE")  # before each value
 _APPLICATION = Layout("MON2_APPLICATION")
+_FAR = 0x10000  # offsets from here on take 32 bits
 _MESSAGE_OVERHEAD = 96  # layer 7 header, application tag and list heads, bytes
 _TRIES = 5  # to read values while no task runs
 _ALL_BITS = 0xFF
@@ -120,7 +121,7 @@ def _address_code(where: AreaRange) -> bytes:
 
 
 def _load(value: int) -> bytes:
-    if value < 0x10000:
+    if value < _FAR:
         return struct.pack("<BH", lib.MON2_OP_LD16, value)
     return struct.pack("<BI", lib.MON2_OP_LD32, value)
 
@@ -171,14 +172,16 @@ class Write:
 
 
 def write_memory(session: Session, image_crc: int, values: Sequence[Write]) -> None:
-    """Writes all values, in one request if they fit, to the application with this CRC.
+    """Writes all values, in one request if they fit, to the application with this CRC; in parts what is too long for
+    one.
 
     Not repeated when it is unknown whether they were written.
     """
     session.recover(session.application)
     room = session.connection.buffer_size - _MESSAGE_OVERHEAD
     message = b""
-    for index, write in enumerate(values):
+    parts = (part for value in values for part in _parts(value, room))
+    for index, write in enumerate(parts):
         code = _address_code(write.where)
         if write.mask != _ALL_BITS:
             code += bytes([lib.MON2_OP_MASK, write.mask])
@@ -189,6 +192,18 @@ def write_memory(session: Session, image_crc: int, values: Sequence[Write]) -> N
         message += entry
     if message:
         _write_batch(session, image_crc, message)
+
+
+def _parts(write: Write, room: int) -> Iterator[Write]:
+    """A value in parts that fit a request."""
+    further = len(_load(_FAR)) - len(_load(0))  # an offset may need a longer code
+    most = room - _VALUE_HEAD.size - struct.calcsize("<H") - len(_address_code(write.where)) - further
+    if len(write.value) <= most:
+        yield write
+        return
+    for at in range(0, len(write.value), most):
+        value = write.value[at : at + most]
+        yield Write(write.where.part(at, len(value)), value, write.mask)
 
 
 def _write_batch(session: Session, image_crc: int, entries: bytes) -> None:

@@ -97,5 +97,8 @@ def _client_key(password: str, salt: bytes, iterations: int) -> bytes:
 
 
 def _bytes(password: str) -> bytes:
-    """However a keyboard composes its characters."""
-    return unicodedata.normalize("NFKC", password).encode()
+    """However a keyboard composes its characters. Raises UsageError for what is no text."""
+    try:
+        return unicodedata.normalize("NFKC", password).encode()
+    except UnicodeEncodeError:
+        raise UsageError("The password is not UTF-8; set it in a terminal with UTF-8.", "bad-password") from None

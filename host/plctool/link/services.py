@@ -290,7 +290,8 @@ def reset(session: Session, option: int) -> None:
     """`option` is RESET_OPTION_*; origin deletes the application."""
     look(session)
     which = bintag.u32(lib.TAG_APP_OPTION, option)
-    _check_control(session.recover(partial(_control, session, lib.SRV_APP_RESET, which)), "reset")
+    done = lib.ERR_APP_NOT_EXIST if option == lib.RESET_OPTION_ORIGIN else lib.ERR_OK
+    session.finish(lambda: _check_control(_control(session, lib.SRV_APP_RESET, which), "reset"), done)
     session.forget_application()
 
 
@@ -487,13 +488,17 @@ class _Transfer:
 def run_shell(session: Session, command: str) -> str:
     """The answer of a device to a command of its PLC shell. Raises DeviceError when it has none, or refuses it."""
     answer, block = "", 0
-    while True:
+
+    def ask() -> bintag.Tags:
         content = [
             bintag.u32(lib.TAG_SHELL_SESSION, session.ensure()),
             bintag.u32(lib.TAG_SHELL_BLOCK, block),
             bintag.text(lib.TAG_SHELL_COMMAND, command),
         ]
-        tags = session.call(lib.SG_PLCSHELL, lib.SRV_SHELL_EXECUTE, content)
+        return session.call(lib.SG_PLCSHELL, lib.SRV_SHELL_EXECUTE, content)
+
+    while True:
+        tags = session.recover(ask, repeatable=False)  # it may do something
         parts = tags.containers(lib.TAG_SHELL_PART)
         last = parts or tags.containers(lib.TAG_SHELL_LAST)
         text = "".join(part.text(lib.TAG_SHELL_TEXT) for part in last)

@@ -174,6 +174,22 @@ class Session:
                     raise
         raise AssertionError("the last try returns or raises")
 
+    def finish(self, action: Callable[[], None], done: int) -> None:
+        """Runs `action`, also again as `recover` does. A repetition that the device refuses with the result `done`
+        finds that it was carried out, and only its reply was lost."""
+        tries = 0
+
+        def attempt() -> None:
+            nonlocal tries
+            tries += 1
+            try:
+                action()
+            except DeviceError as error:
+                if tries == 1 or error.result != done:
+                    raise
+
+        self.recover(attempt)
+
     def _exchange(self, request: l7.Message, patience: float, more: bool) -> bintag.Tags:
         return l7.decode_reply(self.connection.exchange(l7.encode(request), patience, more=more), request)
 

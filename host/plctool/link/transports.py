@@ -274,7 +274,7 @@ def parse_link(text: str) -> Link:
     return make_link(scheme, place, **named)
 
 
-def make_link(scheme: str, place: str, **options: Value) -> Link:
+def make_link(scheme: str, place: str, /, **options: Value) -> Link:
     """A link of a kind in TRANSPORTS from its parts; the text of an option stands for its value. Raises UsageError."""
     kind = TRANSPORTS[scheme]
     if bool(place) != bool(kind.flag):

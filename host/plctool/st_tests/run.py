@@ -125,7 +125,8 @@ class TestProgram:
     @cached_property
     def _built(self) -> BuildResult:
         with bugs_reported():
-            return build_program(self._program, Options(find_target(host_target()), self._level))
+            options = Options(find_target(host_target()), self._level)
+            return build_program(self._program, options, keeps=False)  # each test starts on fresh variables
 
     def run(self, numbers: Iterable[int]) -> Iterator[Outcome]:
         """Runs the tests with these indices in `cases`, each from a cold start."""
