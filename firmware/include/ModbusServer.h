@@ -29,7 +29,7 @@ typedef struct {
     bool running;      /* the application, for MODBUS_REPORT_SERVER_ID */
     RTS_UI32 requests; /* that were for this unit */
     RTS_UI32 errors;   /* replied to with an exception */
-    RTS_UI32 written;  /* requests that wrote; counted with the lock of the memory */
+    RTS_UI32 written;  /* requests that wrote, after the first one never 0; counted with the lock of the memory */
     const MODBUS_MEMORY *memory;
     const char *object[MODBUS_OBJECTS]; /* "" or NULL: none; longer ones are cut at 100 characters */
 } MODBUS_SERVER;

@@ -156,6 +156,14 @@ static void numbers_of_two_registers_may_have_the_high_one_first(void)
 }
 
 /* Half of one would be another number than anyone meant. */
+static void the_count_of_requests_that_wrote_wraps_past_zero(void)
+{
+    begin();
+    server.written = 0xFFFFFFFF;
+    CHECK_REPLY(ASK(6, 0, 3, 0xAB, 0xCD), 6, 0, 3, 0xAB, 0xCD);
+    CHECK_EQUAL(server.written, 1); /* 0: nothing was ever written */
+}
+
 static void a_part_of_a_number_is_not_written(void)
 {
     begin();
@@ -395,6 +403,7 @@ static void an_empty_request_is_refused(void)
 int main(void)
 {
     RUN(registers_are_written_and_read);
+    RUN(the_count_of_requests_that_wrote_wraps_past_zero);
     RUN(a_read_goes_on_in_the_next_range);
     RUN(coils_and_registers_are_one_memory);
     RUN(memory_with_the_low_byte_first_looks_the_same_from_outside);

@@ -162,20 +162,27 @@ static bool is_untouched(const MODBUS_PLACE *place)
 
 static RTS_RESULT follow(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
 {
-    MODBUS_PLACE place = ModbusFindPlace(&setup, connector);
-    RTS_UI32 bits;
+    MODBUS_PLACE place = {NULL, NULL};
+    RTS_UI32 bits, lock;
 
-    if (type == IO_MAP_INPUTS && is_untouched(&place))
+    if (type == IO_MAP_INPUTS)
+        place = ModbusFindPlace(&setup, connector);
+    if (is_untouched(&place)) {
+        lock = SysLockEnter();
         IoMgrCopyInputBackLE(channel, ModbusFindMemory(&place, channel->parameter, false, &bits));
+        SysLockLeave(lock);
+    }
     return ERR_OK;
 }
 
 void IoDrvModbusFollowInputs(void)
 {
-    RTS_UI32 lock = SysLockEnter();
+    bool all_written = true;
 
-    (void)IoMgrConfigEachChannel(maps, map_count, &driver, follow);
-    SysLockLeave(lock);
+    for (RTS_UI32 i = 0; i < setup.server_count; i++)
+        all_written = all_written && setup.servers[i].server.written != 0;
+    if (!all_written)
+        (void)IoMgrConfigEachChannel(maps, map_count, &driver, follow);
 }
 
 static void copy(const IoConfigConnectorMap *map, bool is_output)
@@ -358,8 +365,7 @@ static void cycle(void)
         ModbusScanPoll(&setup.clients[i].client, now_ns);
         note_client(&setup.clients[i]);
     }
-    if (setup.server_count != 0)
-        IoDrvModbusFollowInputs();
+    IoDrvModbusFollowInputs();
     for (RTS_UI32 i = 0; i < setup.server_count; i++) {
         MODBUS_SERVER_LINE *line = &setup.servers[i];
         line->server.running = AppGetState() == AS_RUN;

@@ -158,7 +158,8 @@ static RTS_UI8 access(MODBUS_SERVER *server, MODBUS_REQUEST *request, RTS_UI8 *p
     if (!exchange(server, request, false, NULL) || !exchange(server, request, true, NULL))
         return MODBUS_ILLEGAL_ADDRESS;
     lock = SysLockEnter();
-    server->written += request->write_count != 0;
+    if (request->write_count != 0 && ++server->written == 0)
+        server->written = 1;
     if (request->function->function == MODBUS_MASK_WRITE_REGISTER)
         mask_register(server, request);
     else
