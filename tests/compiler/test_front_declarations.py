@@ -178,7 +178,7 @@ def test_structure_takes_the_defaults_of_its_type() -> None:
     assert p.defaults["Point"] == StructInit({"x": ScalarInit(1)})
     assert variable(p, "Main.v").initial == StructInit({})
     assert variable(p, "Main.w").initial == StructInit({"y": ScalarInit(7), "name": ScalarInit("p")})
-    assert variable(p, "Main.a").initial == ArrayInit([(2, StructInit({}))])
+    assert variable(p, "Main.a").initial == ArrayInit([], StructInit({}))
 
 
 @pytest.mark.parametrize("spec", ["TON := (PT := T#1s)", "TON(PT := T#1s)"])

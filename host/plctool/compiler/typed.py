@@ -8,13 +8,14 @@ errors and the debugger.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
 from plctool.files import Pos as Pos
 from plctool.iec.areas import Area
-from plctool.iec.types import Keep, StructType, Type
+from plctool.iec.types import ArrayType, Field, Keep, StructType, Type
 from plctool.image.c_functions import C_FUNCTIONS, VERSION
 
 if TYPE_CHECKING:
@@ -65,9 +66,11 @@ class ScalarInit:
 
 @dataclass
 class ArrayInit:
-    """Runs of (count, value) in element order; what is missing at the end takes the element type's default."""
+    """Runs of (count, value) in element order. `rest`: what elements without a value take, at the end and where the
+    value is None; it is the default of the element's declared type."""
 
     runs: list[tuple[int, Initial | None]]
+    rest: Initial | None = None
 
 
 @dataclass
@@ -91,13 +94,46 @@ class ComputedInit:
 Initial = ScalarInit | ArrayInit | StructInit | ComputedInit
 
 
-def overlay(given: Initial, default: Initial | None) -> Initial:
-    """An initial value that is complete: members that `given` does not name, at any depth, are as in `default`."""
-    if isinstance(given, StructInit) and isinstance(default, StructInit):
-        named = {name: overlay(value, default.members.get(name)) for name, value in given.members.items()}
+def overlay(t: Type, given: Initial, default: Initial | None) -> Initial:
+    """An initial value that is complete: members that `given` does not name, at any depth, are as in `default`, and
+    elements as in its rest. The members of a union share their memory, so there the given ones are all."""
+    if isinstance(t, StructType) and isinstance(given, StructInit) and isinstance(default, StructInit):
+        named = {
+            f.name: overlay(f.type, given.members[f.name], default.members.get(f.name))
+            for f in t.fields
+            if f.name in given.members
+        }
+        others = {} if t.union and named else default.members
         arguments = {**default.arguments, **given.arguments}
-        return StructInit({**default.members, **named}, arguments, {**default.properties, **given.properties})
+        return StructInit({**others, **named}, arguments, {**default.properties, **given.properties})
+    if isinstance(t, ArrayType) and isinstance(given, ArrayInit) and isinstance(default, ArrayInit):
+        rest = default.rest if given.rest is None else given.rest
+        runs = [(count, None if value is None else overlay(t.element, value, rest)) for count, value in given.runs]
+        return ArrayInit(runs, rest)
     return given
+
+
+def array_runs(t: ArrayType, initial: Initial | None) -> Iterator[tuple[int, Initial | None]]:
+    """Runs of equal elements that cover the whole array."""
+    left = t.count
+    given = initial if isinstance(initial, ArrayInit) else ArrayInit([])
+    for count, value in given.runs:
+        yield min(count, left), given.rest if value is None else value
+        left -= min(count, left)
+    if left:
+        yield left, given.rest
+
+
+def struct_members(
+    t: StructType, initial: Initial | None, default: Initial | None
+) -> Iterator[tuple[Field, Initial | None]]:
+    """Every member with the value it gets: the one given, else the one in the `default` of the struct type, else None.
+    Of a union those with a value."""
+    complete = overlay(t, initial if isinstance(initial, StructInit) else StructInit({}), default)
+    assert isinstance(complete, StructInit)
+    for f in t.fields:
+        if not t.union or f.name in complete.members:
+            yield f, complete.members.get(f.name)
 
 
 # ---- nodes of a body ------------------------------------------------------------------------------------------------

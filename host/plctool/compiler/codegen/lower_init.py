@@ -9,15 +9,14 @@ image.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
 
 from plctool.compiler.codegen.ir import Value, round_to_single
 from plctool.compiler.codegen.lower_arith import constant
 from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.codegen.lower_string import copy_literal, encode_text
 from plctool.compiler.codegen.lower_unit import Unit
-from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, StructInit, overlay
-from plctool.iec.types import ArrayType, Elementary, Field, Kind, StringType, StructType, Type, base_of, is_scalar
+from plctool.compiler.typed import Initial, ScalarInit, array_runs, struct_members
+from plctool.iec.types import ArrayType, Elementary, Kind, StringType, StructType, Type, base_of, is_scalar
 
 _LOOP_FROM = 5  # equal scalars that are worth a loop
 _CONSTANT_FROM = 4  # different scalars that are worth a constant
@@ -35,27 +34,6 @@ def encode_scalar(value: int | float | str, t: Type) -> bytes:
     return (int(value) & ((1 << 8 * t.size) - 1)).to_bytes(t.size, "little")
 
 
-def struct_members(unit: Unit, t: StructType, initial: Initial | None) -> Iterator[tuple[Field, Initial | None]]:
-    """Every member with the value it gets: the one given, else the default of the struct type, else None. Of a union
-    those with a value."""
-    given = initial if isinstance(initial, StructInit) else StructInit({})
-    complete = overlay(given, unit.defaults.get(t.name))
-    assert isinstance(complete, StructInit)
-    for f in t.fields:
-        if not t.union or f.name in complete.members:
-            yield f, complete.members.get(f.name)
-
-
-def array_runs(t: ArrayType, initial: Initial | None) -> Iterator[tuple[int, Initial | None]]:
-    """Runs of equal elements that cover the whole array."""
-    left = t.count
-    for count, value in initial.runs if isinstance(initial, ArrayInit) else []:
-        yield min(count, left), value
-        left -= min(count, left)
-    if left:
-        yield left, None
-
-
 def image_of(unit: Unit, t: Type, initial: Initial | None) -> bytes:
     """The bytes of a variable with its initial value."""
     if isinstance(initial, ScalarInit):
@@ -64,7 +42,7 @@ def image_of(unit: Unit, t: Type, initial: Initial | None) -> bytes:
         return b"".join(image_of(unit, t.element, value) * count for count, value in array_runs(t, initial))
     data = bytearray(t.size)
     if isinstance(t, StructType):
-        for f, value in struct_members(unit, t, initial):
+        for f, value in struct_members(t, initial, unit.defaults.get(t.name)):
             data[f.offset : f.offset + f.type.size] = image_of(unit, f.type, value)
     return bytes(data)
 
@@ -97,7 +75,7 @@ def _initialise_struct(frame: Frame, ref: Ref, t: StructType, initial: Initial |
 
 
 def initialise_members(frame: Frame, ref: Ref, t: StructType, initial: Initial | None) -> None:
-    for f, value in struct_members(frame.unit, t, initial):
+    for f, value in struct_members(t, initial, frame.unit.defaults.get(t.name)):
         initialise(frame, ref.member(f.offset, f.type), value)
 
 

@@ -54,6 +54,7 @@ from plctool.compiler.typed import (
     UnaryOp,
     Variable,
     VarPlace,
+    array_runs,
     overlay,
     runtime_function,
 )
@@ -155,7 +156,7 @@ class Construction:
             return self._array(place, t, initial, pos, keep, path)
         assert isinstance(t, StructType)
         given = initial if isinstance(initial, StructInit) else StructInit({})
-        complete = overlay(given, _moved_initial(self._world.defaults.get(t.name), place))
+        complete = overlay(t, given, _moved_initial(self._world.defaults.get(t.name), place))
         assert isinstance(complete, StructInit)
         statements: list[Statement] = []
         named = path_members(self._world, t)
@@ -202,11 +203,9 @@ class Construction:
         self, place: Place, t: ArrayType, initial: Initial | None, pos: Pos, keep: Keep | None, path: str
     ) -> list[Statement]:
         base = _flat(place, t, pos)
-        runs = list(initial.runs) if isinstance(initial, ArrayInit) else []
-        runs.append((t.count - sum(count for count, _ in runs), None))
         statements: list[Statement] = []
         first = 0
-        for count, value in runs:
+        for count, value in array_runs(t, initial):
             if count >= _LOOP_FROM and not self._is_named(t.element):
                 loop, element = _loop(self._pou, base, t.element, first, first + count - 1)
                 loop.body = self.place(element, value, pos, keep, path)
@@ -321,7 +320,7 @@ def _is_computed(initial: Initial | None) -> bool:
     if isinstance(initial, StructInit):
         return bool(initial.properties) or any(map(_is_computed, initial.members.values()))
     if isinstance(initial, ArrayInit):
-        return any(_is_computed(value) for _, value in initial.runs)
+        return _is_computed(initial.rest) or any(_is_computed(value) for _, value in initial.runs)
     return isinstance(initial, ComputedInit)
 
 
@@ -336,7 +335,8 @@ def _moved_initial(initial: Initial | None, instance: Place) -> Initial | None:
         )
         return StructInit(members, arguments, properties)
     if isinstance(initial, ArrayInit):
-        return ArrayInit([(count, _moved_initial(value, instance)) for count, value in initial.runs])
+        runs = [(count, _moved_initial(value, instance)) for count, value in initial.runs]
+        return ArrayInit(runs, _moved_initial(initial.rest, instance))
     return ComputedInit(_moved(initial.value, instance)) if isinstance(initial, ComputedInit) else initial
 
 

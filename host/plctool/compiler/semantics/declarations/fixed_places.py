@@ -21,6 +21,8 @@ from plctool.compiler.typed import (
     StructInit,
     Variable,
     VarPlace,
+    array_runs,
+    overlay,
 )  # fmt: skip
 from plctool.iec.types import ArrayType, StructType, Type
 
@@ -88,26 +90,15 @@ def with_part(
         member = t.member(step)
         assert member is not None
         changed = with_part(member.type, part, rest, value, defaults)
-        return StructInit({**given.members, step: changed}, given.arguments, given.properties)
+        return overlay(t, StructInit({step: changed}), given)
     assert isinstance(t, ArrayType) and isinstance(step, int)
     runs: list[tuple[int, Initial | None]] = []
     first = 0
-    for count, part in [*(initial.runs if isinstance(initial, ArrayInit) else []), (t.count, None)]:
+    for count, part in array_runs(t, initial):
         if not first <= step < first + count:
             runs.append((count, part))
         else:
             changed = with_part(t.element, part, rest, value, defaults)
             runs += [(n, p) for n, p in ((step - first, part), (1, changed), (first + count - 1 - step, part)) if n]
         first += count
-    return ArrayInit(_limited(runs, t.count))
-
-
-def _limited(runs: list[tuple[int, Initial | None]], count: int) -> list[tuple[int, Initial | None]]:
-    """The runs up to `count` elements."""
-    kept: list[tuple[int, Initial | None]] = []
-    for n, part in runs:
-        n = min(n, count)
-        count -= n
-        if n:
-            kept.append((n, part))
-    return kept
+    return ArrayInit(runs)

@@ -17,8 +17,20 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Namespace, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import ArrayInit, ComputedInit, Const, Expr, Initial, Load, ScalarInit, StructInit, VarPlace
-from plctool.iec.types import MAX_SIZE, ArrayType, ReferenceType, StructType, Type
+from plctool.compiler.typed import (
+    ArrayInit,
+    ComputedInit,
+    Const,
+    Expr,
+    Initial,
+    Load,
+    ScalarInit,
+    StructInit,
+    VarPlace,
+    array_runs,
+    struct_members,
+)
+from plctool.iec.types import MAX_SIZE, ArrayType, ReferenceType, StringType, StructType, Type
 
 MAX_RUNS = 1_000_000  # of different values that a repetition makes
 
@@ -46,8 +58,18 @@ class InitialValues:
             scope.error(node.pos, "type", f"an instance of {t} is not a value; write (name := value) for its variables")
             return None
         if isinstance(e, Load) and isinstance(e.place, VarPlace) and e.place.var.constant:
-            return e.place.var.initial or (ArrayInit([]) if isinstance(t, ArrayType) else StructInit({}))
+            return self._complete(t, e.place.var.initial)
         return ComputedInit(e)
+
+    def _complete(self, t: Type, initial: Initial | None) -> Initial:
+        """The value of a constant with its zeros, which the defaults of where it is copied to leave alone."""
+        if isinstance(t, ArrayType):
+            return ArrayInit([(count, self._complete(t.element, value)) for count, value in array_runs(t, initial)])
+        if isinstance(t, StructType):
+            given = initial if isinstance(initial, StructInit) else StructInit({})
+            members = struct_members(t, given, self._world.defaults.get(t.name))
+            return replace(given, members={f.name: self._complete(f.type, value) for f, value in members})
+        return initial or ScalarInit("" if isinstance(t, StringType) else 0)
 
     def _array_initial(self, node: ast.ArrayInit, t: Type, scope: Scope) -> Initial | None:
         if not isinstance(t, ArrayType):

@@ -105,7 +105,7 @@ class TypeDeclarations:
             return t, default
         if default is None and not overrides and given == ScalarInit(0) and str(given.value) != "-0.0":
             return t, None
-        return t, overlay(given, default)
+        return t, overlay(t, given, default)
 
     def _check_extras(self, decl: ast.VarDecl, may: May, scope: Scope) -> None:
         location = decl.location
@@ -228,7 +228,7 @@ class TypeDeclarations:
             if isinstance(t, EnumType) and isinstance(decl.spec, ast.EnumSpec):
                 scope.names.update(values_of(t, scope.pos(decl.pos)))
             given = self._initials.initial(decl.init, t, scope)
-            symbol.default = default if given is None else overlay(given, default)
+            symbol.default = default if given is None else overlay(t, given, default)
         symbol.busy = False
         return symbol.type
 
@@ -265,7 +265,7 @@ class TypeDeclarations:
         if t.size > MAX_SIZE:
             scope.error(spec.pos, "size", f"an array of {t.size} bytes is too large")
             return ERROR, None
-        return t, None if default is None else ArrayInit([(t.count, default)])
+        return t, None if default is None else ArrayInit([], default)
 
     def _open_array(self, spec: ast.ArraySpec, scope: Scope) -> Type:
         """The type of a parameter that takes arrays of any size."""
@@ -282,7 +282,7 @@ class TypeDeclarations:
         if t is ERROR or not members:
             return t, default
         given = self._initials.initial(ast.StructInit(spec.pos, members, arguments=True), t, scope)
-        return t, default if given is None else overlay(given, default)
+        return t, default if given is None else overlay(t, given, default)
 
     def _pointer(self, spec: ast.PointerSpec, scope: Scope) -> Type:
         target = self._target(spec.target, scope)
