@@ -382,7 +382,7 @@ class Call(Node):
 
 @dataclass
 class AssignedValue(Node):
-    """`(a := e)`: the assignment of a scalar, and what was assigned."""
+    """`(a := e)`: an assignment, and what was assigned."""
 
     children: ClassVar = ("assignment",)
     assignment: Assign

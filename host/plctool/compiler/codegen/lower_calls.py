@@ -26,6 +26,7 @@ from plctool.compiler.typed import (
     Direction,
     Dispatch,
     Expr,
+    IntrinsicCall,
     Load,
     Parameter,
     Place,
@@ -180,7 +181,7 @@ def operand(
         if is_scalar(t) and not parameter.by_reference:
             return frame.value(argument)
         ref = _aligned(frame, materialised(frame, argument))
-        if isinstance(argument, Load):
+        if isinstance(argument, Load | IntrinsicCall):
             ref = lasting(frame, ref, *later)
     else:
         ref = frame.ref(argument)
@@ -203,8 +204,8 @@ def operand(
 
 
 def lasting(frame: Frame, ref: Ref, *later: Expr | Place | None) -> Ref:
-    """A string, array or structure as it is now: a copy, if what is worked out later may write variables and it is
-    known how large it is."""
+    """A string, array or structure as it is now: a copy, if what is worked out later may write variables. A string
+    of the caller that is longer than its type says stays where it is."""
     parts = (part for node in later if node is not None for part in walk(node))
     if (
         is_scalar(ref.type)
@@ -216,11 +217,14 @@ def lasting(frame: Frame, ref: Ref, *later: Expr | Place | None) -> Ref:
         copy = frame.temporary(ref.type)
         frame.copy(copy, ref, ref.type.size)
         return copy
-    if ref.capacity.constant is None:
-        return ref
-    copy = frame.temporary(StringType(ref.capacity.constant, ref.type.wide))
+    capacity = ref.capacity.constant
+    copy = frame.temporary(StringType(ref.type.length if capacity is None else capacity, ref.type.wide))
     copy_string(frame, copy, ref)
-    return copy
+    if capacity is not None:
+        return copy
+    fits = frame.fn.value(f"icmp ule i32 {ref.capacity}, {copy.capacity}")
+    pointer = frame.fn.value(f"select i1 {fits}, ptr {frame.address(copy)}, ptr {frame.address(ref)}")
+    return Ref(pointer, 0, ref.type, capacity=ref.capacity)
 
 
 def is_changing(frame: Frame, node: object) -> bool:

@@ -27,6 +27,7 @@ from plctool.compiler.codegen.lower_arith import (
     square_root,
     unary,
 )
+from plctool.compiler.codegen.lower_blocks import assign_aggregate
 from plctool.compiler.codegen.lower_calls import call_function, lasting
 from plctool.compiler.codegen.lower_frame import (
     AGGREGATES,
@@ -215,7 +216,7 @@ def _compared_strings(frame: Frame, e: Binary) -> Value:
                     return compare_strings(frame, e.op, ref, frame.aggregate(literal))
                 return equal if e.op is BinaryOp.EQ else frame.fn.value(f"xor i1 {equal}, true")
     left = frame.aggregate(e.left)
-    if isinstance(e.left, Load):
+    if isinstance(e.left, Load | IntrinsicCall):
         left = lasting(frame, left, e.right)
     return compare_strings(frame, e.op, left, frame.aggregate(e.right))
 
@@ -327,6 +328,14 @@ def constant_text(frame: Frame, e: Const) -> Ref:
 def loaded_aggregate(frame: Frame, e: Load) -> Ref:
     """What a variable holds is not copied."""
     return frame.ref(e.place)
+
+
+@rule(AGGREGATES, AssignedValue)
+def assigned_aggregate(frame: Frame, e: AssignedValue) -> Ref:
+    """The variable that a string, array or structure was assigned to."""
+    ref = frame.ref(e.assignment.target)
+    assign_aggregate(frame, ref, e.assignment.value)
+    return ref
 
 
 @rule(AGGREGATES, Convert)

@@ -22,7 +22,7 @@ from plctool.compiler.typed import (
     Variable,
 )
 from plctool.compiler.typed_nodes import walk
-from plctool.iec.types import PointerType, Type, is_scalar
+from plctool.iec.types import PointerType, Type
 
 
 def calls(node: Expr | Place) -> bool:
@@ -30,12 +30,12 @@ def calls(node: Expr | Place) -> bool:
     return any(isinstance(part, Call | AssignedValue) for part in walk(node))
 
 
-def kept_value(c: Checker, e: Expr) -> tuple[Expr, Expr]:
-    """A scalar that is needed twice: the first time, and then."""
-    if not is_scalar(e.type) or isinstance(e, Const) or c.scope.pou is None:
+def kept_value(c: Checker, e: Expr, t: Type) -> tuple[Expr, Expr]:
+    """A value that is needed twice, as one of `t`: the first time, and then."""
+    if isinstance(e, Const) or c.scope.pou is None:
         return e, e
-    place = _hidden(c, e.type, e.pos)
-    return AssignedValue(Assign(place, e, e.pos), e.type, e.pos), Load(place, e.type, e.pos)
+    place = _hidden(c, t, e.pos)
+    return AssignedValue(Assign(place, e, e.pos), t, e.pos), Load(place, t, e.pos)
 
 
 def kept_place(c: Checker, place: Place) -> tuple[list[Assign], Place]:

@@ -42,7 +42,7 @@ def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
         statement = _assign_one(c, target, source, c.pos(node.pos), known)
         source, known = target, None
         if isinstance(statement, Assign) and number < len(node.targets) and calls(statement.target):
-            first, known = kept_value(c, statement.value)
+            first, known = kept_value(c, statement.value, statement.target.type)
             statement = replace(statement, value=first)
         if statement is not None:
             result.append(statement)

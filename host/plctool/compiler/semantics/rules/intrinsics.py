@@ -132,9 +132,7 @@ def _pair(c: Checker, f: Applied) -> Expr:
 
 def _chain(c: Checker, f: Applied) -> Expr:
     """`GT(a, b, c)` is `a > b AND b > c`."""
-    inner = [(e, e) for e in f.args[1:-1]]
-    if any(map(calls, f.args)):
-        inner = [kept_value(c, settle(e)) for e, _ in inner]
+    inner = [kept_value(c, e, e.type) if calls(e) else (e, e) for e in f.args[1:-1]]
     rights, lefts = ([*(pair[n] for pair in inner), f.args[-1]] for n in (0, 1))
     result = operate(c, _CHAINS[f.name], f.args[0], rights[0], f.node.pos)
     for left, right in zip(lefts, rights[1:], strict=False):
