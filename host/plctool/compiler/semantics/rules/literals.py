@@ -151,7 +151,7 @@ def _literal_for(c: Checker, e: Expr, other: Type, expected: Type | None) -> Exp
     assert isinstance(e, Const) and not isinstance(e.value, str)
     if isinstance(other, PointerType) and e.value == 0:
         return Const(0, other, e.pos)
-    if t is None or t.kind is Kind.TIME:
+    if t is None or t.kind in (Kind.TIME, Kind.DATE, Kind.CHAR):
         return settle(e)
     if t.kind is Kind.REAL:
         return c.coerce(e, t)
