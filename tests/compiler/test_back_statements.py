@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
 from plctool.compiler.ranges import type_range
+from plctool.compiler.semantics.conversions import SIGNED
 from plctool.compiler.typed import (
     AddressOf,
     Assign,
@@ -127,10 +128,11 @@ def for_model(start: int, stop: int, step: int, low: int, high: int) -> tuple[li
 
 
 @functools.cache
-def for_loop(t: Elementary, step: int | None, modified: bool, level: int) -> Running:
+def for_loop(t: Elementary, step: int | None, step_type: Elementary, modified: bool, level: int) -> Running:
     """n counts, total is a hash of the values; `step` None: from a variable. `modified`: the body assigns k := k."""
     p = ProgramBuilder()
-    k, start, stop, by = (p.variable(name, t) for name in ("k", "start", "stop", "by"))
+    k, start, stop = (p.variable(name, t) for name in ("k", "start", "stop"))
+    by = p.variable("by", step_type)
     n, total = p.variable("n", DINT), p.variable("total", LINT)
     body: list[Statement] = [
         increment(n),
@@ -140,7 +142,7 @@ def for_loop(t: Elementary, step: int | None, modified: bool, level: int) -> Run
     ]
     if modified:
         body.append(assign(k, load(k)))
-    step_value: Expr = load(by) if step is None else const(step, t)
+    step_value: Expr = load(by) if step is None else const(step, step_type)
     return p.run(
         assign(n, const(0, DINT)),
         assign(total, const(0, LINT)),
@@ -155,12 +157,13 @@ def test_for_runs_as_specified_at_all_limits(t: Elementary, modified: bool) -> N
     low, high = type_range(t) or (0, 0)
     edge = st.one_of(st.sampled_from([low, low + 1, high - 1, high]), st.integers(-4, 4), st.integers(low, high))
     number = edge.map(lambda v: min(max(v, low), high))
-    steps = st.sampled_from([1, 2, 3, 7, 100] + ([-1, -2, -7, -100] if t.signed else []))
+    steps = st.sampled_from([1, 2, 3, 7, 100, -1, -2, -7, -100, -128])
 
-    @settings(max_examples=150)
-    @given(number, number, steps, st.booleans(), st.sampled_from([0, 2]))
-    def check(start: int, stop: int, step: int, constant: bool, level: int) -> None:
-        run = for_loop(t, step if constant else None, modified, level)
+    @settings(max_examples=250)
+    @given(number, number, steps, st.booleans(), st.booleans(), st.sampled_from([0, 2]))
+    def check(start: int, stop: int, step: int, signed: bool, constant: bool, level: int) -> None:
+        step_type = SIGNED[t.bits] if signed or step < 0 else t
+        run = for_loop(t, step if constant else None, step_type, modified, level)
         run["start"], run["stop"], run["by"] = start, stop, step
         assert run.cycle() == 0
         seen, after = for_model(start, stop, step, low, high)
@@ -173,7 +176,7 @@ def test_for_runs_as_specified_at_all_limits(t: Elementary, modified: bool) -> N
 
 
 def test_for_with_step_zero_raises() -> None:
-    run = for_loop(INT, None, False, 2)
+    run = for_loop(INT, None, INT, False, 2)
     run["start"], run["stop"], run["by"] = 1, 3, 0
     assert run.cycle() == DIVIDEBYZERO
 

@@ -171,11 +171,20 @@ class _Loop:
 
     def _saturated(self, current: Value) -> Value:
         """`current` + step, or the limit of the type."""
-        word, step = "sadd" if is_signed(self._s.var.type) else "uadd", self._step
-        if self._known_step is not None and self._known_step < 0 and word == "uadd":
-            word, step = "usub", number(-self._known_step)
+        step, known = self._step, self._known_step
+        if is_signed(self._s.var.type):
+            return self._limited("sadd", current, step)
+        if known is not None:
+            return self._limited("uadd" if known > 0 else "usub", current, number(abs(known)))
+        up = self._limited("uadd", current, step)
+        if not is_signed(self._s.step.type):
+            return up
+        size = self._body.fn.value(f"sub {self.text} 0, {step}")
+        return self._by_direction(up, self._limited("usub", current, size))
+
+    def _limited(self, word: str, current: Value, amount: Value) -> Value:
         text = self.text
-        return self._body.fn.value(f"call {text} @llvm.{word}.sat.{text}({text} {current}, {text} {step})")
+        return self._body.fn.value(f"call {text} @llvm.{word}.sat.{text}({text} {current}, {text} {amount})")
 
     def limits(self) -> tuple[int, int] | None:
         """The values the variable can have in the body."""

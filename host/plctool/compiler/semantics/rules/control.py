@@ -38,7 +38,7 @@ from plctool.compiler.typed import (
     While,
 )
 from plctool.compiler.typed_nodes import root_of, walk, written_places
-from plctool.iec.types import BOOL, EnumType, StringType, SubrangeType, Type, is_scalar
+from plctool.iec.types import BOOL, EnumType, Kind, StringType, SubrangeType, Type, is_scalar
 
 # ---- statements in sequence ----
 
@@ -319,11 +319,13 @@ def _report_changes(c: Checker, node: ast.For, limits: Expr | list[Expr], body: 
 
 
 def _step_value(c: Checker, node: ast.Expr, target: Type) -> Expr:
-    """The step of a FOR loop. A constant one may lead downwards, whatever counts."""
+    """The step of a FOR loop. One with a sign may lead downwards, whatever counts."""
     e, counter = c.expr(node, target), elementary(target)
-    if isinstance(e, Const) and isinstance(e.value, int) and e.value < 0 and counter is not None:
-        target = SIGNED[counter.bits]
-    return c.coerce(e, target)
+    own = elementary(e.type)
+    has_sign = own is not None and own.kind is Kind.INT and own.signed
+    if isinstance(e, Const):
+        has_sign = isinstance(e.value, int) and e.value < 0
+    return c.coerce(e, SIGNED[counter.bits] if has_sign and counter is not None else target)
 
 
 def _noted(c: Checker, loop: While | Repeat | For) -> Statement:
