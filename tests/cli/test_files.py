@@ -451,6 +451,30 @@ def test_wrong_words_exit_2_with_one_sentence(tool: Any, words: tuple[str, ...])
     assert tool(*words, "--json").json["error"]["code"] == "usage"
 
 
+def test_options_are_written_whole(tool: Any) -> None:
+    done = tool("build", "none.st", "--jso")
+    assert (done.status, done.out) == (2, "")
+    assert "Unrecognized arguments: --jso (did you mean --json?)" in done.err
+
+
+@pytest.mark.parametrize("text", ["abc", "-1", "5000000000", "1.5", "²"])
+@pytest.mark.parametrize("command", ["build", "export"])
+def test_a_time_of_build_that_is_none_exits_2(
+    tool: Any, scratch: Path, monkeypatch: pytest.MonkeyPatch, command: str, text: str
+) -> None:
+    (scratch / "main.st").write_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM")
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", text)
+    done = tool(command, "main.st", *(("-o", "main.xml") if command == "export" else ()))
+    assert done.status == 2
+    assert "SOURCE_DATE_EPOCH in the environment is" in done.err
+
+
+def test_diagnostics_are_the_same_documents_whatever_command_has_them(tool: Any, scratch: Path) -> None:
+    (scratch / "main.st").write_text("PROGRAM Main VAR n : INT; END_VAR n := m; END_PROGRAM")
+    built, checked = (tool(command, "main.st", "--json").json for command in ("build", "check"))
+    assert built["diagnostics"] == checked["diagnostics"]
+
+
 @pytest.mark.parametrize("command", ["force", "unforce"])
 def test_commands_of_later_versions_say_so(tool: Any, command: str) -> None:
     done = tool(command, "Main.n=1", "--port", "/dev/x", "--json")

@@ -131,6 +131,13 @@ def test_plant_in_st_is_compiled_and_attached(tool, program: Path) -> None:  # t
     assert found["values"]["Bench.level"] == 9
 
 
+def test_the_kind_of_a_plant_is_told_by_its_suffix_in_any_case(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
+    (program / "PLANT.PY").write_text("def step(plc):\n    plc.set_input('level', 7)\n")
+    tool("build", "main.st")
+    found = tool("run", "app.cdl", "--cycles", "3", "--plant", "PLANT.PY", "--get", "Bench.level", "--json").json
+    assert found["values"]["Bench.level"] == 7
+
+
 @pytest.mark.parametrize(("text", "reason"), [("x = 1\n", "has no function step"), (None, "cannot be read")])
 def test_plant_that_is_none_is_an_error(tool, program: Path, text: str | None, reason: str) -> None:  # type: ignore[no-untyped-def]
     if text is not None:
@@ -145,6 +152,7 @@ def test_plant_that_is_none_is_an_error(tool, program: Path, text: str | None, r
         ("def step(plc):\n    plc.set_input('level', 1 / 0)\n", "plant.py:2: ZeroDivisionError: division by zero"),
         ("import math\nmath.nothing\n", "plant.py:2: AttributeError"),
         ("def step(plc)\n", "plant.py:1: expected ':'"),
+        ("x = 1\0\n", "plant.py: source code string cannot contain null bytes"),
         ("EVERY_MS = 'often'\ndef step(plc): pass\n", "EVERY_MS in plant.py is not a number of milliseconds above 0"),
         ("def step(plc, what): pass\n", "plant.py: TypeError"),
         ("import sys\nsys.exit()\ndef step(plc): pass\n", "plant.py:2: exit would end plctool, not the plant; return"),

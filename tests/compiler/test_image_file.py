@@ -17,6 +17,7 @@ from plctool.image.file import (
     Image,
     ImageTask,
     KeptVariable,
+    _parse_functions,
     build_image,
     describe_image,
     parse_image,
@@ -150,6 +151,14 @@ def test_an_entry_outside_the_code_is_refused() -> None:
     for image in (replace(SAMPLE, functions={1: 100}), replace(SAMPLE, tasks=[ImageTask("t", 0, 0, 1, 100)])):
         with pytest.raises(UsageError, match="outside the code"):
             parse_image(build_image(image))
+
+
+def test_entries_of_functions_that_no_device_knows_are_left_out() -> None:
+    table = ffi.new("POU_REF[]", lib.CDL_FUNCTION_COUNT + 2)
+    for entry in table:
+        entry.area, entry.offset = lib.APP_AREA_CODE, 8
+    found = _parse_functions(bytes(ffi.buffer(table)), code_size=100)
+    assert list(found) == list(range(lib.CDL_FUNCTION_COUNT))
 
 
 def test_description_is_ready_for_json() -> None:

@@ -43,6 +43,11 @@ def test_zip_is_read_in_place(tmp_path: Path, top: str) -> None:
     assert [s.path for s in found.sources] == [str(path / "src/get.st")]
 
 
+def test_what_macos_adds_to_a_zip_is_no_part_of_it(tmp_path: Path) -> None:
+    files = {"lib/library.toml": manifest("Lib"), "lib/get.st": GET, "__MACOSX/lib/._get.st": "\0\1"}
+    assert messages(check(tmp_path, USE, zipped(tmp_path / "lib.zip", files))) == []
+
+
 def test_mistake_in_a_zip_has_its_line_and_is_quoted(tmp_path: Path) -> None:
     from plctool.compiler import CompileError, compile_sources
 

@@ -282,6 +282,7 @@ MISTAKES = [
     (server('"40001.3" = "Main.on", "400001.3" = "Main.off"'), "400001.3 is the bit 40001.3 in line 3"),
     (server('40001.3 = "Main.on", 40001.4 = "Main.off"'), 'a bit of a register is written in quotes: "40001.3"'),
     ('[modbus.server.tcp]\naddress = "plc"', "'plc' is not an address: write for example"),
+    ('[[modbus.tcp]]\nhost = ""', "'' is not an address"),
     ('[[modbus.tcp]]\nhost = "10.0.0.1:503"', 'is not an address: write host = "10.0.0.1" and port = 503'),
     (server('"40001.16" = "Main.on"'), "3: 40001.16: the bits of a register are 0 to 15"),
     (device("word_1", address=-1), "10: -1 is not the address of holding registers: they are 40001 to 49999"),

@@ -25,7 +25,11 @@ _ONE_DOCUMENT = "print one JSON document and nothing else"
 
 
 class _Parser(argparse.ArgumentParser):
-    """Reports wrong arguments as UsageError, like all other wrong use."""
+    """Reports wrong arguments as UsageError, like all other wrong use. Options are written whole, so that they mean the
+    same when there are more of them."""
+
+    def __init__(self, **words: Any) -> None:
+        super().__init__(allow_abbrev=False, **words)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Of what a command does not know, it says so itself."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -23,6 +24,7 @@ Document = dict[str, Any]
 
 
 _LAST_PARAMETER = 0xFFFF_FFFF
+_STRING = re.compile(r"STRING\[([1-9]\d?|1\d\d|2[0-4]\d|25[0-5])\]", re.ASCII)
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -174,18 +176,18 @@ def _parameter(plc: Plc, device: str, parameter: str, type_name: str | None) -> 
     with suppress(UsageError):  # without symbols numbers will do
         devices = plc.symbols().io.get("devices", [])
         known = next((d["parameters"] for d in devices if d["name"].casefold() == device.casefold()), [])
-    found = next((p for p in known if parameter.casefold() in (p["name"].casefold(), str(p["id"]))), None)
     number = None
     with suppress(ValueError):
         number = int(parameter, 0)
+    found = next((p for p in known if p["id"] == number or p["name"].casefold() == parameter.casefold()), None)
     if number is not None and not 0 <= number <= _LAST_PARAMETER:
         raise UsageError(f"{parameter} is not the number of a parameter; they are of 32 bits.", "unknown-parameter")
     if found is None and number is None:
         hint = did_you_mean(parameter, (p["name"] for p in known)) or "; give its number, and its type by --type."
         raise UsageError(f"{device} has no parameter {parameter}{hint}", "unknown-parameter")
     name = (type_name or (found["type"] if found else "UDINT")).upper()
-    length = name.removeprefix("STRING[").removesuffix("]")
-    t: Type | None = StringType(int(length)) if length.isdigit() else ELEMENTARY.get(name)
+    string = _STRING.fullmatch(name)
+    t: Type | None = StringType(int(string[1])) if string else ELEMENTARY.get(name)
     if t is None:
         raise UsageError(f"A parameter cannot be {name}; use for example UINT, REAL or STRING[20].", "bad-type")
     return found["id"] if found else number or 0, t

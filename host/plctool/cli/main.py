@@ -143,7 +143,9 @@ def _test(args: argparse.Namespace) -> int:
 
 
 def _export(args: argparse.Namespace) -> int:
-    document, warnings = documents.export(_settings(args), args.xml, int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
+    from plctool.compiler import source_date
+
+    document, warnings = documents.export(_settings(args), args.xml, source_date())
     _print_warnings(args, warnings)
     return _show(args, document, lambda d: str(d["file"]))
 
@@ -606,7 +608,7 @@ def _report(error: PlcError, as_json: bool) -> int:
     if as_json:
         document: dict[str, Any] = {"error": {"code": error.code, "message": error.message}}
         if diagnostics := getattr(error, "diagnostics", None):
-            document["diagnostics"] = [vars(d) for d in diagnostics]
+            document["diagnostics"] = [documents.diagnostic_document(d) for d in diagnostics]
         if exception := getattr(error, "exception", None):
             document["exception"] = documents.exception_document(exception)
         print(output.as_json(document))

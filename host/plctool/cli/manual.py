@@ -24,7 +24,7 @@ _EXIT_STATUS = {
     "1": "the device or the program said no",
     "2": "wrong use or bad input",
     "3": "the link was lost or nothing answered",
-    "130": "interrupted by Ctrl-C",
+    "130": "interrupted by Ctrl-C; 0 of watch --json",
 }
 
 

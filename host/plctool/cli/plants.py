@@ -25,13 +25,13 @@ _LONGEST_MS = 1e9
 def attached(plc: Simulator, path: Path, aside: bool = False) -> Iterator[None]:
     """The plant in a file is connected to a simulator: Python with a function `step`, or a program in ST. `aside`: what
     it prints goes to stderr. Raises UsageError, with file and line, when Python code of the plant fails."""
-    if path.suffix == ".py":
+    if path.suffix.lower() == ".py":
         plc.attach(*_python_plant(path, aside))
         yield
         return
     from plctool.sim_plant import PlantProgram
 
-    with PlantProgram.from_file(path) if path.suffix == ".cdl" else _compiled_plant(path) as plant:
+    with PlantProgram.from_file(path) if path.suffix.lower() == ".cdl" else _compiled_plant(path) as plant:
         plc.attach(plant, plant.every_ms)
         yield
 
@@ -56,7 +56,7 @@ def files_of_plant(path: Path) -> Iterator[Path]:
     """The files that `attached` reads."""
     from plctool.compiler import IoFiles, program_files
 
-    if path.suffix in (".py", ".cdl"):
+    if path.suffix.lower() in (".py", ".cdl"):
         yield path
     else:
         yield from program_files([path], IoFiles(wanted=False)).every_file()
@@ -100,7 +100,8 @@ def _said_with_its_line(path: Path) -> Iterator[None]:
     except PlcError:
         raise
     except SyntaxError as error:
-        raise UsageError(f"{error.filename}:{error.lineno}: {error.msg}", "no-plant") from error
+        place = f"{error.filename}:{error.lineno}" if error.filename else str(path)
+        raise UsageError(f"{place}: {error.msg}", "no-plant") from error
     except (Exception, SystemExit) as error:
         own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         if not own and isinstance(error, OSError):

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CompileError", "IoFiles", "Level", "ProgramFiles", "Sources", "check_sources", "check_with_tests",
     "compile_sources", "io_sources", "library_sources", "load_io", "load_sources", "program_files",
+    "source_date",
 ]  # fmt: skip
 
 
@@ -38,6 +39,18 @@ def load_sources(paths: Sequence[Path | str]) -> list[Source]:
     """The files named, and all sources in the folders named; of a project those that it names. Raises UsageError when
     there is nothing to read."""
     return program_files(paths).load_sources()
+
+
+def source_date() -> int:
+    """SOURCE_DATE_EPOCH of the environment: the time that images and exports have, in seconds since 1970; 0 without
+    one. Raises UsageError."""
+    text = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    if not (text.isascii() and text.isdigit() and int(text) <= 0xFFFF_FFFF):
+        raise UsageError(
+            f"SOURCE_DATE_EPOCH in the environment is {text!r}; it is a number of seconds since 1970, of 32 bits.",
+            "bad-value",
+        )
+    return int(text)
 
 
 def load_io(paths: Sequence[Path | str], files: IoFiles | None = None) -> Description | None:
@@ -186,7 +199,7 @@ def compile_sources(
     if checked.program is None:
         raise CompileError(checked.diagnostics, shown)
     # No time of build: the same sources give the same image, so that its symbols are found again anywhere.
-    info = replace(files.info, date=int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
+    info = replace(files.info, date=source_date())
     with bugs_reported():
         built = build_program(checked.program, options, info)
     if limits:

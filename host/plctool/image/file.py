@@ -416,6 +416,8 @@ def _parse_functions(data: bytes, code_size: int) -> dict[int, int]:
     for number, entry in enumerate(_entries("POU_REF", data, "function table")):
         if entry.area == NO_AREA:
             continue
+        if number >= lib.CDL_FUNCTION_COUNT:
+            break  # no device of ours calls them
         if entry.area != lib.APP_AREA_CODE or entry.offset >= code_size:
             raise _refuse(f"entry {number} of its function table is outside the code")
         functions[number] = int(entry.offset)

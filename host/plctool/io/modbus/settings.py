@@ -68,7 +68,8 @@ def serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
 
 def address_parameters(table: Table, key: str, default: str) -> list[Parameter]:
     """The IPv4 address that `key` gives, and the port."""
-    host = table.text(key, default or None, required="" if default else "192.168.0.7") or "0.0.0.0"
+    found = table.text(key, default or None, required="" if default else "192.168.0.7")
+    host = "0.0.0.0" if found is None else found
     try:
         address = int(ipaddress.IPv4Address(host))
     except ValueError:
