@@ -116,6 +116,16 @@ def test_a_packed_structure_is_packed_in_c(tool: Tool) -> None:
     compile_c("-c", "packed.c", "-o", "packed.o")
 
 
+@needs_compiler
+def test_types_of_one_name_in_two_namespaces_are_two_in_c(tool: Tool) -> None:
+    types = "TYPE Mode : (Off, {0});\nConfig : STRUCT pad : {1}; mode : Mode; END_STRUCT; END_TYPE"
+    spaces = {"Press": ("Down", "INT"), "Oven": ("Hot", "LINT")}
+    text = "".join(f"NAMESPACE {n}\n{types.format(*words)}\nEND_NAMESPACE\n" for n, words in spaces.items())
+    function = "{attribute 'external' := 'heat'}\nFUNCTION Heat\nVAR_INPUT a : Press.Config; b : Oven.Config; END_VAR\n"
+    export(tool, f"{text}{function}END_FUNCTION\n")
+    compile_c("-c", "sensors.c", "-o", "sensors.o")
+
+
 def test_an_array_of_any_size_comes_with_its_bounds(tool: Tool) -> None:
     export(tool)
     words = " ".join(Path("sensorsItf.h").read_text("utf-8").split())

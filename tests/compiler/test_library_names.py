@@ -9,6 +9,9 @@ from library_support import check, library, messages
 
 from plctool import Simulator
 from plctool.compiler import compile_sources
+from plctool.compiler.build import BuildResult
+from plctool.image.c_functions import interface_signature
+from plctool.image.file import parse_image
 from plctool.image.targets import host_target
 from plctool.st_tests import run_tests
 
@@ -41,12 +44,17 @@ END_FUNCTION
 }
 
 
-def values(folder: Path, text: str, names: list[str], *libraries: Path) -> list[object]:
-    """What variables have after one cycle."""
+def built(folder: Path, text: str, *libraries: Path) -> BuildResult:
+    """A program of one file."""
     (folder / "p").mkdir(exist_ok=True)
     (folder / "p/main.st").write_text(text)
-    built = compile_sources([folder / "p"], target=host_target(), libraries=libraries)
-    with Simulator(built.image, built.symbols) as plc:
+    return compile_sources([folder / "p"], target=host_target(), libraries=libraries)
+
+
+def values(folder: Path, text: str, names: list[str], *libraries: Path) -> list[object]:
+    """What variables have after one cycle."""
+    program = built(folder, text, *libraries)
+    with Simulator(program.image, program.symbols) as plc:
         plc.run_cycles(1)
         return [plc.read(name) for name in names]
 
@@ -120,6 +128,35 @@ def test_name_that_two_libraries_have_needs_its_namespace(tmp_path: Path) -> Non
         "main.st:3: unknown function Get; write One.Get or Two.Get",
     ]
     assert messages(check(tmp_path, text, one)) == ["main.st:4: unknown name Two"]
+
+
+def test_types_of_one_name_in_two_libraries_are_different(tmp_path: Path) -> None:
+    types = "TYPE Mode : ({0}) := {1};\nConfig : STRUCT {2} mode : Mode; limit : INT := {3}; END_STRUCT; END_TYPE"
+    one, two = (
+        library(tmp_path, name, {"t.st": types.format(*words)})
+        for name, words in {
+            "One": ("Off, On", "On", "", 10),
+            "Two": ("Cold, Warm, Hot", "Hot", "p : LINT;", 20),
+        }.items()
+    )
+    text = "PROGRAM Main\nVAR a : One.Config; b : Two.Config; END_VAR\nEND_PROGRAM"
+    names = ["Main.a.limit", "Main.b.limit", "Main.a.mode", "Main.b.mode"]
+    assert values(tmp_path, text, names, one, two) == [10, 20, "On", "Hot"]
+
+
+def test_c_function_has_one_signature_in_a_library_and_in_what_imports_it(tmp_path: Path) -> None:
+    text = (
+        "TYPE Point : STRUCT x : INT; END_STRUCT; END_TYPE\nFUNCTION_BLOCK Fb\nEND_FUNCTION_BLOCK\n"
+        "{attribute 'external' := 'draw'}\nFUNCTION Draw : BOOL\n"
+        "VAR_IN_OUT p : Point; l : ARRAY[1..2] OF Point; f : Fb; END_VAR\nEND_FUNCTION\n"
+    )
+    program = "PROGRAM Main\nVAR p : Point; l : ARRAY[1..2] OF Point; f : Fb; END_VAR\nDraw(p, l, f);\nEND_PROGRAM"
+    home = library(tmp_path, "Lib", {"draw.st": text})
+    alone, importing = (
+        {e.name: e.signature for e in parse_image(built(tmp_path, source, *libraries).image).externals}["draw"]
+        for source, libraries in ((text + program, []), (program, [home]))
+    )
+    assert alone == importing == interface_signature("draw(&POINT,&ARRAY[1..2] OF POINT,&FB):BOOL")
 
 
 def test_library_uses_what_it_depends_on(tmp_path: Path) -> None:

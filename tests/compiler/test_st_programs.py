@@ -166,7 +166,8 @@ def run_program(script: Script, result: BuildResult) -> list[str]:
     per_cycle = {name: values for name, values in script.expected if len(values) > 1}
     at_end = {name: values[0] for name, values in script.expected if len(values) == 1}
     wrong = []
-    with Simulator(result.image, result.symbols) as plc:
+    symbols = SymbolTable.from_json(result.symbols.to_json())  # as they come from the file
+    with Simulator(result.image, symbols) as plc:
         if script.time_ms:
             plc.run_for(script.time_ms, check=False)
         for cycle in range(0 if script.time_ms else script.cycles):
@@ -174,7 +175,7 @@ def run_program(script: Script, result: BuildResult) -> list[str]:
             now = {name: values[cycle] for name, values in per_cycle.items() if cycle < len(values)}
             wrong += differences(plc, now, cycle + 1)
         wrong += differences(plc, at_end, script.cycles)
-        seen = exception_of(plc, result.symbols)
+        seen = exception_of(plc, symbols)
     if seen != script.exception:
         wrong.append(f"exception is {seen}, not {script.exception}")
     return wrong

@@ -169,7 +169,7 @@ def _value(t: Type) -> str:
     if isinstance(t, PointerType):
         return f"{_target(t.target)}*"
     if isinstance(t, EnumType) and _is_named(t):
-        return t.name
+        return _type_name(t)
     base = base_of(t)
     assert isinstance(base, Elementary), t
     if base.kind is Kind.REAL:
@@ -184,13 +184,18 @@ def _target(t: Type) -> str:
     if isinstance(t, StringType):
         return "char "
     if isinstance(t, StructType):
-        return f"{t.name} "
+        return f"{_type_name(t)} "
     text = _value(t)
     return text if text.endswith("*") else f"{text} "
 
 
+def _type_name(t: EnumType | StructType) -> str:
+    """The name of a declared type in C: with its namespace, which keeps it apart from others."""
+    return t.name.replace(".", "_")
+
+
 def _is_named(t: EnumType | StructType) -> bool:
-    return _NAME.fullmatch(t.name) is not None
+    return _NAME.fullmatch(_type_name(t)) is not None
 
 
 def _named_types(functions: list[Pou]) -> list[EnumType | StructType]:
@@ -219,16 +224,16 @@ def _named_types(functions: list[Pou]) -> list[EnumType | StructType]:
 
 def _type_lines(t: EnumType | StructType) -> Iterable[str]:
     if isinstance(t, EnumType):
-        values = ", ".join(f"{t.name}_{name} = {value}" for name, value in t.values.items())
-        return [f"typedef {_value(t.base)} {t.name};", f"enum {{ {values} }};"]
-    packed = t.pack < MAX_ALIGN
+        values = ", ".join(f"{_type_name(t)}_{name} = {value}" for name, value in t.values.items())
+        return [f"typedef {_value(t.base)} {_type_name(t)};", f"enum {{ {values} }};"]
+    name, packed = _type_name(t), t.pack < MAX_ALIGN
     lines = [f"#pragma pack(push, {t.pack})"] if packed else []
     lines += ["typedef struct {"]
     lines += [f"    {_field(f.type, c_name(f.name))};" for f in t.fields]
-    lines += [f"}} {t.name};", *(["#pragma pack(pop)"] if packed else [])]
-    lines += [f"RTS_STATIC_ASSERT(sizeof({t.name}) == {t.size}, {t.name}_size);"]
+    lines += [f"}} {name};", *(["#pragma pack(pop)"] if packed else [])]
+    lines += [f"RTS_STATIC_ASSERT(sizeof({name}) == {t.size}, {name}_size);"]
     lines += [
-        f"RTS_STATIC_ASSERT(offsetof({t.name}, {c_name(f.name)}) == {f.offset}, {t.name}_{c_name(f.name)});"
+        f"RTS_STATIC_ASSERT(offsetof({name}, {c_name(f.name)}) == {f.offset}, {name}_{c_name(f.name)});"
         for f in t.fields
     ]
     return lines
@@ -244,7 +249,7 @@ def _field(t: Type, name: str) -> str:
     if isinstance(t, PointerType):
         return f"union {{ {_value(t)}address; RTS_UI64 bits; }} {name}"
     if isinstance(t, StructType):
-        return f"{t.name} {name}"
+        return f"{_type_name(t)} {name}"
     if isinstance(t, SubrangeType):
         t = t.base
     return f"{_value(t)} {name}"

@@ -198,15 +198,16 @@ def part(place: Place, name: str, seen_as: Type | None = None) -> Place:
     return MemberPlace(place, field.offset, seen_as or field.type, place.pos)
 
 
-def handed(place: Place, t: Type, size: Expr) -> tuple[Expr, list[Expr]]:
-    """What a call passes for `place`, and after the arguments. An AnyType is passed on."""
+def handed(place: Place, described: Type, size: Expr) -> tuple[Expr, list[Expr]]:
+    """What a call passes for `place`, and after the arguments. One of the type `described`, the AnyType, is passed
+    on."""
     pos: Pos = place.pos
-    if isinstance(place.type, StructType) and place.type.name == NAME:
+    if place.type is described:
         address, kind, bytes_ = (
             load(part(place, name, seen)) for name, seen in (("pValue", None), ("TypeClass", INT), ("diSize", None))
         )
         return address, [kind, bytes_]
-    return AddressOf(place, RawPointerType(BYTE), pos), [Const(class_of(t), INT, pos), size]
+    return AddressOf(place, RawPointerType(BYTE), pos), [Const(class_of(place.type), INT, pos), size]
 
 
 # ---- ARRAY[*] ----

@@ -244,6 +244,12 @@ class Names:
         """Whether the program declares a global name, or a library that has its namespace in front."""
         return name.casefold() in self._units or self.imported.has(name)
 
+    def unique_name(self, symbol: Unit) -> str:
+        """The full name of a unit, by which nothing else is known: what is in the standard library gives way to what
+        the program declares."""
+        hidden = symbol.library and self.is_user_name(symbol.decl.name)
+        return f"Standard.{symbol.decl.name}" if hidden else symbol.full_name
+
     def enumerations_with(self, name: str, *, imported: bool = False) -> list[TypeSymbol]:
         """The enumerations that have a value of that name: those of the program before those of libraries."""
         own = [] if imported else self._enum_values.get(name.casefold(), [])

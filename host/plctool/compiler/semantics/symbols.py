@@ -131,6 +131,11 @@ class PouSymbol:
     library: bool
 
     @property
+    def full_name(self) -> str:
+        """With the namespace in front."""
+        return self.decl.full_name
+
+    @property
     def keyword(self) -> ast.Unit:
         """FUNCTION, FUNCTION_BLOCK, INTERFACE or PROGRAM."""
         return self.decl.keyword

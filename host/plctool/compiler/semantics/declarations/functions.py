@@ -49,6 +49,7 @@ from plctool.iec.types import (
 )  # fmt: skip
 from plctool.image.c_functions import interface_signature
 
+_NAMESPACE = re.compile(r"\w+\.(?=[^\W\d])")
 _VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")
 
 
@@ -208,6 +209,7 @@ def interface_text(name: str, pou: Pou) -> str:
 
 
 def _interface_name(t: Type) -> str:
+    """Without namespaces: a library has the same functions in a program that imports it as in one of its own."""
     if isinstance(t, StringType):
         return "STRING"
-    return t.name.upper()
+    return _NAMESPACE.sub("", t.name).upper()

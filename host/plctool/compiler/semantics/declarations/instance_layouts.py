@@ -79,8 +79,7 @@ class Blocks:
 
     def _declare_block(self, symbol: PouSymbol) -> BlockInfo:
         decl = symbol.decl
-        hidden = symbol.library and self._world.names.is_user_name(decl.name)
-        pou = new_pou(symbol, f"Standard.{decl.name}" if hidden else decl.full_name)
+        pou = new_pou(symbol, self._world.names.unique_name(symbol))
         scope = self._world.scope_of(symbol)
         scope.pou = pou
         layout = StructType(pou.name)

@@ -12,7 +12,7 @@ from plctool.compiler.semantics.symbols import ERROR, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Initial, Pos, ScalarInit
-from plctool.iec.types import Elementary, EnumType, Kind, SubrangeType, Type
+from plctool.iec.types import INT, Elementary, EnumType, Kind, SubrangeType, Type
 
 
 def enumeration(
@@ -24,7 +24,7 @@ def enumeration(
     if not isinstance(base, Elementary) or base.kind not in (Kind.INT, Kind.BIT):
         scope.error(spec.pos, "type", f"an enumeration is based on an integer type, not on {base}")
         return ERROR, None
-    t = EnumType(name or "(" + ", ".join(n for _, n, _ in spec.values) + ")", base, {})
+    t = EnumType(name or "", base, {})
     inner = Scope(scope.globals, scope.source, scope.library, dict(scope.names), scope.bindings)
     checker, value, seen = Checker(world, inner), -1, set[str]()
     for offset, value_name, node in spec.values:
@@ -45,8 +45,18 @@ def enumeration(
         inner.names[key] = _value_symbol(t, value_name, scope.pos(offset))
         if name is None:
             scope.names.setdefault(key, inner.names[key])
+    t.name = name or _inline_name(t)
     first = next(iter(t.values.values()), 0)
     return t, ScalarInit(first) if first else None
+
+
+def _inline_name(t: EnumType) -> str:
+    """`(First, Second := 5) DINT`: all that the type is, as there may be others with such names."""
+    values, following = list[str](), 0
+    for name, value in t.values.items():
+        values.append(name if value == following else f"{name} := {value}")
+        following = value + 1
+    return f"({', '.join(values)})" + (f" {t.base}" if t.base is not INT else "")
 
 
 def subrange(

@@ -124,7 +124,8 @@ class TypeDeclarations:
     # ---- types ----
 
     def type_of(self, spec: ast.TypeSpec, scope: Scope, name: str | None = None) -> tuple[Type, Initial | None]:
-        """The type, and what variables of it start with. `name`: of the declared type, if it is one."""
+        """The type, and what variables of it start with. `name`: of the declared type, if it is one;
+        no other type has it."""
         self._depth += 1
         if self._depth > MAX_TYPE_DEPTH:
             raise NestingError(scope.pos(spec.pos))
@@ -219,7 +220,7 @@ class TypeDeclarations:
         if symbol.busy:
             return ERROR
         symbol.busy = True
-        t, default = self.type_of(decl.spec, scope, decl.name)
+        t, default = self.type_of(decl.spec, scope, self._world.names.unique_name(symbol))
         if isinstance(t, EnumType) and isinstance(decl.spec, ast.EnumSpec):
             t.strict, t.named = "strict" in decl.attributes, "to_string" in decl.attributes
         if symbol.type is None:
@@ -313,7 +314,7 @@ class TypeDeclarations:
             return None
         if not symbol.busy:
             self._postponed.append(symbol)
-        return self._layout(spec, symbol.decl.name)
+        return self._layout(spec, self._world.names.unique_name(symbol))
 
     @contextmanager
     def postponing(self) -> Iterator[None]:

@@ -224,7 +224,7 @@ def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tu
         place = ValuePlace(e, e.type, e.pos)
     elif is_unaligned(place):
         c.warning(offset, "pointer", packed_and_pointed_to(place))
-    return handed(place, e.type, total_size(place))
+    return handed(place, symbol.type, total_size(place))
 
 
 def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:
