@@ -163,7 +163,7 @@ class Construction:
         for f in t.fields:
             part, own = MemberPlace(place, f.offset, f.type, pos), None if keep is None else keep.of_member(f.keep)
             statements += self.place(part, complete.members.get(f.name), pos, own, f"{path}.{f.name}")
-            if f.name in named and isinstance(f.type, StringType):
+            if f.name.casefold() in named and isinstance(f.type, StringType):
                 statements.append(Assign(part, Const(path[: f.type.length], f.type, pos), pos))
         for member in initialisers(self._world, t):
             statements.append(self._call(member, place, complete.arguments, pos, keep))

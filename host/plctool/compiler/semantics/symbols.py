@@ -192,6 +192,18 @@ class BlockInfo:
     retain: bool = False  # instances live in the retain area as a whole
     cls: ClassInfo | None = None
 
+    def make_way(self, name: str, defaults: dict[str, Initial]) -> None:
+        """Puts the name of the base in front of that of a variable that the base has for itself, such as a PRIVATE one:
+        the block declares another one."""
+        inherited, base = self.type.member(name), self.type.base
+        if inherited is None or base is None:
+            return
+        old, inherited.name = inherited.name, f"{base.name}.{inherited.name}"
+        if old in defaults:
+            defaults[inherited.name] = defaults.pop(old)
+        if old.casefold() in self.members:
+            self.members[inherited.name.casefold()] = self.members.pop(old.casefold())
+
 
 @dataclass(slots=True, eq=False)
 class Member:

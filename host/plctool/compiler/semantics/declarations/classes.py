@@ -149,6 +149,7 @@ class Classes:
         """VAR_INST of methods, and the steps of charts in actions: hidden members of the instance."""
         assert info.cls is not None
         for full_name, symbol in self._lasting(info.cls, scope):
+            info.make_way(full_name, defaults)
             symbol.variable = Variable(full_name, symbol.type, Storage.SELF, symbol.pos, initial=symbol.default)
             info.members[full_name.casefold()] = symbol
             info.type.fields.append(Field(full_name, symbol.type, keep=symbol.keep))

@@ -132,6 +132,7 @@ class Blocks:
                     scope.error(offset, "attribute", f"the path of the instance needs a STRING, not {t}")
                 if not scope.declare(symbol, offset):
                     continue
+                info.make_way(name, defaults)
                 info.members[name.casefold()] = symbol
                 alias = line.attributes.get("alias", "") if scope.library else ""
                 if alias:
