@@ -66,7 +66,7 @@ def starters(world: World, t: StructType) -> list[Member]:
 
 
 def path_members(world: World, t: StructType) -> set[str]:
-    """The members of a block that hold the path of the instance, those with {attribute 'instance-path'}, case-folded."""
+    """Members that hold the path of the instance: those with {attribute 'instance-path'}, case-folded."""
     block = world.blocks.get(t)
     return set() if block is None else {name for name, symbol in block.members.items() if symbol.is_path}
 

@@ -21,9 +21,9 @@ from plctool.compiler.semantics.conversions import (
     takes_array,
 )
 from plctool.compiler.semantics.generics import accepts, group_name, handed, handed_bounds, is_group, total_size
-from plctool.compiler.semantics.rules.members import dotted_name
+from plctool.compiler.semantics.rules.members import bound_member, dotted_name
 from plctool.compiler.semantics.rules.places import changeable_place, may_copy
-from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, PouSymbol, VarSymbol
+from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, Member, PouSymbol, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     AddressOf,
@@ -85,15 +85,22 @@ def split_enable(node: ast.Call, declared: Container[str] = ()) -> tuple[list[as
     return rest, enable
 
 
-def parameter_names(c: Checker, callee: ast.Expr) -> set[str]:
-    """What the function of that name declares, folded; nothing for one that is built in."""
-    if isinstance(callee, ast.Name):
-        symbol = c.world.names.unit(callee.name.casefold(), library=c.scope.library)
-    else:
-        symbol = named_function(c, callee)
-    if not isinstance(symbol, PouSymbol):
+def has_enable(node: ast.Call, declared: Container[str] = ()) -> bool:
+    """Whether a call has EN or ENO that the callee does not declare itself."""
+    keys = ((a.name or "").casefold() for a in node.args)
+    return any(key in ("en", "eno") and key not in declared for key in keys)
+
+
+def parameter_names(c: Checker, node: ast.Call) -> set[str]:
+    """What the function or method that is called with EN or ENO declares, folded; nothing for what is built in."""
+    callee = node.callee
+    if not has_enable(node):
         return set()
-    return {name.casefold() for name, _, _ in parameter_lines(symbol.decl)}
+    bound = bound_member(c, callee, called=True)
+    if bound is not None:
+        return declared_names(bound.callable)
+    symbol = c.scope.unit(callee.name) if isinstance(callee, ast.Name) else named_function(c, callee)
+    return declared_names(symbol if isinstance(symbol, PouSymbol) else None)
 
 
 def named_function(c: Checker, callee: ast.Expr) -> PouSymbol | None:
@@ -392,6 +399,11 @@ def parameter_lines(decl: ast.PouDecl) -> list[tuple[str, Direction, str | None]
             for _, name in line.names:
                 found.append((name, DIRECTIONS[block.keyword], group if is_group(group) else None))
     return found
+
+
+def declared_names(unit: PouSymbol | Member | None) -> set[str]:
+    """The names of the parameters, folded."""
+    return set() if unit is None else {name.casefold() for name, _, _ in parameter_lines(unit.decl)}
 
 
 def arguments_text(n: int) -> str:

@@ -10,9 +10,9 @@ from dataclasses import replace
 from plctool.compiler.semantics.checker import Checker, checks, checks_statement
 from plctool.compiler.semantics.conversions import error_value
 from plctool.compiler.semantics.once import calls, kept_value
-from plctool.compiler.semantics.rules.arguments import input_value, parameter_names
+from plctool.compiler.semantics.rules.arguments import has_enable, input_value, parameter_names
 from plctool.compiler.semantics.rules.builtin import attempt
-from plctool.compiler.semantics.rules.call_statements import enabled, has_enable
+from plctool.compiler.semantics.rules.call_statements import enabled
 from plctool.compiler.semantics.rules.calls import assign_property, assigned_property
 from plctool.compiler.semantics.rules.places import changeable_place, may_copy
 from plctool.compiler.semantics.symbols import ERROR
@@ -33,7 +33,7 @@ def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
     if node.op is not ast.Assigning.VALUE:
         return _set_or_reset(c, node)
     if isinstance(node.value, ast.Call):
-        declared = parameter_names(c, node.value.callee)
+        declared = parameter_names(c, node.value)
         if has_enable(node.value, declared):
             return enabled(c, node.value, declared, lambda plain: assignment(c, replace(node, value=plain)))
     result: list[Statement] = []

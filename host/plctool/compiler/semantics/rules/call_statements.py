@@ -14,6 +14,7 @@ from plctool.compiler.semantics.generics import handed_bounds
 from plctool.compiler.semantics.once import kept_place
 from plctool.compiler.semantics.rules.arguments import (
     bind,
+    has_enable,
     input_value,
     named_function,
     packed,
@@ -276,7 +277,7 @@ def _called(c: Checker, node: ast.Call) -> list[Statement]:
         block = c.world.blocks.get(instance.type) if isinstance(instance.type, StructType) else None
         members = block.members if block is not None else ()
         return enabled(c, node, members, lambda plain: block_call(c, plain, instance))
-    return enabled(c, node, parameter_names(c, node.callee), lambda plain: _function_statement(c, plain))
+    return enabled(c, node, parameter_names(c, node), lambda plain: _function_statement(c, plain))
 
 
 def _function_statement(c: Checker, node: ast.Call) -> list[Statement]:
@@ -339,9 +340,3 @@ def enabled(
         return statements + done
     condition = c.condition(enable.en)
     return [] if condition.type is ERROR else [If([(condition, statements + done)], skipped, pos)]
-
-
-def has_enable(node: ast.Call, declared: Container[str]) -> bool:
-    """Whether a call has EN or ENO that the callee does not declare itself."""
-    keys = ((a.name or "").casefold() for a in node.args)
-    return any(key in ("en", "eno") and key not in declared for key in keys)

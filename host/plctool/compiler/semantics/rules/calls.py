@@ -10,7 +10,7 @@ from dataclasses import replace
 from plctool.compiler.library import without_library
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import error_value, is_exact, load
-from plctool.compiler.semantics.rules.arguments import bind, parameter_lines, plain_arguments, typed_call
+from plctool.compiler.semantics.rules.arguments import bind, declared_names, plain_arguments, typed_call
 from plctool.compiler.semantics.rules.builtin import QUERIES, built_in_call, function_hint, query
 from plctool.compiler.semantics.rules.intrinsics import overloaded_form
 from plctool.compiler.semantics.rules.library_calls import call_symbol, call_text_function, overload_call
@@ -50,7 +50,7 @@ from plctool.iec.types import ELEMENTARY, ArrayType, ReferenceType, StructType, 
 
 def method_call(c: Checker, bound: Bound, node: ast.Call) -> Expr:
     """A call of a method or action."""
-    args = plain_arguments(c, node)
+    args = plain_arguments(c, node, declared_names(bound.callable))
     offset = node.callee.name_pos if isinstance(node.callee, ast.Member) else node.pos
     if args is None:
         return error_value(c.pos(node.pos))
@@ -313,7 +313,7 @@ def _call_of_place(c: Checker, node: ast.Call) -> Expr:
 def _call_function(c: Checker, symbol: PouSymbol, node: ast.Call, expected: Type | None) -> Expr:
     if not c.scope.may_use(symbol, symbol.decl.name, node.callee.pos):
         return error_value(c.pos(node.pos))
-    args = plain_arguments(c, node, {name.casefold() for name, _, _ in parameter_lines(symbol.decl)})
+    args = plain_arguments(c, node, declared_names(symbol))
     if args is None:
         return error_value(c.pos(node.pos))
     return call_symbol(c, symbol, args, node.pos, expected, formal=node.formal)
