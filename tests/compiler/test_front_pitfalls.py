@@ -400,8 +400,8 @@ VAR_IN_OUT x : INT; END_VAR
 See := x;
 END_FUNCTION
 FUNCTION Give
-VAR_OUTPUT x : INT; END_VAR
-x := 1;
+VAR_OUTPUT x : INT; END_VAR VAR_STAT n : INT; END_VAR
+x := 1; n := n + 1;
 END_FUNCTION
 FUNCTION SetG
 g := 5;
@@ -446,6 +446,7 @@ def test_two_tasks_write_one_byte_of_memory() -> None:
         ("g := 1;", "Give(x => g);"),
         ("g := 1;", "SetG();"),
         ("SetG();", "SetG();"),
+        ("Give();", "Give();"),
         ("p.a := 1;", "p.a := 2;"),
         ("p.a := 1;", "p.a := 1; p.b := 2;"),
         ("a[1] := 1;", "a[i] := 2;"),

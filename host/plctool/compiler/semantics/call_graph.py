@@ -196,7 +196,7 @@ def report_shared_writes(tasks: Sequence[Task], diagnostics: Diagnostics) -> Non
     told: set[Variable] = set()
     for later in range(1, len(tasks)):
         for earlier in range(later):
-            common = {pou.name for pou in by_task[later] & by_task[earlier]}
+            common = {pou.name for pou in by_task[later] & by_task[earlier] if pou.kind is PouKind.PROGRAM}
             mine, other = units.writes(by_task[later]), units.writes(by_task[earlier])
             for write, theirs in _overlaps(mine, other):
                 shared = write.variable.name.rpartition(".")[0] in common  # `task` warns of the program

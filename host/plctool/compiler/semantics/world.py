@@ -123,7 +123,7 @@ class World:
         self.open_members: dict[StructType, dict[str, VarSymbol]] = {}  # of structures: AT %I*, %Q*, %M*
         self.interfaces: dict[StructType, ClassInfo] = {}
         self.defaults: dict[str, StructInit] = {}
-        self.shared: dict[tuple[str, str, int], Variable] = {}
+        self.shared: dict[tuple[str, str, int, frozenset[tuple[str, Type]]], Variable] = {}
         self.enumeration_texts: dict[EnumType, PouSymbol] = {}  # what gives the names of values
         self._texts: dict[tuple[int | float | str, Type], Variable] = {}
         self._parameter_defaults: dict[tuple[str, int], Variable] = {}

@@ -111,6 +111,12 @@ def _seen_by_actions(block: ast.VarBlock, decl: ast.PouDecl) -> bool:
     return any(name.name.casefold() in names for name in ast.every(ast.Name, actions))
 
 
+def _owner(decl: ast.PouDecl, scope: Scope) -> str:
+    """What stands in front of the name of something that exists once: of a PROGRAM, for all its instances."""
+    pou = scope.pou
+    return decl.full_name if pou is None or pou.kind is PouKind.PROGRAM else pou.name
+
+
 def new_pou(symbol: PouSymbol, name: str) -> Pou:
     """The unit that a declaration becomes, still empty."""
     decl = symbol.decl
@@ -162,7 +168,7 @@ class UnitVariables:
         for line, role in _in_order_of_use(lines):
             t, init = self._types.declared_type(line, scope)
             for offset, name in line.names:
-                symbol = self._variables.constant_symbol(offset, name, t, init, scope, decl.name, role)
+                symbol = self._variables.constant_symbol(offset, name, t, init, scope, _owner(decl, scope), role)
                 symbol.given = line.init is not None
                 scope.declare(symbol, offset)
 
@@ -196,8 +202,7 @@ class UnitVariables:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
                 if t is not ERROR:
-                    owner = scope.pou.name if scope.pou is not None and decl.keyword is ast.Unit.METHOD else decl.name
-                    full_name = f"{owner}.{name}"
+                    full_name = f"{_owner(decl, scope)}.{name}"
                     keep = Keep.of(block.qualifiers)
                     self._variables.check_kept(name, t, keep, scope, offset)
                     symbol.variable = self._variables.shared_variable(full_name, t, init, scope, offset, keep=keep)

@@ -103,8 +103,8 @@ class Variables:
         constant: bool = False,
         keep: Keep = Keep.UNSAID,
     ) -> Variable:
-        """A variable that exists once for all instances of its POU."""
-        key = (scope.source.path, scope.source.name, offset)
+        """A variable that exists once for all instances of its POU; of a generic function, for each of its types."""
+        key = (scope.source.path, scope.source.name, offset, frozenset(scope.bindings.items()))
         variable = self._world.shared.get(key)
         if variable is None:
             area = self._area(t, keep)
