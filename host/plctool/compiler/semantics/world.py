@@ -126,7 +126,7 @@ class World:
         self.shared: dict[tuple[str, str, int, frozenset[tuple[str, Type]]], Variable] = {}
         self.enumeration_texts: dict[EnumType, PouSymbol] = {}  # what gives the names of values
         self._texts: dict[tuple[int | float | str, Type], Variable] = {}
-        self._parameter_defaults: dict[tuple[str, int], Variable] = {}
+        self._parameter_defaults: dict[VarSymbol, Variable] = {}
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
         self.pools: dict[StructType, Pool] = {}
         self.closers: dict[StructType, Pou] = {}  # what ends the elements that a POINTER TO the type leads to
@@ -153,12 +153,11 @@ class World:
 
     def default_of(self, symbol: VarSymbol) -> Variable:
         """What a parameter that is a structure or an array holds when a call leaves it out: a constant in memory."""
-        key = (symbol.pos.file, symbol.pos.line << 16 | symbol.pos.column)
-        variable = self._parameter_defaults.get(key)
+        variable = self._parameter_defaults.get(symbol)
         if variable is None:
             name = f"{symbol.name} default {symbol.pos.line}.{symbol.pos.column}"
             variable = Variable(name, symbol.type, Storage.AREA, symbol.pos, initial=symbol.default, constant=True)
-            self._parameter_defaults[key] = variable
+            self._parameter_defaults[symbol] = variable
             self.allocation.add(variable)
         return variable
 
