@@ -106,7 +106,7 @@ def _verify_node(node: object) -> None:
         assert all(condition.type is BOOL for condition, _ in node.branches)
     elif isinstance(node, typed.For):
         counter = base_of(node.var.type)
-        assert node.start.type == node.stop.type == counter
+        assert base_of(node.start.type) == node.stop.type == counter
         assert node.step.type in (counter, SIGNED[counter.size * 8])
     elif isinstance(node, typed.FbCall):
         for target, value in node.inputs:
