@@ -126,6 +126,20 @@ def test_types_of_one_name_in_two_namespaces_are_two_in_c(tool: Tool) -> None:
     compile_c("-c", "sensors.c", "-o", "sensors.o")
 
 
+@needs_compiler
+def test_wide_strings_unions_and_a_parameter_called_result(tool: Tool) -> None:
+    Path("wide.st").write_text(
+        "TYPE Wide : STRUCT w : WSTRING(5); n : INT; both : Both; END_STRUCT; "
+        "Both : UNION a : DWORD; b : LREAL; END_UNION; END_TYPE\n"
+        "{attribute 'external' := 'wide'}\nFUNCTION Take : INT VAR_INPUT result : INT; w : WSTRING; s : Wide; END_VAR "
+        "END_FUNCTION\n"
+        "{attribute 'external' := 'made'}\nFUNCTION Made : Wide VAR_INPUT result : Wide; END_VAR END_FUNCTION\n"
+    )
+    tool("export-itf", "wide.st", "-o", ".")
+    compile_c("-c", "wide.c", "-o", "wide.o")
+    assert "RTS_UI16 w[6];" in Path("wideItf.h").read_text()
+
+
 def test_an_array_of_any_size_comes_with_its_bounds(tool: Tool) -> None:
     export(tool)
     words = " ".join(Path("sensorsItf.h").read_text("utf-8").split())

@@ -145,6 +145,7 @@ def _parameters(pou: Pou) -> Iterator[str]:
 
 def _parameter(parameter: Parameter) -> Iterator[str]:
     t, name = parameter.variable.type, c_name(parameter.variable.name)
+    name = "result_" if name == "result" else name  # that is what the function gives
     if is_scalar(t) and not parameter.by_reference:
         value = _value(t)
         yield f"{value}{name}" if value.endswith("*") else f"{value} {name}"
@@ -182,11 +183,15 @@ def _target(t: Type) -> str:
     while isinstance(t, ArrayType):
         t = t.element
     if isinstance(t, StringType):
-        return "char "
+        return f"{_character(t)} "
     if isinstance(t, StructType):
         return f"{_type_name(t)} "
     text = _value(t)
     return text if text.endswith("*") else f"{text} "
+
+
+def _character(t: StringType) -> str:
+    return "RTS_UI16" if t.wide else "char"
 
 
 def _type_name(t: EnumType | StructType) -> str:
@@ -228,7 +233,7 @@ def _type_lines(t: EnumType | StructType) -> Iterable[str]:
         return [f"typedef {_value(t.base)} {_type_name(t)};", f"enum {{ {values} }};"]
     name, packed = _type_name(t), t.pack < MAX_ALIGN
     lines = [f"#pragma pack(push, {t.pack})"] if packed else []
-    lines += ["typedef struct {"]
+    lines += ["typedef union {" if t.union else "typedef struct {"]
     lines += [f"    {_field(f.type, c_name(f.name))};" for f in t.fields]
     lines += [f"}} {name};", *(["#pragma pack(pop)"] if packed else [])]
     lines += [f"RTS_STATIC_ASSERT(sizeof({name}) == {t.size}, {name}_size);"]
@@ -245,7 +250,7 @@ def _field(t: Type, name: str) -> str:
         counts = "".join(f"[{high - low + 1}]" for low, high in t.bounds)
         return _field(t.element, name + counts)
     if isinstance(t, StringType):
-        return f"char {name}[{t.length + 1}]"
+        return f"{_character(t)} {name}[{t.length + 1}]"
     if isinstance(t, PointerType):
         return f"union {{ {_value(t)}address; RTS_UI64 bits; }} {name}"
     if isinstance(t, StructType):

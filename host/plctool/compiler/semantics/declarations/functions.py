@@ -211,5 +211,5 @@ def interface_text(name: str, pou: Pou) -> str:
 def _interface_name(t: Type) -> str:
     """Without namespaces: a library has the same functions in a program that imports it as in one of its own."""
     if isinstance(t, StringType):
-        return "STRING"
+        return "WSTRING" if t.wide else "STRING"
     return _NAMESPACE.sub("", t.name).upper()

@@ -87,7 +87,7 @@ def unary_operator(c: Checker, node: ast.Unary, expected: Type | None) -> Expr:
         return c.error(node.pos, "type", f"{node.op} needs a number, not {e.type}")
     if node.op is ast.Operator.ADD:
         return e
-    if not base.signed and base.bits < 64 and not isinstance(e, Const):
+    if not base.signed and base.bits < 64 and not is_untyped(e):
         base = SIGNED[base.bits * 2]
     return fold_unary(c, UnaryOp.NEG, convert(e, base), node.pos)
 
