@@ -16,7 +16,8 @@ void ModbusTcpBeginServer(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns);
 /* A link that connects to a server when it is asked whether it is ready, and again when it has lost the connection,
  * MODBUS_RECONNECT_MS after it began to connect last, or at once if it was given up. */
 void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer);
-/* Of a client nothing that is on its way arrives any more: it would do so minutes later, after newer values. */
+/* Of a client nothing that is on its way arrives any more: it would do so minutes later, after newer values. Nor of a
+ * server whose peer does not read: the system would keep it for ever. */
 void ModbusTcpClose(MODBUS_LINK *link);
 
 bool ModbusTcpReady(MODBUS_LINK *link, RTS_I64 now_ns);

@@ -1,6 +1,6 @@
 /*
- * test_linux_socket.c - SysSocket: what a closed connection still sends, and one that is reset does not; datagrams that
- * find no socket; networks.
+ * test_linux_socket.c - SysSocket: what a closed connection still sends, and one that is reset does not; what main waits
+ * for while a peer does not read; datagrams that find no socket; networks.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -105,6 +105,23 @@ static void one_that_is_reset_sends_nothing_more(void)
     end(&peer);
 }
 
+/* A component that sends may read no more until all has left. */
+static void what_a_peer_sends_that_does_not_read_ends_no_wait(void)
+{
+    static RTS_UI8 data[65536];
+    PEER peer;
+
+    begin(&peer);
+    (void)fill(peer.socket);
+    CHECK_EQUAL(write(peer.file, data, 1), 1);
+    (void)PortWait(0); /* after what was sent */
+    CHECK(!PortWait(0));
+    while (!PortWait(1)) /* until there is room again */
+        CHECK(read(peer.file, data, sizeof(data)) > 0);
+    SysSockReset(peer.socket);
+    end(&peer);
+}
+
 /* ---- the networks of the device ---- */
 
 static void the_networks_are_those_that_tools_reach_it_by(void)
@@ -176,6 +193,7 @@ int main(void)
 {
     RUN(a_closed_connection_sends_what_was_taken);
     RUN(one_that_is_reset_sends_nothing_more);
+    RUN(what_a_peer_sends_that_does_not_read_ends_no_wait);
     RUN(a_datagram_that_is_refused_is_told_and_costs_no_other_one);
     RUN(the_networks_are_those_that_tools_reach_it_by);
     return test_result();

@@ -123,6 +123,46 @@ static void replies_wait_for_room(void)
     CHECK(has_reply(socket, 1, UNIT));
 }
 
+/* It sends requests, and its side of the connection is full of replies. */
+static FAKE_SOCKET *dial_without_reading(void)
+{
+    FAKE_SOCKET *socket = net_dial();
+
+    for (RTS_UI16 i = 0; i < 20; i++)
+        net_put_pdu(socket, i, UNIT, read_two, sizeof(read_two));
+    socket->out_size = FAKE_SOCKET_ROOM;
+    return socket;
+}
+
+static void a_client_that_reads_nothing_for_seconds_is_dropped(void)
+{
+    FAKE_SOCKET *deaf;
+    FAKE_SOCKET *other;
+
+    begin();
+    deaf = dial_without_reading();
+    other = net_dial();
+    run_ms(4900);
+    CHECK(deaf->open);
+    run_ms(200);
+    CHECK(!deaf->open);
+    CHECK_EQUAL(deaf->out_size, 0); /* it was reset: the system keeps nothing for it */
+    CHECK(works(other));
+}
+
+static void a_client_that_reads_slowly_stays(void)
+{
+    FAKE_SOCKET *slow;
+
+    begin();
+    slow = dial_without_reading();
+    for (RTS_UI32 i = 0; i < 2 * REPLY_SIZE; i++) {
+        run_ms(4900);
+        CHECK(slow->open);
+        slow->out_size--;
+    }
+}
+
 /* What a header with these words does: the connection is closed, and counted. */
 static void check_bad_header(RTS_UI16 protocol, RTS_UI16 length)
 {
@@ -243,6 +283,8 @@ int main(void)
     RUN(several_frames_may_come_at_once);
     RUN(a_flood_holds_up_no_other);
     RUN(replies_wait_for_room);
+    RUN(a_client_that_reads_nothing_for_seconds_is_dropped);
+    RUN(a_client_that_reads_slowly_stays);
     RUN(what_is_no_frame_ends_the_connection);
     RUN(half_a_frame_and_its_end);
     RUN(one_client_more_replaces_the_idlest);

@@ -478,7 +478,8 @@ RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RT
     if (count > 0) {
         PortWaitNotNow();
     }
-    find(socket)->events = *taken < size ? POLLIN | POLLOUT : POLLIN;
+    /* Who has more to send may not read until it is gone: bytes that come meanwhile would end each wait. */
+    find(socket)->events = *taken < size ? POLLOUT : POLLIN;
     return ERR_OK;
 }
 

@@ -31,7 +31,7 @@ bool PortIsDevice(int file, const char *path);
  */
 typedef struct {
     int file;     /* -1: there is nothing to wait for now */
-    short events; /* POLLIN; with POLLOUT while it has to take more, POLLPRI for what says so */
+    short events; /* POLLIN; POLLOUT while it has to take more, POLLPRI for what says so */
 } PORT_SOURCE;
 
 /* False when PORT_MAX_SOURCES are there. Adding one again does nothing, as does removing one that is not there. */

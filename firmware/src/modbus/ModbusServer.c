@@ -15,7 +15,7 @@
 #include "ModbusTunnel.h"
 #include "SysLock.h"
 
-enum { TEXT_MAX = 100, REGISTER_SIZE = 2, ANY_UNIT = 255, LATE_NS = 100000000 };
+enum { TEXT_MAX = 100, REGISTER_SIZE = 2, ANY_UNIT = 255, NS_PER_MS = 1000000, LATE_MS = 100, UNREAD_MS = 5000 };
 
 static bool is_tcp(const MODBUS_SERVER *server)
 {
@@ -339,10 +339,12 @@ static RTS_UI32 reply_no_target(RTS_UI8 *pdu)
 }
 
 /* A reply on a serial line does not say to which request it is: one that the port does not take in time would be that
- * to a later one. */
+ * to a later one. A client of TCP that reads nothing for so long is gone, or will not read any more. */
 static void give_up_late(const MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64 now_ns)
 {
-    if (!is_tcp(server) && link->sending && now_ns - link->moved_ns >= LATE_NS)
+    RTS_I64 most_ns = (RTS_I64)(is_tcp(server) ? UNREAD_MS : LATE_MS) * NS_PER_MS;
+
+    if (link->sending && now_ns - link->moved_ns >= most_ns)
         ModbusLinkType(link)->give_up(link);
 }
 

@@ -48,7 +48,7 @@ void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer)
 
 void ModbusTcpClose(MODBUS_LINK *link)
 {
-    if (is_open(link) && link->type == &of_client)
+    if (is_open(link) && (link->type == &of_client || link->sending))
         SysSockReset(link->handle);
     else if (is_open(link))
         SysSockClose(link->handle);
