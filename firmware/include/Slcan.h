@@ -8,7 +8,7 @@
  *
  *   tIIIL<data>\r TIIIIIIIIL<data>\r    frame with 11 or 29 bits, L bytes; r and R: remote
  *   dIIIL<data>\r DIIIIIIIIL<data>\r    FD, L is the length code 0..F; b and B: with the second bit rate
- *   C\r S6\r Y2\r O\r                   to an adapter: close, bit rate, second bit rate, open
+ *   \r C\r S6\r Y2\r O\r                to an adapter: end of what was cut, close, bit rate, second bit rate, open
  *   F\r -> Fxx\r                       its status flags: 0x04 warning, 0x20 passive, 0x01 and 0x08 frames were lost
  *   sbRRRTTT\r                         the state has changed: a(ctive), w(arning), p(assive), b(us off), and the
  *                                      counters of errors in receiving and sending, decimal

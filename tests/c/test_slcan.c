@@ -189,10 +189,10 @@ static void an_adapter_is_opened_at_the_bit_rate(void)
 {
     start();
     CHECK_EQUAL(SlcanOpen(&slcan, (SLCAN_LINE){read_line, write_line}, 500000, 2000000), ERR_OK);
-    CHECK(line.out_size == 10 && memcmp(line.out, "C\rS6\rY2\rO\r", 10) == 0);
+    CHECK(line.out_size == 11 && memcmp(line.out, "\rC\rS6\rY2\rO\r", 11) == 0);
     line.out_size = 0;
     CHECK_EQUAL(SlcanOpen(&slcan, (SLCAN_LINE){read_line, write_line}, 83300, 0), ERR_OK);
-    CHECK(line.out_size == 7 && memcmp(line.out, "C\rS9\rO\r", 7) == 0);
+    CHECK(line.out_size == 8 && memcmp(line.out, "\rC\rS9\rO\r", 8) == 0);
     CHECK_EQUAL(SlcanOpen(&slcan, (SLCAN_LINE){read_line, write_line}, 123456, 0), ERR_NOT_SUPPORTED);
     CHECK_EQUAL(SlcanOpen(&slcan, (SLCAN_LINE){read_line, write_line}, 500000, 3000000), ERR_NOT_SUPPORTED);
 }
@@ -251,11 +251,24 @@ static void bus_off_ends_when_the_adapter_is_opened_again(void)
     CHECK_EQUAL(SlcanSend(&slcan, &examples[0].frame), ERR_DEVICE);
     CHECK_EQUAL(state_after("F00\r").bus, CAN_BUS_OFF); /* flags do not say bus off */
     SlcanRestart(&slcan);
-    CHECK(is_sent("C\rS6\rO\r"));
+    CHECK(is_sent("\rC\rS6\rO\r"));
     CAN_STATE state = state_after("\r\r\r");
     CHECK(state.bus == CAN_BUS_ACTIVE && state.tx_errors == 0);
     CHECK_EQUAL(SlcanSend(&slcan, &examples[0].frame), ERR_OK);
     CHECK(is_sent(examples[0].text));
+}
+
+/* The adapter would take the first command for a part of it, and refuse the others while it is open. */
+static void a_frame_that_was_cut_takes_no_command_with_it(void)
+{
+    start();
+    line.write_limit = 5;
+    CHECK_EQUAL(SlcanSend(&slcan, &examples[2].frame), ERR_OK);
+    line.write_limit = 0;
+    CHECK_EQUAL(state_after("sb256256\r").bus, CAN_BUS_OFF);
+    line.write_limit = LINE_SIZE;
+    SlcanRestart(&slcan);
+    CHECK(is_sent("T1F40\rC\rS6\rO\r"));
 }
 
 static void the_flags_are_asked_for_now_and_then_and_their_answer_is_the_state(void)
@@ -305,6 +318,7 @@ int main(void)
     RUN(an_adapter_that_reports_its_state_is_believed);
     RUN(what_is_no_report_changes_no_state);
     RUN(bus_off_ends_when_the_adapter_is_opened_again);
+    RUN(a_frame_that_was_cut_takes_no_command_with_it);
     RUN(the_flags_are_asked_for_now_and_then_and_their_answer_is_the_state);
     RUN(a_frame_that_the_line_has_not_taken_is_not_cut_by_a_question);
     return test_result();

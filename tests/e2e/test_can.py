@@ -384,6 +384,16 @@ def test_bus_off_that_an_adapter_reports_is_ended_and_logged_once(tmp_path: Path
     assert said == ["CAN: bus off; check the bit rate and the cable"]
 
 
+def test_a_tool_opens_an_adapter_that_has_the_beginning_of_a_frame() -> None:
+    """Of a tool that was killed."""
+    with closing(_Adapter()) as adapter:
+        line = os.open(adapter.path, os.O_WRONLY | os.O_NOCTTY)
+        os.write(line, b"T1F40")
+        os.close(line)
+        open_bus(f"slcan:{adapter.path}", 500000, 0).shutdown()
+        adapter.expects("T1F40O", "C", "S6")
+
+
 def test_what_is_no_interface_expects(tool: Any) -> None:
     for place, status, said in (
         ("can0", 2, "is not a CAN interface"),

@@ -175,10 +175,13 @@ static void put_command(SLCAN *slcan, char letter, char code)
     slcan->out[slcan->out_size++] = END;
 }
 
-/* Whatever the line has not taken yet is forgotten. */
+/* Whatever the line has not taken yet is forgotten. The adapter may have the beginning of it, or of what a process sent
+ * that was killed: that line ends first, or the first command would be a part of it. */
 static void open_adapter(SLCAN *slcan)
 {
-    slcan->out_size = slcan->out_sent = 0;
+    slcan->out[0] = END;
+    slcan->out_size = 1;
+    slcan->out_sent = 0;
     slcan->bus = CAN_BUS_ACTIVE;
     slcan->tx_errors = slcan->rx_errors = 0;
     put_command(slcan, 'C', 0);
