@@ -322,9 +322,10 @@ RTS_RESULT SysCanSend(RTS_UI32 index, const CAN_FRAME *frame)
         return SlcanSend(&can.slcan, frame);
     }
     RTS_RESULT result = CanSocketSend(can.line.file, frame);
-    can.line.events = result == ERR_NOBUFFER ? POLLIN | POLLOUT : POLLIN;
     if (result == ERR_OK) {
         PortWaitNotNow();
+    } else if (result == ERR_NOBUFFER) {
+        SysTimeWantPass(1); /* poll does not know the queue of the interface: for it there is always room */
     } else if (result == ERR_DEVICE) {
         can.state.bus = CAN_BUS_STOPPED;
     }
