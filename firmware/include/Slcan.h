@@ -65,7 +65,10 @@ typedef struct {
     char out[SLCAN_TEXT_SIZE + SLCAN_COMMANDS_SIZE];
 } SLCAN;
 
-/* Sends the commands that open an adapter; what is none ignores them. ERR_NOT_SUPPORTED: adapters have no such bit rate. */
+/* Whether adapters have these bit rates; the second one 0: no CAN FD. */
+bool SlcanKnows(RTS_UI32 bit_rate, RTS_UI32 data_bit_rate);
+
+/* Sends the commands that open an adapter; what is none ignores them. ERR_NOT_SUPPORTED: it does not know a bit rate. */
 RTS_RESULT SlcanOpen(SLCAN *slcan, SLCAN_LINE line, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate);
 
 /* As the functions of SysCan.h; a frame that the line has not taken yet goes on with each call of these. */

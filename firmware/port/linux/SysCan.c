@@ -202,6 +202,10 @@ bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON 
         PortReason(reason, "cannot open CAN %s: the name is too long", text);
         return false;
     }
+    if (path != NULL && !SlcanKnows(options->bit_rate, options->data_bit_rate)) {
+        PortReason(reason, "cannot open CAN %s: SLCAN has no such bit rate; give for example --bitrate 500000", text);
+        return false;
+    }
     memset(&can, 0, sizeof(can));
     can.slave = -1;
     can.options = *options;

@@ -192,10 +192,15 @@ static void open_adapter(SLCAN *slcan)
     (void)flush(slcan);
 }
 
+bool SlcanKnows(RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
+{
+    return code_of(bit_rate) != 0 &&
+           (data_bit_rate == 0 || (CAN_FD && (data_bit_rate == 2000000 || data_bit_rate == 5000000)));
+}
+
 RTS_RESULT SlcanOpen(SLCAN *slcan, SLCAN_LINE line, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
 {
-    if (code_of(bit_rate) == 0 ||
-        (data_bit_rate != 0 && (!CAN_FD || (data_bit_rate != 2000000 && data_bit_rate != 5000000))))
+    if (!SlcanKnows(bit_rate, data_bit_rate))
         return ERR_NOT_SUPPORTED;
     memset(slcan, 0, sizeof(*slcan));
     slcan->line = line;
