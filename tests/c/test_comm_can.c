@@ -255,6 +255,47 @@ static void a_tool_that_stops_in_the_middle_blocks_no_other(void)
     can_end();
 }
 
+/* The last frame of a request waits in the controller when this returns. */
+static void send_stop(CLIENT *client)
+{
+    RTS_UI8 content[32];
+    RTS_UI8 message[PIECE];
+    BTAG_WRITER writer;
+
+    BTagWriterInit(&writer, content, sizeof(content));
+    BTagOpen(&writer, TAG_APP_DESCRIPTOR, BTAG_ALIGN_0);
+    BTagWrite32(&writer, TAG_APP_SESSION, client->app_session);
+    BTagClose(&writer);
+    client_send_message(client, message,
+                        client_message(client, SG_APPLICATION, SRV_APP_STOP, content, writer.size, message));
+}
+
+/* The frames of another tool came in time, and were read after the service. */
+static void a_service_that_takes_long_aborts_no_packet_of_another_tool(void)
+{
+    static const RTS_UI8 first[] = {0x10, 12, 1, 2, 3, 4, 5, 6};
+    static const RTS_UI8 last[] = {0x21, 7, 8, 9, 10, 11, 12};
+    CLIENT client;
+
+    can_start(500 * KBIT, 0);
+    CHECK(can_connect(&client, can_tool(130)));
+    CAN_TOOL *other = can_tool(200);
+    fakes.control_ms = 5 * ISOTP_TIMEOUT_MS;
+    send_stop(&client);
+    can_frame(other, DEVICE_NODE, first, sizeof(first));
+    while (SimCanNext() != INT64_MAX)
+        SimCanAdvance(SimCanNext());
+    CHECK_EQUAL(fakes.stops, 0);
+    can_pass(1);
+    CHECK_EQUAL(fakes.stops, 1);
+    RTS_UI32 packets = BlkDrvCanGetCounters()->packets;
+    can_frame(other, DEVICE_NODE, last, sizeof(last));
+    can_pass(10);
+    CHECK_EQUAL(BlkDrvCanGetCounters()->aborted, 0);
+    CHECK_EQUAL(BlkDrvCanGetCounters()->packets, packets + 1);
+    can_end();
+}
+
 static void ids_tried_in_the_name_of_a_tool_close_nothing(void)
 {
     CLIENT client;
@@ -590,6 +631,7 @@ int main(void)
     RUN(packets_of_several_tools_arrive_at_the_same_time);
     RUN(more_packets_than_there_is_room_for_are_sent_again);
     RUN(a_tool_that_stops_in_the_middle_blocks_no_other);
+    RUN(a_service_that_takes_long_aborts_no_packet_of_another_tool);
     RUN(ids_tried_in_the_name_of_a_tool_close_nothing);
     RUN(tools_that_have_vanished_give_way_in_less_than_a_second);
     RUN(a_tool_that_is_many_leaves_a_channel_to_others);

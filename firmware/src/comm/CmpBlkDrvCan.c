@@ -263,12 +263,13 @@ static void take_frame(const CAN_FRAME *frame, RTS_UI32 now_ms)
         take_isotp(source, frame, now_ms);
 }
 
-static void receive(RTS_UI32 now_ms)
+/* Each frame at its own time: a service that the one before it completes may take long. */
+static void receive(void)
 {
     CAN_FRAME frame;
 
     for (RTS_UI32 i = 0; i < READ_MAX && SysCanReceive(CONTROLLER, &frame) == ERR_OK; i++)
-        take_frame(&frame, now_ms);
+        take_frame(&frame, SysTimeGetMs());
 }
 
 /* ---- sending packets ---- */
@@ -401,12 +402,10 @@ static void watch_bus(RTS_UI32 now_ms)
 
 static void cycle(void)
 {
-    RTS_UI32 now_ms = SysTimeGetMs();
-
     if (!can.open)
         return;
-    receive(now_ms);
-    now_ms = SysTimeGetMs(); /* a service may have taken its time */
+    receive();
+    RTS_UI32 now_ms = SysTimeGetMs();
     expire(now_ms);
     answer_scans(now_ms);
     transmit(now_ms);
