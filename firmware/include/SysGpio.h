@@ -23,10 +23,10 @@ typedef struct {
 /* ---- from main ---- */
 
 /*
- * Adds a line to a group that is closed, or is being put together; below 1 ms, with nothing done to the hardware. The
- * name is copied or understood, not kept. ERR_NO_OBJECT: the board has no such line; ERR_OPERATION_DENIED: something else
- * has it (another process, the kernel, another group); ERR_NOT_SUPPORTED: it cannot do what the options say;
- * ERR_NOMEMORY.
+ * Adds a line to a group that is closed, or is being put together; below 1 ms, with nothing done to the hardware. Tasks
+ * may use other groups meanwhile. The name is copied or understood, not kept. ERR_NO_OBJECT: the board has no such line;
+ * ERR_OPERATION_DENIED: something else has it (another process, the kernel, another group); ERR_NOT_SUPPORTED: it cannot
+ * do what the options say; ERR_NOMEMORY.
  */
 RTS_RESULT SysGpioAdd(RTS_UI32 group, RTS_UI32 number, const SYS_GPIO_LINE *line);
 

@@ -302,6 +302,20 @@ static void lines_are_given_back_with_the_application(void)
     end_lines();
 }
 
+static void main_pass(void)
+{
+    CHECK_EQUAL(IoDrvGpio_Hook(CH_COMM_CYCLE), ERR_OK);
+}
+
+/* One diagnosis wants it to be looked for, a pass of main does so, and the next diagnosis opens it. */
+static void pass_until_looked_for(void)
+{
+    for (RTS_UI32 i = 0; i < 3; i++) {
+        CHECK_EQUAL(SimAdvance(ms(110)), ERR_OK);
+        main_pass();
+    }
+}
+
 static void a_chip_that_has_gone_comes_back(void)
 {
     begin_lines();
@@ -315,17 +329,12 @@ static void a_chip_that_has_gone_comes_back(void)
     CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0); /* on_error */
     CHECK_EQUAL(AppGetAreaAddress(APP_AREA_DATA, 16 + 12, 1)[0], 0);
     SimGpioUnplug(0);
-    CHECK_EQUAL(SimAdvance(ms(150)), ERR_OK);
+    pass_until_looked_for();
     CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
     CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 1);
     CHECK_EQUAL(SimGpioGet("DO0"), 1);
     CHECK(log_has("Board has an error") && log_has("Board is back"));
     end_lines();
-}
-
-static void main_pass(void)
-{
-    CHECK_EQUAL(IoDrvGpio_Hook(CH_COMM_CYCLE), ERR_OK);
 }
 
 static bool is_ok(void)
@@ -349,6 +358,40 @@ static void begin_line_with_event(void)
     io_add_channel(&io, 0, IO_MAP_INPUTS, 0, GPIO_INPUTS, 0, 0, 1);
 }
 
+/* In a diagnosis tasks cannot use the driver; to ask all chips for their lines takes long. */
+static void a_chip_that_has_gone_is_looked_for_while_tasks_may_use_others(void)
+{
+    begin_line_with_event();
+    start_io();
+    SimGpioUnplug(1);
+    main_pass();
+    SimGpioUnplug(0);
+    CHECK_EQUAL(SimAdvance(ms(500)), ERR_OK);
+    CHECK(!is_ok());
+    main_pass();
+    CHECK_EQUAL(SimAdvance(ms(110)), ERR_OK);
+    CHECK(is_ok());
+    end_lines();
+}
+
+/* It is given back, not opened, when the program goes meanwhile. */
+static void lines_that_were_found_are_free_without_the_program(void)
+{
+    begin_line_with_event();
+    start_io();
+    SimGpioUnplug(1);
+    main_pass();
+    SimGpioUnplug(0);
+    CHECK_EQUAL(SimAdvance(ms(110)), ERR_OK);
+    main_pass();
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    main_pass();
+    begin_lines_again();
+    add_connector_of("DI0", 0);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    end_lines();
+}
+
 /* Without an event nothing reads the lines, and a chip that has gone posts none. */
 static void a_chip_that_only_posts_events_is_lost_and_comes_back(void)
 {
@@ -359,12 +402,10 @@ static void a_chip_that_only_posts_events_is_lost_and_comes_back(void)
     SimGpioUnplug(1);
     main_pass();
     CHECK(!is_ok());
-    CHECK_EQUAL(SimAdvance(ms(150)), ERR_OK); /* it is looked for */
-    main_pass();
+    pass_until_looked_for();
     CHECK(!is_ok());
     SimGpioUnplug(0);
-    CHECK_EQUAL(SimAdvance(ms(150)), ERR_OK);
-    main_pass();
+    pass_until_looked_for();
     CHECK(is_ok());
     CHECK(log_has("DI0 has an error") && log_has("DI0 is back"));
     CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
@@ -412,5 +453,7 @@ int main(void)
     RUN(a_chip_that_has_gone_comes_back);
     RUN(a_chip_that_only_posts_events_is_lost_and_comes_back);
     RUN(a_chip_that_has_gone_is_one_error);
+    RUN(a_chip_that_has_gone_is_looked_for_while_tasks_may_use_others);
+    RUN(lines_that_were_found_are_free_without_the_program);
     return test_result();
 }

@@ -5,6 +5,9 @@
  *
  * A connector is a group of lines (SysGpio.h). A group whose lines stay the same over a download stays open, whatever its
  * place among the connectors, so that outputs that hold their value do so.
+ *
+ * Lines that are lost are looked for in a pass of main, in which tasks may use other groups: it takes long where all
+ * chips are asked. IoDrvGetModuleDiagnosis, which has the driver for itself, only opens what was found.
  */
 #include "IoDrvGpio.h"
 
@@ -21,12 +24,15 @@
 RTS_STATIC_ASSERT((int)IO_GPIO_LINES == 32, a_value_has_a_bit_for_each_line);
 RTS_STATIC_ASSERT(SCHED_MAX_EXTERNAL_EVENTS <= 32, events_have_a_bit_each);
 
+typedef enum { NOT_ADDED, TO_BE_ADDED, ADDED } LINES_STATE;
+
 typedef struct {
-    RTS_UI32 user;       /* index of its connector + 1; 0: the group is not in use now */
+    RTS_UI16 user;       /* index of its connector + 1; 0: the group is not in use now */
+    RTS_UI8 state;       /* LINES_STATE of its lines in SysGpio.h; of main alone */
     RTS_UI32 outputs;    /* lines that are some */
     RTS_UI8 in[4];       /* as they were read */
     RTS_UI8 out[4];      /* to be written */
-    RTS_UI32 lines;      /* CRC of what they are; 0: closed */
+    RTS_UI32 lines;      /* CRC of what they are; 0: closed, and no task uses it */
     RTS_UI32 events;     /* handles of those that are registered for it, a bit each */
     RTS_UI32 has_failed; /* since it was opened; tasks and main say so */
 } GROUP;
@@ -59,12 +65,13 @@ static void close_group(GROUP *group)
 {
     RTS_HANDLE event;
 
-    if (group->lines != 0)
+    if (group->state == ADDED)
         SysGpioClose((RTS_UI32)(group - groups));
     for (event = 0; group->events != 0; event++, group->events >>= 1) {
         if ((group->events & 1) != 0)
             (void)SchedUnregisterExternalEvent(event);
     }
+    group->state = NOT_ADDED;
     group->lines = 0;
     group->outputs = 0;
 }
@@ -137,24 +144,33 @@ static RTS_RESULT add_line(GROUP *group, RTS_UI32 number, const char **bad)
     return SysGpioAdd((RTS_UI32)(group - groups), number, &line);
 }
 
-/* Opens the lines of a connector. */
-static RTS_RESULT open_group(GROUP *group, const IoConfigConnector *connector, const char **bad)
+static RTS_RESULT add_lines(GROUP *group, const char **bad)
 {
     RTS_RESULT result = ERR_OK;
     RTS_UI32 n;
 
-    group->user = user_of(connector);
-    group->lines = crc_of_lines(connector);
+    group->state = ADDED;
     for (n = 0; n < IO_GPIO_LINES && result == ERR_OK; n++)
         result = add_line(group, n, bad);
-    if (result == ERR_OK)
-        result = SysGpioOpen((RTS_UI32)(group - groups), BytesGet32(group->out));
-    SysAtomicStore(&group->has_failed, result != ERR_OK);
-    if (result == ERR_OK)
-        IoMgrConfigNoteAlive(connector);
-    else
+    if (result != ERR_OK)
         close_group(group);
     return result;
+}
+
+/* With the lines that were added. */
+static RTS_RESULT open_group(GROUP *group)
+{
+    const IoConfigConnector *connector = connector_of(group);
+    RTS_RESULT result = SysGpioOpen((RTS_UI32)(group - groups), BytesGet32(group->out));
+
+    if (result != ERR_OK) {
+        close_group(group);
+        return result;
+    }
+    group->lines = crc_of_lines(connector);
+    SysAtomicStore(&group->has_failed, 0);
+    IoMgrConfigNoteAlive(connector);
+    return ERR_OK;
 }
 
 /* The group of a user; of 0, one that is free. NULL: there is none. */
@@ -176,7 +192,7 @@ static RTS_RESULT keep_group(const IoConfigConnector *connector)
     while (i < IO_GPIO_GROUPS && (groups[i].user != 0 || groups[i].lines != lines))
         i++;
     if (i < IO_GPIO_GROUPS) {
-        groups[i].user = user_of(connector);
+        groups[i].user = (RTS_UI16)user_of(connector);
         IoMgrConfigNoteAlive(connector);
     }
     return ERR_OK;
@@ -194,7 +210,10 @@ static RTS_RESULT take_group(const IoConfigConnector *connector)
         return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "this device can have %u groups of lines.",
                                  (unsigned)IO_GPIO_GROUPS);
     memset(group->out, 0, sizeof group->out);
-    result = open_group(group, connector, &bad);
+    group->user = (RTS_UI16)user_of(connector);
+    result = add_lines(group, &bad);
+    if (result == ERR_OK)
+        result = open_group(group);
     if (result == ERR_OK)
         return ERR_OK;
     group->user = 0;
@@ -291,7 +310,7 @@ static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
         GROUP *group = &groups[number];
         RTS_UI32 values;
         RTS_UI32 lock;
-        RTS_RESULT result = SysGpioRead(number, &values);
+        RTS_RESULT result = group->lines != 0 ? SysGpioRead(number, &values) : (RTS_RESULT)ERR_DEVICE;
 
         if (result != ERR_OK) {
             note_failure(group);
@@ -326,24 +345,37 @@ static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
 /* A chip that has gone (USB) is opened again when it is back, outputs with what they should be. */
 static RTS_RESULT diagnose(const IoConfigConnector *connector)
 {
-    const char *bad;
     GROUP *group = find_group(user_of(connector));
 
     if (group == NULL || SysAtomicLoad(&group->has_failed) == 0)
         return ERR_OK;
-    close_group(group);
-    return open_group(group, connector, &bad);
+    if (group->lines != 0)
+        close_group(group);
+    if (group->state == ADDED)
+        return open_group(group);
+    group->state = TO_BE_ADDED;
+    return ERR_DEVICE;
 }
 
 /* Edges, and chips that have gone: without edges there may be no task that would notice. */
+static void poll_group(GROUP *group)
+{
+    const char *bad;
+
+    if (group->lines != 0 && SysGpioPoll((RTS_UI32)(group - groups)) != ERR_OK &&
+        SysAtomicLoad(&group->has_failed) == 0)
+        note_failure(group);
+    if (group->state == TO_BE_ADDED)
+        (void)add_lines(group, &bad);
+}
+
 static void poll_groups(void)
 {
     RTS_UI32 i;
 
     for (i = 0; i < IO_GPIO_GROUPS; i++) {
-        GROUP *group = &groups[i];
-        if (group->user != 0 && group->lines != 0 && SysGpioPoll(i) != ERR_OK && SysAtomicLoad(&group->has_failed) == 0)
-            note_failure(group);
+        if (groups[i].user != 0)
+            poll_group(&groups[i]);
     }
 }
 
