@@ -307,7 +307,7 @@ static void main_pass(void)
     CHECK_EQUAL(IoDrvGpio_Hook(CH_COMM_CYCLE), ERR_OK);
 }
 
-/* One diagnosis wants it to be looked for, a pass of main does so, and the next diagnosis opens it. */
+/* Every 100 ms the manager wants it to be looked for, or opened; in between a pass of main looks for it. */
 static void pass_until_looked_for(void)
 {
     for (RTS_UI32 i = 0; i < 3; i++) {
@@ -358,7 +358,7 @@ static void begin_line_with_event(void)
     io_add_channel(&io, 0, IO_MAP_INPUTS, 0, GPIO_INPUTS, 0, 0, 1);
 }
 
-/* In a diagnosis tasks cannot use the driver; to ask all chips for their lines takes long. */
+/* While the manager asks how a device is, tasks cannot use its driver; to ask all chips for their lines takes long. */
 static void a_chip_that_has_gone_is_looked_for_while_tasks_may_use_others(void)
 {
     begin_line_with_event();

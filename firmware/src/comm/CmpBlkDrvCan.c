@@ -263,7 +263,7 @@ static void take_frame(const CAN_FRAME *frame, RTS_UI32 now_ms)
         take_isotp(source, frame, now_ms);
 }
 
-/* Each frame at its own time: a service that the one before it completes may take long. */
+/* Each frame at its own time: a service that the previous one has completed may take long. */
 static void receive(void)
 {
     CAN_FRAME frame;
