@@ -197,6 +197,24 @@ def test_line_that_is_too_slow_is_warned_of(tmp_path: Path) -> None:
     assert any("too slow" in m for m in messages(tmp_path, PROGRAM, text))
 
 
+def test_device_that_is_not_enabled_takes_no_time_of_its_line(tmp_path: Path) -> None:
+    spare = "".join(device("words").replace("Meter", "Spare").replace("100ms", "1ms").splitlines(True)[3:])
+    spare = spare.replace("unit = 3", "unit = 4\nenabled = false")
+    alone, both = (build(tmp_path, PROGRAM, device("word_1") + more) for more in ("", spare))
+    assert not any("too slow" in w.message for w in both.warnings)
+    assert both.symbols.io["devices"][0]["load"] == alone.symbols.io["devices"][0]["load"]
+    ages = [c["age_us"] for c in both.symbols.io["channels"]]
+    assert ages == [alone.symbols.io["channels"][0]["age_us"], None]
+
+
+def test_line_that_is_not_enabled_has_no_load_and_no_device_that_is(tmp_path: Path) -> None:
+    text = device("words").replace('"T#100ms"', '"T#20ms"').replace("baud", "enabled = false\nbaud")
+    built = build(tmp_path, PROGRAM, text)
+    assert not any("too slow" in w.message for w in built.warnings)
+    assert [(d["load"], d["enabled"]) for d in built.symbols.io["devices"]] == [(None, False), (None, False)]
+    assert [c["age_us"] for c in built.symbols.io["channels"]] == [None]
+
+
 BOTH = """\
 [[modbus.tcp]]
 host = "127.0.0.1"
@@ -352,6 +370,12 @@ def second_device(key: str, name: str = "Second") -> str:
 def test_two_devices_with_one_unit_are_a_warning(tmp_path: Path) -> None:
     found = messages(tmp_path, PROGRAM, second_device("unit = 3"))
     assert any("Second has the unit 3 of " in message and "both are one device" in message for message in found), found
+
+
+def test_two_devices_with_the_unit_of_one_that_is_not_enabled_are_a_warning(tmp_path: Path) -> None:
+    text = second_device("unit = 3").replace("unit = 3", "unit = 3\nenabled = false", 1)
+    found = messages(tmp_path, PROGRAM, f'{text}[[modbus.rs485.device]]\nname = "Third"\nunit = 3\n')
+    assert any("Third has the unit 3 of Second" in message for message in found), found
 
 
 @pytest.mark.parametrize("key", ["unit = 4", 'unit = 3\norder = "CDAB"', "unit = 3\nenabled = false"])

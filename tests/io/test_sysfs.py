@@ -60,6 +60,11 @@ def test_age_of_an_input_is_that_of_its_readings(tmp_path: Path) -> None:
     assert ages["in_voltage0"] == 20_000 + 10_000  # and the interval of the task
 
 
+def test_input_of_a_device_that_is_not_enabled_has_no_age(tmp_path: Path) -> None:
+    text = ADC.replace('name = "Adc"', 'name = "Adc"\nenabled = false')
+    assert {c["age_us"] for c in build(tmp_path, PROGRAM, text).symbols.io["channels"]} == {None}
+
+
 @pytest.mark.parametrize(
     "description, expected",
     [

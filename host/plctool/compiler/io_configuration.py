@@ -151,7 +151,8 @@ def substitute_value(t: Type | None, value: object) -> int:
 
 
 def io_document(program: TypedProgram, description: Description) -> dict[str, Any]:
-    """What the symbol file says of inputs and outputs. `age_us`: see `worst_age_us`; `address`: of the variable."""
+    """What the symbol file says of inputs and outputs. `age_us`: see `worst_age_us`, None of a device that is
+    not enabled; `address`: of the variable."""
     devices = [
         {
             "name": connector.name,
@@ -174,7 +175,7 @@ def io_document(program: TypedProgram, description: Description) -> dict[str, An
             "type": str(c.variable_type),
             "address": _address(c),
             "tasks": [program.tasks[i].name for i in c.tasks],
-            "age_us": worst_age_us(c, program.tasks),
+            "age_us": worst_age_us(c, program.tasks) if connector.enabled else None,
             "parameter": c.parameter,
             "parameter_bit": c.parameter_bit,
             "bits": c.size_bits,

@@ -24,7 +24,7 @@ def read_connector(
     """A connector of the class `made` with the keys `name`, `task`, `optional` and `enabled` of a table.
 
     With `name` it has a variable of that name in the program; without `default_name` the name is required. `kind`:
-    CT_*, for other than master and slave."""
+    CT_*, for other than master and slave. What is on a line that is not enabled is not enabled either."""
     name = table.text("name", required="" if default_name else "Drive1")
     if name is not None and not is_name(name):
         what = f"the name of a device is one of a variable, with at most {MAX_NAME} letters, digits and _"
@@ -36,7 +36,7 @@ def read_connector(
     connector.type = kind if kind is not None else int(lib.CT_SLAVE if parent is not None else lib.CT_MASTER)
     connector.variable = name is not None
     connector.optional = table.flag("optional")
-    connector.enabled = table.flag("enabled", True)
+    connector.enabled = table.flag("enabled", True) and (parent is None or parent.enabled)
     connector.task = table.text("task")
     connector.task_pos = table.value_pos("task")
     return connector

@@ -160,7 +160,7 @@ class ModbusLine(Connector):
     def note_ages(self) -> None:
         """A job that is due waits for each of the others once at most: the one that has been due longest comes next.
         What changes when the device has just begun to reply is in the next reply."""
-        jobs = [job for device in self.devices for job in device.jobs]
+        jobs = [job for device in self.devices if device.enabled for job in device.jobs]
         round_us = int(sum(job.took_us for job in jobs))
         for job in jobs:
             for channel in job.channels:
@@ -313,7 +313,7 @@ class ModbusDevice(Connector):
             )
         if job.verify:
             job.took_us += line.transaction_us(5, 2 + _data_size(function, job.write.count))
-        if line.char_us is None or job.interval_us == 0:
+        if not self.enabled or line.char_us is None or job.interval_us == 0:
             return
         before = line.load or 0.0
         line.load = before + job.took_us / job.interval_us
@@ -386,9 +386,9 @@ def _read_devices(table: Table, line: ModbusLine) -> list[Connector]:
 def _warn_of_equal_units(line: ModbusLine, mistakes: Mistakes) -> None:
     """Two devices with one unit are one that is described twice, which its orders of bytes may need, or a mistake."""
     seen: dict[tuple[int, Order], ModbusDevice] = {}
-    for device in line.devices:
+    for device in (d for d in line.devices if d.enabled):
         first = seen.setdefault((device.unit, device.order), device)
-        if first is not device and device.enabled and first.enabled:
+        if first is not device:
             message = f"{device.name} has the unit {device.unit} of {first.name} in line {first.pos.line}"
             mistakes.warning(device.pos, f"{message}: both are one device; give it its own unit, or one table")
 
