@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
+
+from library_support import library
+
 from plctool import Simulator
+from plctool.cli.arguments import parser
 from plctool.cli.file_documents import prepared_source
-from plctool.cli.projects import settings_of_sources
+from plctool.cli.projects import settings_of, settings_of_sources
 from plctool.image.file import image_crc
 
 LONG = "x" * 256  # bytes; a name has 255
@@ -272,6 +278,46 @@ def test_sources_of_a_project_with_a_board_make_its_image_again(tool: Any, proje
     image = project / "app.cdl"
     archive, _ = prepared_source(settings_of_sources([project]), image_crc(image.read_bytes()), image)
     assert archive.build[archive.build.index("--board") + 1] == "mps2-an385/full"
+
+
+ARCHIVED = """\
+sources = ["src"]
+io = "main.io.toml"
+device = "small.toml"
+[options]
+debug = true
+werror = true
+"""
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["--io", "io/alt.io.toml"], ["--device", "large.toml"], ["--no-debug"], ["--library", "libs"]]
+)
+def test_sources_of_a_project_and_options_make_its_image_again(tool: Any, project: Path, words: list[str]) -> None:
+    write(project, ARCHIVED)
+    library(project / "libs", "Lib", {"get.st": "FUNCTION Get : INT\nGet := 7;\nEND_FUNCTION\n"})
+    (project / "src/main.st").write_text(MAIN.replace("+ 1", "+ Lib.Get()") if "libs" in words else MAIN)
+    (project / "io").mkdir()
+    for path, address in (("main.io.toml", "%IX0.0"), ("io/alt.io.toml", "%IX9.0")):
+        (project / path).write_text(f"[sim.in]\nx = '{address}'\n")
+    for name in ("small", "large"):
+        (project / f"{name}.toml").write_text(f'name = "{name}"\ntarget = "cortex-m3"\n')
+    assert tool("build", "--no-werror", *words).status == 0
+    image = project / "app.cdl"
+    archive, _ = prepared_source(settings_of(parser().parse_args(["build", *words])), image_crc(image.read_bytes()))
+    assert set(words) <= {word.removeprefix(f"{project.name}/") for word in archive.build}
+
+
+@pytest.mark.parametrize("sources", ["src", "../src"])
+def test_library_that_needs_no_files_does_not_keep_sources_from_being_stored(
+    tool: Any, project: Path, monkeypatch: pytest.MonkeyPatch, sources: str
+) -> None:
+    (project / "below").mkdir()
+    monkeypatch.chdir(project / "below" if sources.startswith("..") else project)
+    words = ["build", sources, "--library", "Util", "-o", "app.cdl"]
+    assert tool(*words).status == 0
+    archive, _ = prepared_source(settings_of(parser().parse_args(words)), image_crc(Path("app.cdl").read_bytes()))
+    assert list(archive.files) == ["src/main.st"]
 
 
 def test_device_of_the_command_line_holds_before_the_board_of_the_project(tool: Any, project: Path) -> None:

@@ -18,6 +18,7 @@ from plctool.link.file_services import SOURCE_NAME
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
+    from plctool.compiler.program_files import ProgramFiles
 
 _FACTS = "plctool-source.json"
 _FORMAT = 1
@@ -105,9 +106,10 @@ def archive_of(settings: Settings, crc: int, target: str) -> Archive:
 
 
 def _files(settings: Settings) -> Iterator[Path]:
-    """All that is read, each once, as paths of real files."""
+    """All that is read or has to be there, each once, as paths of real files."""
     project = settings.files.project
-    every = [*settings.files.every_file(), *([project.file] if project is not None else [])]
+    of_project = (project.file, project.io, project.device) if project is not None else ()
+    every = (*settings.files.every_file(), *(path for path in of_project if path is not None))
     yield from dict.fromkeys(path.resolve() for path in every)
 
 
@@ -115,11 +117,17 @@ def _folders(settings: Settings) -> Iterator[Path]:
     """That contain all of it. A folder that was named keeps its name in the archive, because the image may have it."""
     yield from (path.parent for path in _files(settings))
     project = settings.files.project
-    if project is not None:
-        yield project.file.resolve().parent.parent
-        return
-    for path in (*settings.files.sources, *settings.files.libraries):
+    named = settings.files.sources if project is None else [project.file.resolve().parent]
+    for path in (*named, *_named_libraries(settings.files)):
         yield path.resolve().parent if path.name else path.resolve()
+
+
+def _named_libraries(files: ProgramFiles) -> list[Path]:
+    """Those that the project does not name. Names that need no files are left out."""
+    from plctool.compiler.library_files import libraries_at
+
+    known = files.project.libraries if files.project is not None else []
+    return [path for path in files.libraries if path not in known and libraries_at(path)]
 
 
 def _below(root: Path, path: Path) -> str:
@@ -128,22 +136,21 @@ def _below(root: Path, path: Path) -> str:
 
 def _words(settings: Settings, root: Path) -> list[str]:
     """What makes the image, in the folder of the archive."""
-    files = settings.files
-    words: list[Any] = []
-    if files.project is not None:
-        words = [_below(root, files.project.file)]
-    else:
-        words = [_below(root, path) for path in files.sources]
-        for path in files.libraries:
-            words += ["--library", _below(root, path)]
-        if files.io.description is not None:
-            words += ["--io", _below(root, files.io.description)]
-        if files.io.device is not None:
-            words += ["--device", _below(root, files.io.device)]
+    files, project = settings.files, settings.files.project
+    named = files.sources if project is None else [project.file]
+    words: list[Any] = [_below(root, path) for path in named]
+    for path in _named_libraries(files):
+        words += ["--library", _below(root, path)]
+    if files.io.description not in (None, project and project.io):
+        words += ["--io", _below(root, files.io.description)]
+    if files.io.device not in (None, project and project.device):
+        words += ["--device", _below(root, files.io.device)]
     words += ["--board", settings.board] if settings.board else ["--target", settings.target]
     words += [f"-O{settings.level}", "--checks", settings.checks]
     words += [] if settings.dialect is None else ["--dialect", settings.dialect]
-    return [*map(str, words), *(["--debug"] if settings.debug else [])]
+    words += ["--debug" if settings.debug else "--no-debug"]
+    words += ["--no-werror"] if settings.warnings.as_errors else []  # it may have been built so: the image is the same
+    return list(map(str, words))
 
 
 def _built_crc(archive: Archive, folder: Path) -> int:
