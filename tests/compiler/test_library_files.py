@@ -157,6 +157,16 @@ def test_two_libraries_with_one_namespace_are_refused(tmp_path: Path) -> None:
     assert "have the same namespace" in refusal(a, b)
 
 
+@pytest.mark.parametrize(("here", "named", "folder"), [(".", ".", ".."), ("src", "..", "../..")])
+def test_library_that_is_named_as_a_dot_has_what_lies_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: str, named: str, folder: str
+) -> None:
+    monkeypatch.chdir(library(tmp_path, "Top", {"src/t.st": GET}, Base="1") / here)
+    assert f"or put it into {folder}\n" in refusal(Path(named))
+    library(tmp_path, "Base", {"b.st": GET})
+    assert [found.path for found in resolve_libraries([], [Path(named)])] == [Path(folder) / "Base"]
+
+
 def test_library_that_is_checked_by_itself_has_what_it_needs(tmp_path: Path) -> None:
     library(tmp_path, "Base", {"b.st": GET})
     test = "TEST 'own'\nASSERT_EQ(Top.Twice(), 14);\nASSERT_EQ(Twice(), 14);\nEND_TEST\n"

@@ -245,15 +245,21 @@ class _Resolution:
 
     def _missing(self, library: LibraryFiles, needed: Dependency) -> str:
         names = [*(other.name for other in (*self.found.values(), *self._near(library))), *STAND_INS]
-        hint = did_you_mean(needed.name, names) or f"; give it with --library, or put it into {library.path.parent}"
+        hint = did_you_mean(needed.name, names) or f"; give it with --library, or put it into {_folder_of(library)}"
         return f"{library.name} needs the library {needed.name}, which is not here{hint}"
 
     def _near(self, library: LibraryFiles) -> list[LibraryFiles]:
         """The libraries in the folder of a library. What is none of them, and not right either, does not matter."""
-        folder = library.path.parent
+        folder = _folder_of(library)
         if folder not in self._nearby:
             self._nearby[folder] = [other for path in _libraries_in(folder) if (other := _readable(path))]
         return self._nearby[folder]
+
+
+def _folder_of(library: LibraryFiles) -> Path:
+    """The folder that a library lies in, also of one that is named as . or .."""
+    path = library.path
+    return path.parent if path.name not in ("", "..") else path / ".."
 
 
 def _readable(path: Path) -> LibraryFiles | None:
