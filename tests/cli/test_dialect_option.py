@@ -12,10 +12,11 @@ HALF = "PROGRAM Main\nVAR x : REAL := 2.5; b : BYTE; END_VAR\nb := REAL_TO_BYTE(
 TEST = "TEST 'halves'\nVAR x : REAL := 2.5; END_VAR\nASSERT_EQ(REAL_TO_BYTE(x), BYTE#3);\nEND_TEST\n"
 
 
-@pytest.mark.parametrize("words", [["check"], ["build"], ["test"], ["export", "-o", "out/m.xml"]])
+@pytest.mark.parametrize("words", [["check"], ["build"], ["test"], ["export", "-o", "out/m.xml"], ["export-itf"]])
 def test_commands_take_it_and_refuse_unknown_ones(tool: Any, scratch: Path, words: list[str]) -> None:
     (scratch / "out").mkdir()
-    (scratch / "m.st").write_text(MIXED + "TEST 'nothing'\nASSERT_TRUE(TRUE);\nEND_TEST\n")
+    in_c = "{attribute 'external' := 'in_c'}\nFUNCTION InC : INT\nEND_FUNCTION\n"
+    (scratch / "m.st").write_text(MIXED + in_c + "TEST 'nothing'\nASSERT_TRUE(TRUE);\nEND_TEST\n")
     assert tool(*words, "m.st").status == 0
     done = tool(*words, "m.st", "--dialect", "iec")
     assert done.status != 0 and "error in the dialect iec" in done.out + done.err

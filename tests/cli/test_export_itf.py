@@ -6,11 +6,16 @@ import ctypes
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import _plccore
 import pytest
 from conftest import Tool
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
+
+from library_support import library
 
 from plctool.core import lib
 from plctool.sim import Simulator
@@ -277,6 +282,21 @@ def test_the_document_lists_the_functions(tool: Tool) -> None:
     assert functions[0]["interface"].startswith("sensor_scale(INT,REAL,BOOL,UNIT,DIGIT,TIME,LWORD):REAL")
     assert functions[0]["version"] == "2.3"
     assert len(functions[0]["signature"]) == 8
+
+
+@pytest.mark.parametrize("words", [[], ["."], ["src", "--library", "Base", "--io", "a.io.toml"]])
+def test_a_program_has_its_libraries_and_devices(tool: Tool, scratch: Path, words: list[str]) -> None:
+    library(scratch, "Base", {"pair.st": "TYPE Pair : STRUCT a : INT; b : LREAL; END_STRUCT END_TYPE\n"})
+    (scratch / "src").mkdir()
+    (scratch / "src/main.st").write_text(
+        "{attribute 'external' := 'mean'}\nFUNCTION Mean : LREAL\nVAR_INPUT p : Base.Pair; END_VAR\nEND_FUNCTION\n"
+        "PROGRAM Main\nVAR p : Base.Pair; r : LREAL; END_VAR\n"
+        "IF Drive.ok THEN r := Mean(p); END_IF\nEND_PROGRAM\n"
+    )
+    (scratch / "a.io.toml").write_text("[sim]\nname = 'Drive'\n")
+    (scratch / "plc.toml").write_text("sources = 'src'\nlibraries = 'Base'\nio = 'a.io.toml'\n")
+    assert tool("export-itf", *words, "-o", "c").status == 0
+    assert (scratch / f"c/{'src' if 'src' in words else scratch.name}Itf.h").exists()
 
 
 def test_a_library_without_c_functions_is_reported(tool: Tool) -> None:

@@ -212,16 +212,13 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_io_files(xml)
 
     export = command("export-itf", "write a C header, and a C file to fill in, for functions implemented in C")
-    export.add_argument(
-        "sources", nargs="*", type=usable_path, metavar="FILE.st|DIR", help="for a folder, all sources in it"
-    )
+    _add_sources(export)
     export.add_argument(
         "-o", "--output", type=file_path, default=Path(), metavar="DIR", help="default: the current folder"
     )
     export.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
-    export.add_argument(
-        "--device", type=usable_path, metavar="FILE.toml", help="write the C header of this board instead"
-    )
+    _add_dialect(export)
+    _add_io_files(export, "write the C header of this board instead")
 
     bench = command("bench", "measure the time of a cycle on this machine")
     _add_image(bench)
@@ -440,11 +437,11 @@ def _add_warnings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--werror", action=argparse.BooleanOptionalAction, help="treat warnings as errors")
 
 
-def _add_io_files(parser: argparse.ArgumentParser) -> None:
+def _add_io_files(parser: argparse.ArgumentParser, device: str = "what the vendor says of the board") -> None:
     parser.add_argument(
         "--io", type=usable_path, metavar="FILE.io.toml", help="inputs and outputs; default: what is beside the sources"
     )
-    parser.add_argument("--device", type=usable_path, metavar="FILE.toml", help="what the vendor says of the board")
+    parser.add_argument("--device", type=usable_path, metavar="FILE.toml", help=device)
 
 
 def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:

@@ -157,34 +157,35 @@ def _missing_document(name: Missing) -> Document:
     return {"name": name.name, "library": name.library, "count": name.count, "file": first.file, "line": first.line}
 
 
-def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Document:
+def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
     """Writes the C header of the functions that are implemented in C, and a C file to fill in, unless there is one.
 
     Raises CompileError when the sources have errors, UsageError when no function is implemented in C.
     """
-    from plctool.compiler import CompileError, load_sources, program_files
+    from plctool.compiler import CompileError, io_sources, library_sources
     from plctool.compiler.export_itf import export_interface as export
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
     from plctool.files import make_folder
+    from plctool.iec.dialect import find_dialect
 
-    if not paths:
-        raise UsageError("Name the sources, or a board by --device.", "usage")
-    sources = load_sources(paths)
+    files, dialect = settings.files, find_dialect(settings.dialect)
+    sources, io, libraries = files.load_sources(), files.load_io(), files.load_libraries()
     with bugs_reported():
-        program = check_sources(sources)
-    if program.program is None:
-        raise CompileError(program.diagnostics, sources)
-    functions = program.program.externals
+        checked = check_sources(sources, io=io, libraries=libraries, dialect=dialect)
+    if checked.program is None:
+        raise CompileError(checked.diagnostics, [*sources, *io_sources(io), *library_sources(libraries)])
+    functions = checked.program.externals
     if not functions:
         raise UsageError(
             "No function is implemented in C; mark those that are by {attribute 'external' := 'name'}.", "no-external"
         )
-    interface = export(paths[0].resolve().stem, functions)
+    named = files.sources[0] if files.project is None else files.project.file.parent
+    interface = export(named.resolve().stem, functions)
     header, source = folder / interface.header_name, folder / interface.source_name
     written = force or not source.exists()
     for file in (header, source) if written else (header,):
-        check_not_read(file, program_files(paths).every_file(), "-o interface, a folder for it")
+        check_not_read(file, files.every_file(), "-o interface, a folder for it")
     make_folder(folder)
     write_atomically(header, interface.header.encode("latin-1", "replace"))
     if written:

@@ -153,7 +153,8 @@ def _export(args: argparse.Namespace) -> int:
 def _export_itf(args: argparse.Namespace) -> int:
     if args.device is not None:
         return _show(args, io_documents.export_board(args.device, args.output), lambda d: str(d["header"]))
-    return _show(args, documents.export_interface(args.sources, args.output, args.force), output.interface_text)
+    args.no_warn, args.werror = [], None
+    return _show(args, documents.export_interface(_settings(args), args.output, args.force), output.interface_text)
 
 
 def _bench(args: argparse.Namespace) -> int:
