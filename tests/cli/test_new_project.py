@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from plctool import templates
 from plctool.compiler import check_sources
 from plctool.templates import TEMPLATES
 
@@ -28,10 +30,19 @@ def test_a_library_is_not_called_like_a_word_of_the_language(tool: Any, name: st
     assert not Path("libraries").exists()
 
 
-@pytest.mark.parametrize("name", ["TON", "Main", "Scale", "THIS", "Default", "library"])
+@pytest.mark.parametrize("name", ["TON", "Main", "Scale", "THIS", "Default", "library", "a" * 63])
 def test_other_names_do_for_a_library(tool: Any, name: str) -> None:
     assert tool("new", name, "--template", "library").status == 0
     assert check_sources([name]).diagnostics == []
+
+
+def test_every_word_of_its_template_does_for_a_library_or_is_refused(tool: Any) -> None:
+    """A variable hides the library whose name it has."""
+    sources = (Path(templates.__file__).parent / "library").rglob("*.st")
+    words = {word for source in sources for word in re.findall(r"[A-Za-z]\w*", source.read_text("utf-8"))}
+    made = [word for word in sorted(words) if tool("new", word, "--template", "library").status == 0]
+    assert [word for word in ("raw", "low", "Cyclic") if word not in made] == []
+    assert [word for word in made if check_sources([word]).diagnostics] == []
 
 
 @pytest.mark.parametrize("template", sorted({*TEMPLATES} - {"library"}))
