@@ -155,6 +155,23 @@ def test_a_condition_may_be_a_named_transition_or_a_variable(tmp_path: Path) -> 
         assert plc.read("Main.Start.X") is True
 
 
+@pytest.mark.parametrize("more", ["", 'negated="true"'])
+@pytest.mark.parametrize("condition", ["{} // go", "{}; // go", "// go\n:= {}; (* go *)", "(* ; *) {}"])
+def test_a_condition_may_have_comments(tmp_path: Path, condition: str, more: str) -> None:
+    wired = transition(2, "1", condition.format("n > 3 AND a" if more else "n < 3 OR a"), more=more)
+    elements = (step(1, "Start", initial=True), wired, step(3, "End", "2"), transition(4, "3", "FALSE"))
+    with started(tmp_path, chart(*elements, jump(5, "4", "Start"))) as plc:
+        plc.run_cycles(3)
+        assert plc.read("Main.End.X") is True
+
+
+@pytest.mark.parametrize("condition", ["", ":=", ";", "// go"])
+def test_a_comment_is_no_condition(tmp_path: Path, condition: str) -> None:
+    elements = (step(1, "Start", initial=True), transition(2, "1", condition), jump(3, "2", "Start"))
+    ((_, message),) = errors(tmp_path, chart(*elements))
+    assert message.endswith("a transition has no condition")
+
+
 def test_an_action_may_have_a_qualifier_with_a_time(tmp_path: Path) -> None:
     elements = (*LOOP[:3], actions(4, "3", action("b", "L", 'duration="T#20ms"')), *LOOP[4:])
     with started(tmp_path, chart(*elements[:4], transition(5, "3", "FALSE"), *elements[5:])) as plc:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
 from plctool.compiler.formats.plcopen_graph import Network
 from plctool.compiler.formats.text import Chunk, Place
+from plctool.compiler.formats.units import tokens_of
 from plctool.compiler.formats.xml_tree import Element
 
 _BRANCHES = ("selectionDivergence", "selectionConvergence", "simultaneousDivergence", "simultaneousConvergence")
@@ -97,7 +98,7 @@ class Chart:
         head = f"TRANSITION{order} FROM {_listed(sources)} TO {_listed(targets)} := "
         self._body.parts.append((head, transition.at))
         self._body.parts += condition
-        self._body.line(";\nEND_TRANSITION", transition.at)
+        self._body.line("\n;\nEND_TRANSITION", transition.at)  # the condition may end with a comment
 
     def _condition(self, transition: Element) -> list[Chunk | tuple[str, Place]]:
         condition = transition.child("condition")
@@ -118,7 +119,7 @@ class Chart:
             found = [] if value is None else [(value, transition.at)]
         if not found:
             raise NotTranslatedError(transition.at, "a transition has no condition")
-        return [("NOT (", transition.at), *found, (")", transition.at)] if negated else found
+        return [("NOT (", transition.at), *found, ("\n)", transition.at)] if negated else found
 
     def _steps_before(self, element: Element, depth: int = 0) -> Iterator[str]:
         for ref in _connections(element):
@@ -139,20 +140,19 @@ class Chart:
 
 
 def expression(text: Element) -> list[Chunk | tuple[str, Place]]:
-    """The condition in a body of Structured Text: `x`, `:= x` or `:= x;`."""
-    chunks = [chunk for chunk in text.every_chunk() if chunk.text.strip()]
-    if not chunks:
-        return []
-    first = chunks[0]
-    head = len(first.text) - len(first.text.lstrip().removeprefix(":="))
-    skipped = first.text[:head]
-    if "\n" not in skipped:
-        chunks[0] = Chunk(first.text[head:], first.line, first.column + head)
-    else:
-        chunks[0] = Chunk(first.text[head:], first.line + skipped.count("\n"), len(skipped) - skipped.rfind("\n"))
-    last = chunks[-1]
-    chunks[-1] = last._replace(text=last.text.rstrip().removesuffix(";"))
-    return [chunk for chunk in chunks if chunk.text]
+    """The condition in a body of Structured Text: `x`, `:= x` or `:= x;`, with comments before and after it."""
+    chunks = text.every_chunk()
+    *tokens, _ = tokens_of("".join(chunk.text for chunk in chunks))
+    signs = {t.pos: t.end for t in tokens[:1] if t.text == ":="} | {t.pos: t.end for t in tokens[-1:] if t.text == ";"}
+    found, at = [], 0
+    for chunk in chunks:
+        kept = chunk.text
+        for begin, end in signs.items():
+            first, last = (min(max(offset - at, 0), len(kept)) for offset in (begin, end))
+            kept = kept[:first] + " " * (last - first) + kept[last:]
+        found.append(chunk._replace(text=kept))
+        at += len(kept)
+    return [*found] if len(tokens) > len(signs) else []
 
 
 def _connections(element: Element) -> list[str]:
