@@ -44,10 +44,16 @@ def taken(number: int, name: str, source: str, row: int = 0, more: str = "") -> 
 
 
 def block(
-    number: int, kind: str, inputs: dict[str, str], outputs: str = "OUT", instance: str = "", row: int = 0
+    number: int,
+    kind: str,
+    inputs: dict[str, str],
+    outputs: str = "OUT",
+    instance: str = "",
+    row: int = 0,
+    order: int = 0,
 ) -> str:
-    """A block; an input may be `!id` for a negated one."""
-    name = f' instanceName="{instance}"' if instance else ""
+    """A block; an input may be `!id` for a negated one. `order`: its execution number."""
+    name = f' executionOrderId="{order}"' + (f' instanceName="{instance}"' if instance else "")
     read = "".join(
         f'<variable formalParameter="{n}"{" negated=" + chr(34) + "true" + chr(34) if s.startswith("!") else ""}>'
         f"{lines(s.lstrip('!')) if s else ''}</variable>"
@@ -78,7 +84,8 @@ def run(folder: Path, body: str, local: list[str], cycles: int = 1, other: str =
     main = pou("Main", body, variables("localVars", *local))
     with started(folder, project(other + main, instances=CYCLE)) as plc:
         plc.run_cycles(cycles)
-        return {name: plc.read(f"Main.{name}") for name in (d.partition(":")[0] for d in local) if "TON" not in name}
+        declared = (d.split(":")[:2] for d in local)
+        return {name: plc.read(f"Main.{name}") for name, kind in declared if kind.isupper() and kind != "TON"}
 
 
 CYCLE = """<configuration name="c"><resource name="r"><task name="t" priority="1" interval="T#10ms">
@@ -133,6 +140,88 @@ def test_execution_numbers_come_before_positions(tmp_path: Path) -> None:
         taken(4, "c", "2", row=10, more='executionOrderId="2"'),
     )
     assert run(tmp_path, body, ["a:INT:=7", "b:INT", "c:INT"])["c"] == 7
+
+
+def test_a_function_runs_at_its_execution_number(tmp_path: Path) -> None:
+    body = network(
+        given(1, "x"),
+        given(2, "7"),
+        block(3, "ADD", {"IN1": "1", "IN2": "2"}, order=1),
+        given(4, "100"),
+        taken(5, "x", "4", more='executionOrderId="2"'),
+        taken(6, "r", "3.OUT", more='executionOrderId="3"'),
+    )
+    assert run(tmp_path, body, ["x:INT:=1", "r:INT"]) == {"x": 100, "r": 8}
+
+
+INCREASE = pou("Inc", st("o := o + n;"), variables("inputVars", "n:INT") + variables("outputVars", "o:INT"),
+               "functionBlock")  # fmt: skip
+SAME = pou("Same", st("o := i;"), variables("inputVars", "i:INT") + variables("outputVars", "o:INT"), "functionBlock")
+
+
+@pytest.mark.parametrize(("first", "second", "seen"), [(1, 2, 1), (2, 1, 2), (0, 0, 2), (1, 0, 2)])
+def test_a_block_sees_the_outputs_that_a_later_one_had(tmp_path: Path, first: int, second: int, seen: int) -> None:
+    body = network(
+        given(1, "1"),
+        block(2, "Inc", {"n": "1"}, "o", "a", order=second),
+        block(3, "Same", {"i": "4.OUT"}, "o", "b", order=first),
+        block(4, "MOVE", {"IN": "2.o"}),
+        taken(5, "r", "3.o"),
+    )
+    assert run(tmp_path, body, ["a:Inc", "b:Same", "r:INT"], 2, INCREASE + SAME) == {"r": seen}
+
+
+def test_a_function_of_the_project_is_not_called_when_EN_is_FALSE(tmp_path: Path) -> None:
+    result = "<returnType><BOOL/></returnType>"
+    own = pou("Big", st("Big := 10 / d > 1;"), result + variables("inputVars", "d:INT"), "function")
+    body = ladder(
+        contact(2, "go", "1"),
+        given(3, "d"),
+        block(4, "Big", {"EN": "2", "d": "3"}),
+        coil(5, "big", "4.OUT"),
+        taken(6, "d", "7", row=30),
+        given(7, "0"),
+        coil(8, "go", "1", row=60, more='negated="true"'),
+    )
+    local = ["go:BOOL:=TRUE", "d:INT:=2", "big:BOOL"]
+    assert run(tmp_path, body, local, 3, own) == {"go": False, "d": 0, "big": True}
+
+
+def test_an_output_in_the_block_is_written_once(tmp_path: Path) -> None:
+    point = "<connectionPointOut><expression>n</expression></connectionPointOut>"
+    added = block(3, "ADD", {"IN1": "1", "IN2": "2"}).replace(
+        '<variable formalParameter="OUT"/>', f'<variable formalParameter="OUT">{point}</variable>'
+    )
+    body = network(given(1, "(n)"), given(2, "(1)"), added)
+    assert run(tmp_path, body, ["n:INT"]) == {"n": 1}
+
+
+ONCE = 'edge="rising"'
+PIN = '<variable formalParameter="Q1"'
+
+
+@pytest.mark.parametrize(
+    ("elements", "seen"),
+    [
+        ((given(2, "x", ONCE), taken(3, "y", "2")), [True, False]),
+        ((given(2, "x"), taken(3, "y", "2", more=ONCE)), [True, False]),
+        ((given(2, "x"), block(3, "SR", {"S1": "2"}, "Q1", "s").replace(PIN, f"{PIN} {ONCE}"), taken(4, "y", "3.Q1")),
+         [True, False]),
+        ((given(2, "x"), f'<inOutVariable localId="3" negatedIn="true">{at(0)}{lines("2")}<expression>z</expression>'
+          "</inOutVariable>", given(4, "z"), taken(5, "y", "4", row=10)), [False, False]),
+        ((f'<inOutVariable localId="3" negatedOut="true">{at(0)}<expression>z</expression></inOutVariable>',
+          taken(5, "y", "3")), [True, True]),
+        ((given(2, "x // on"), taken(5, "y", "2", more='negated="true"')), [False, False]),
+    ],
+)  # fmt: skip
+def test_modifiers_are_heeded(tmp_path: Path, elements: tuple[str, ...], seen: list[bool]) -> None:
+    main = pou("Main", network(*elements), variables("localVars", "x:BOOL:=TRUE", "y:BOOL", "z:BOOL", "s:SR"))
+    with started(tmp_path, project(main, instances=CYCLE)) as plc:
+        found = []
+        for _ in seen:
+            plc.run_cycles(1)
+            found.append(plc.read("Main.y"))
+    assert found == seen
 
 
 def test_a_function_is_computed_once_for_all_that_read_it(tmp_path: Path) -> None:
@@ -249,6 +338,38 @@ def test_an_export_without_positions_is_executed_in_the_order_of_the_file(tmp_pa
         ((coil(2, "a", "77"),), "a line comes from element 77, which does not exist"),
         ((contact(2, "a", "3"), contact(3, "a", "2"), coil(4, "a", "3")), "it has a loop without a function block"),
         ((block(2, "AND", {"IN1": "2.OUT", "IN2": "1"}), coil(4, "a", "2.OUT")), "a loop without a function block"),
+        ((given(2, "a", 'storage="set"'), coil(3, "a", "2")), 'storage="set" has no translation here'),
+        ((contact(2, "a", "1", more='storage="set"'), coil(3, "a", "2")), 'storage="set" has no translation here'),
+        ((coil(3, "a", "1", more='edge="both"'),), 'edge="both" has no translation here'),
+        (
+            (f'<inOutVariable localId="2" edgeOut="falling">{at(0)}<expression>a</expression></inOutVariable>',),
+            'edgeOut="falling" has no translation here',
+        ),
+        (
+            (block(2, "SR", {"S1": "1"}, "Q1", "a").replace('"S1"', '"S1" storage="set"'),),
+            'storage="set" has no translation here',
+        ),
+        (
+            (
+                given(2, "n"),
+                block(3, "ABS", {"IN": "2"}, order=2),
+                block(4, "ABS", {"IN": "3.OUT"}, order=1),
+                taken(5, "n", "4.OUT"),
+            ),
+            "number 2 is needed before",
+        ),
+        (
+            (given(2, "x.y"), block(3, "ABS", {"IN": "2"}, order=1), taken(4, "n", "3.OUT")),
+            "the type of the result of ABS is not known",
+        ),
+        (
+            (
+                contact(2, "a", "1"),
+                block(3, "SR", {"EN": "2", "S1": "1"}, "ENO Q1", "b", order=2),
+                block(4, "SR", {"S1": "3.ENO"}, "Q1", "c", order=1),
+            ),
+            "its ENO is needed before it is executed",
+        ),
         (
             (given(2, "x.y"), block(3, "ABS", {"IN": "2"}), taken(4, "n", "3.OUT"), taken(5, "n", "3.OUT", row=40)),
             "the type of the result of ABS is not known",

@@ -21,6 +21,15 @@ _SIMPLE = re.compile(r"[\w.#%\[\]^$:']+")
 _SAME_ROW = 10  # units of the editor by which elements of one row may differ
 _SINKS = frozenset(("outVariable", "inOutVariable", "coil", "return"))
 _REFUSED = {"jump": "a jump", "label": "a label", "error": "an error block"}
+_MODIFIERS = {"negated": ("true",), "edge": ("rising", "falling"), "storage": ("set", "reset")}
+_MODIFIED = {
+    "contact": ("negated", "edge"), "coil": ("negated", "edge", "storage"), "return": (),
+    "inVariable": ("negated", "edge"), "outVariable": ("negated", "edge", "storage"),
+    "inOutVariable": ("negatedIn", "negatedOut"),
+    "inputVariables": ("negated", "edge"), "outputVariables": ("negated", "edge"), "inOutVariables": (),
+}  # fmt: skip
+"""What may stand at an element, or at a connection of a block."""
+
 _TRIGGERS = {"rising": "R_TRIG", "falling": "F_TRIG"}
 
 _OF_FIRST = frozenset((
@@ -55,6 +64,7 @@ class Network:
                 self._consumers.setdefault(connection.get("refLocalId"), []).append(consumer)
         self._done: dict[str, str] = {}  # results of functions, and "" for called blocks, by local id
         self._busy: set[str] = set()
+        self._now = 0  # the execution number of the block whose inputs are evaluated
 
     # ---- all of it ----
 
@@ -63,6 +73,7 @@ class Network:
         for element in self._order:
             if element.tag in _REFUSED:
                 raise NotTranslatedError(element.at, f"it has {_REFUSED[element.tag]}")
+            _check_modifiers(element)
         for element in self._in_order():
             self._execute(element)
 
@@ -85,7 +96,7 @@ class Network:
             self._assign(element, (element.child("expression") or element).text, value)
 
     def _assign(self, element: Element, target: str, value: str) -> None:
-        if _is(element, "negated"):
+        if _is(element, "negatedIn" if element.tag == "inOutVariable" else "negated"):
             value = _negated(value)
         value = self._edge(element, value)
         storage = element.get("storage")
@@ -123,7 +134,7 @@ class Network:
             return "TRUE"
         if element.tag in ("inVariable", "inOutVariable"):
             value = _operand((element.child("expression") or element).text)
-            return _negated(value) if _is(element, "negated") else value
+            return self._modified(element, value, "negatedOut" if element.tag == "inOutVariable" else "negated")
         if element.tag == "block":
             return self._output(element, formal)
         if ref in self._busy:
@@ -148,11 +159,13 @@ class Network:
 
     def _contact(self, contact: Element) -> str:
         name = _operand((contact.child("variable") or contact).text)
-        value = self._edge(contact, name)
-        if _is(contact, "negated"):
-            value = _negated(value)
+        value = self._modified(contact, name)
         power = self._power(contact)
         return value if power == "TRUE" else f"({power} AND {value})"
+
+    def _modified(self, element: Element, value: str, negated: str = "negated") -> str:
+        value = self._edge(element, value)
+        return _negated(value) if _is(element, negated) else value
 
     def _edge(self, element: Element, value: str) -> str:
         """The value, or whether it has an edge now."""
@@ -175,34 +188,36 @@ class Network:
         output = next((v for v in _parameters(block, "outputVariables") if v.get("formalParameter") == formal), None)
         self._called(block, wanted=True)
         if formal.upper() == "ENO":
+            if block.get("localId") not in self._done and _input(block, "EN") is not None:
+                raise NotTranslatedError(block.at, "its ENO is needed before it is executed")
             value = self._done.get(f"{block.get('localId')}.EN", "TRUE")
         elif block.get("instanceName"):
             value = f"{block.get('instanceName')}.{formal}"
         else:
             value = self._done[block.get("localId")]
-        return _negated(value) if output is not None and _is(output, "negated") else value
+        return value if output is None else self._modified(output, value)
 
     def _called(self, block: Element, *, wanted: bool = False) -> None:
         """Sees to it that a block is executed before its outputs are read."""
-        key = block.get("localId")
+        key, number = block.get("localId"), _number(block)
         if key in self._done:
             return
-        if key in self._busy:
+        if key in self._busy or 0 < self._now < number:
             if block.get("instanceName"):
                 return  # its outputs of the cycle before
-            raise NotTranslatedError(block.at, "it has a loop without a function block")
+            why = "it has a loop without a function block" if key in self._busy else f"number {number} is needed before"
+            raise NotTranslatedError(block.at, why)
+        named = _named_outputs(block)
         self._busy.add(key)
+        before, self._now = self._now, number or self._now
         if block.get("instanceName"):
             self._call_instance(block, key)
-        elif wanted or self._unit.blocks.get(block.get("typeName").casefold()) is not None:
+        elif wanted or named or number or self._unit.blocks.get(block.get("typeName").casefold()) is not None:
             self._call_function(block, key)
         self._busy.discard(key)
-        for output in _parameters(block, "outputVariables"):
-            expression = output.child("connectionPointOut", "expression")
-            if expression is not None and expression.text:
-                self._body.line(
-                    f"{expression.text} := {self._output(block, output.get('formalParameter'))};", output.at
-                )
+        self._now = before
+        for output, target in named:
+            self._body.line(f"{target} := {self._output(block, output.get('formalParameter'))};", output.at)
 
     def _inputs(self, block: Element, key: str) -> tuple[str, list[tuple[str, str]]]:
         """EN, "" without one, and the other inputs that are connected, with their values."""
@@ -211,9 +226,7 @@ class Network:
             value = self.point(item.child("connectionPointIn"))
             if value is None:
                 continue
-            value = self._edge(item, value)
-            if _is(item, "negated"):
-                value = _negated(value)
+            value = self._modified(item, value)
             if item.get("formalParameter").upper() != "EN":
                 found.append((item.get("formalParameter"), value))
             elif value != "TRUE":
@@ -235,6 +248,8 @@ class Network:
         outputs = [v for v in _parameters(block, "outputVariables") if v.get("formalParameter").upper() != "ENO"]
         used = {c.get("formalParameter") for e in self._consumers.get(key, []) for c in e.every("connection")
                 if c.get("refLocalId") == key}  # fmt: skip
+        named = [v.get("formalParameter") for v, _ in _named_outputs(block)]
+        used.update(named)
         if any(v.get("formalParameter") in used for v in outputs[1:]):
             raise NotTranslatedError(block.at, f"more than one output of the function {name} is used")
         own = self._unit.blocks.get(name.casefold())
@@ -245,15 +260,16 @@ class Network:
             self._body.line(f"IF {enable} THEN {call}; END_IF;" if enable else f"{call};", block.at)
             self._done[key] = "FALSE"
             return
-        if not spec and (enable or self._reads(block) > 1):
+        later = self._reads(block)
+        if not spec and (enable or later + len(named) > 1 or (later and _number(block))):
             raise NotTranslatedError(block.at, f"the type of the result of {name} is not known")
         if not spec:
             self._done[key] = call
             return
         result = f"_TMP_{name}{key}_OUT"
         self._body.variables[result] = (spec, block.at)
-        if enable and spec == "BOOL" and not _has_output(block, "ENO"):
-            call, enable = f"{enable} AND {_operand(call)}", ""  # a comparison in a rung
+        if enable and name.upper() in _COMPARISONS and not _has_output(block, "ENO"):
+            call, enable = f"{enable} AND {_operand(call)}", ""  # in a rung, as a contact
         statement = f"{result} := {call};"
         self._body.line(f"IF {enable} THEN {statement} END_IF;" if enable else statement, block.at)
         self._done[key] = result
@@ -343,8 +359,35 @@ def _parameters(block: Element, which: str) -> list[Element]:
     return [v for part in block.all(which) for v in part.all("variable")]
 
 
+def _named_outputs(block: Element) -> list[tuple[Element, str]]:
+    """Those that name the variable they go to."""
+    points = [(v, v.child("connectionPointOut", "expression")) for v in _parameters(block, "outputVariables")]
+    return [(v, e.text) for v, e in points if e is not None and e.text]
+
+
+def _check_modifiers(element: Element) -> None:
+    """None is passed over without a word."""
+    parts = [(element, element.tag)]
+    if element.tag == "block":
+        parts = [(v, p.tag) for p in element.children if p.tag in _MODIFIED for v in p.all("variable")]
+    for part, where in parts:
+        for kind, values in _MODIFIERS.items():
+            for name in (kind, f"{kind}In", f"{kind}Out"):
+                value = part.get(name)
+                if value in ("", "none", "false", "0") or where not in _MODIFIED:
+                    continue
+                if name not in _MODIFIED[where] or value not in values:
+                    raise NotTranslatedError(part.at, f'{name}="{value}" has no translation here')
+
+
 def _has_output(block: Element, name: str) -> bool:
     return any(v.get("formalParameter").upper() == name for v in _parameters(block, "outputVariables"))
+
+
+def _input(block: Element, name: str) -> Element | None:
+    """What is connected to an input, and where."""
+    found = next((v for v in _parameters(block, "inputVariables") if v.get("formalParameter").upper() == name), None)
+    return None if found is None else next(found.every("connection"), None)
 
 
 def _number(element: Element) -> int:
@@ -372,7 +415,8 @@ def _is(element: Element, attribute: str) -> bool:
 
 
 def _operand(text: str) -> str:
-    return text if _SIMPLE.fullmatch(text) else f"({text})"
+    end = "\n" * ("//" in text)  # the comment ends there
+    return text if _SIMPLE.fullmatch(text) else f"({text}{end})"
 
 
 def _negated(value: str) -> str:
