@@ -7,9 +7,9 @@ from dataclasses import fields, is_dataclass
 
 from plctool.compiler import typed
 from plctool.compiler.front import CheckResult, Source, check_sources
-from plctool.compiler.semantics.conversions import SIGNED
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import Binary, BinaryOp, Call, Const, Pou, Statement, TypedProgram, Variable
+from plctool.iec.common_types import SIGNED
 from plctool.iec.types import BOOL, ArrayType, Elementary, Kind, StringType, Type, base_of, is_scalar
 
 COMPARISONS = {BinaryOp.EQ, BinaryOp.NE, BinaryOp.LT, BinaryOp.LE, BinaryOp.GT, BinaryOp.GE}

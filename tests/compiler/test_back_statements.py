@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
 from plctool.compiler.ranges import type_range
-from plctool.compiler.semantics.conversions import SIGNED
 from plctool.compiler.typed import (
     AddressOf,
     Assign,
@@ -40,6 +39,7 @@ from plctool.compiler.typed import (
     Variable,
     While,
 )
+from plctool.iec.common_types import SIGNED
 from plctool.iec.types import (
     BOOL,
     BYTE,

@@ -5,8 +5,9 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.semantics.conversions import NS_PER_MS, NUMBERS, convert, elementary, scaled, settle
+from plctool.compiler.semantics.conversions import NS_PER_MS, convert, elementary, scaled, settle
 from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Pos
+from plctool.iec.common_types import NUMBERS, WIDE
 from plctool.iec.types import (
     DATE,
     DT,
@@ -35,9 +36,6 @@ UNIT_NS: dict[Type, int] = {
     TIME: NS_PER_MS, LTIME: 1, DATE: _SECOND, TOD: NS_PER_MS, DT: _SECOND, LDATE: 1, LTOD: 1, LDT: 1,
 }  # fmt: skip
 """What a value of 1 is worth, for durations and dates."""
-
-WIDE: dict[Type, Elementary] = {TIME: LTIME, DATE: LDATE, TOD: LTOD, DT: LDT}
-"""The type of the same meaning in 64 bits."""
 
 _ADD, _SUB, _MUL, _DIV = BinaryOp.ADD, BinaryOp.SUB, BinaryOp.MUL, BinaryOp.DIV
 FUNCTIONS: dict[str, tuple[BinaryOp, Elementary, Elementary | None]] = {

@@ -12,7 +12,6 @@ from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.conversions import (
     LONGER_DATES,
-    NUMBERS,
     UNSIGNED,
     character,
     convert,
@@ -26,6 +25,7 @@ from plctool.compiler.semantics.conversions import (
 from plctool.compiler.semantics.pitfalls import lost_fraction, overlays
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Call, Const, Convert, Expr, Load, Place, Pos, VarPlace
+from plctool.iec.common_types import NUMBERS
 from plctool.iec.literals import BitPattern
 from plctool.iec.types import (
     BOOL,

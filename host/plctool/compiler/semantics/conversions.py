@@ -28,6 +28,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
+from plctool.iec.common_types import common_scalar
 from plctool.iec.types import (
     BOOL,
     BYTE,
@@ -45,8 +46,6 @@ from plctool.iec.types import (
     LTOD,
     LWORD,
     REAL,
-    SINT,
-    TIME,
     TOD,
     UDINT,
     UINT,
@@ -58,7 +57,6 @@ from plctool.iec.types import (
     Elementary,
     EnumType,
     InterfaceType,
-    Kind,
     OpenArrayType,
     PointerType,
     RawPointerType,
@@ -72,12 +70,10 @@ from plctool.iec.types import (
 
 NS_PER_MS = 1_000_000
 
-SIGNED = {8: SINT, 16: INT, 32: DINT, 64: LINT}
 UNSIGNED = {8: USINT, 16: UINT, 32: UDINT, 64: ULINT}
 BITS = {8: BYTE, 16: WORD, 32: DWORD, 64: LWORD}
 LONGER_DATES = {(DATE, LDATE): 1_000_000_000, (TOD, LTOD): NS_PER_MS, (DT, LDT): 1_000_000_000}  # and their factor
 _LITERAL_TYPES = (INT, DINT, UDINT, LINT, ULINT)
-NUMBERS = (Kind.INT, Kind.BIT)
 
 
 def elementary(t: Type) -> Elementary | None:
@@ -178,26 +174,6 @@ def character(e: Expr, target: Type) -> Expr | None:
 # ---- common types -------------------------------------------------------------------------------------------------
 
 
-def common_number(a: Elementary, b: Elementary) -> Elementary | None:
-    """The type two numbers or bit strings are calculated in."""
-    if a is b:
-        return a
-    if Kind.REAL in (a.kind, b.kind):
-        if a.kind is b.kind:
-            return LREAL
-        real, other = (a, b) if a.kind is Kind.REAL else (b, a)
-        return real if other.kind in NUMBERS else None
-    if a.kind is Kind.BIT and b.kind is Kind.BIT:
-        return a if a.bits >= b.bits else b
-    if Kind.BIT in (a.kind, b.kind):
-        bit, number = (a, b) if a.kind is Kind.BIT else (b, a)
-        return number if number.bits >= bit.bits else bit
-    if a.signed is b.signed:
-        return a if a.bits >= b.bits else b
-    signed, unsigned = (a, b) if a.signed else (b, a)
-    return signed if signed.bits > unsigned.bits else SIGNED[min(64, unsigned.bits * 2)]
-
-
 def common_type(a: Type, b: Type) -> Type | None:
     """The type both operands of a comparison, or of a generic function, are brought to; None when there is none."""
     if ERROR in (a, b):
@@ -219,19 +195,7 @@ def common_type(a: Type, b: Type) -> Type | None:
     x, y = elementary(a), elementary(b)
     if x is None or y is None:
         return a if same_type(a, b) else None
-    if x is y:
-        return x
-    if {x, y} == {TIME, LTIME}:
-        return LTIME
-    if (x, y) in LONGER_DATES or (y, x) in LONGER_DATES:
-        return y if (x, y) in LONGER_DATES else x
-    if x.kind in (Kind.INT, Kind.BIT, Kind.REAL) and y.kind in (Kind.INT, Kind.BIT, Kind.REAL):
-        return common_number(x, y)
-    if x is BOOL and y.kind is Kind.BIT:
-        return y
-    if y is BOOL and x.kind is Kind.BIT:
-        return x
-    return None
+    return common_scalar(x, y)
 
 
 # ---- the place that a value was loaded from ----

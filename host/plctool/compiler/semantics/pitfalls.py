@@ -17,7 +17,7 @@ from plctool.compiler.analysis import Effects
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.ranges import Range, type_range
 from plctool.compiler.semantics import constants
-from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary, is_untyped
+from plctool.compiler.semantics.conversions import elementary, is_untyped
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -56,6 +56,7 @@ from plctool.compiler.typed import (
 )
 from plctool.compiler.typed_nodes import walk, written_places
 from plctool.iec.areas import Area
+from plctool.iec.common_types import NUMBERS, SIGNED
 from plctool.iec.types import (
     BOOL,
     ArrayType,

@@ -11,7 +11,6 @@ from plctool.compiler.semantics import mocks
 from plctool.compiler.semantics.assertions import FAILED, LTIME_NOW, TIME_NOW, Assertion, Bench, Operand
 from plctool.compiler.semantics.checker import Checker, SpecialCalls
 from plctool.compiler.semantics.conversions import (
-    NUMBERS,
     convert,
     elementary,
     is_untyped,
@@ -47,6 +46,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )  # fmt: skip
+from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import BOOL, DINT, LREAL, LTIME, TIME, UDINT, ArrayType, Kind, StringType, StructType, Type
 
 _MESSAGE = StringType(255)

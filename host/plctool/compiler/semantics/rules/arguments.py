@@ -11,15 +11,7 @@ from dataclasses import dataclass, replace
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.library import OTHER_BLOCKS
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import (
-    NUMBERS,
-    elementary,
-    error_value,
-    place_of,
-    same_type,
-    settle,
-    takes_array,
-)
+from plctool.compiler.semantics.conversions import elementary, error_value, place_of, same_type, settle, takes_array
 from plctool.compiler.semantics.generics import accepts, group_name, handed, handed_bounds, is_group, total_size
 from plctool.compiler.semantics.rules.members import bound_member, dotted_name
 from plctool.compiler.semantics.rules.places import changeable_place, may_copy
@@ -45,6 +37,7 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.typed_nodes import is_unaligned
+from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
     BOOL,
     LREAL,

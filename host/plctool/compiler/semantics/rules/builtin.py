@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.missing_names import known_name_like
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, place_of, settle
+from plctool.compiler.semantics.conversions import elementary, error_value, place_of, settle
 from plctool.compiler.semantics.generics import bounds_of, total_size
 from plctool.compiler.semantics.rules import intrinsics
 from plctool.compiler.semantics.rules.arguments import packed, packed_and_pointed_to
@@ -39,6 +39,7 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.typed_nodes import is_unaligned
+from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
     BOOL,
     BYTE,

@@ -10,7 +10,7 @@ from collections.abc import Collection
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.checker import Checker, checks_statement
-from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary, is_untyped
+from plctool.compiler.semantics.conversions import elementary, is_untyped
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.labels import Labels
 from plctool.compiler.semantics.loop_bounds import known_values, passed_bounds
@@ -38,6 +38,7 @@ from plctool.compiler.typed import (
     While,
 )
 from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.iec.common_types import NUMBERS, SIGNED
 from plctool.iec.types import BOOL, EnumType, Kind, StringType, SubrangeType, Type, is_scalar
 
 # ---- statements in sequence ----

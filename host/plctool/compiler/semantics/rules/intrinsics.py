@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, error_value, is_untyped, load, settle
+from plctool.compiler.semantics.conversions import convert, elementary, error_value, is_untyped, load, settle
 from plctool.compiler.semantics.once import calls, kept_value
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.rules.literals import common_of, untyped_bits
@@ -20,6 +20,7 @@ from plctool.compiler.semantics.rules.operators import fold_unary, operate
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, UnaryOp, VarPlace
+from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import BOOL, DINT, ELEMENTARY, LINT, LREAL, REAL, Kind, StringType, Type, is_scalar
 
 # ---- what every function that is built in is ----

@@ -12,7 +12,6 @@ from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import (
     BITS,
     NS_PER_MS,
-    NUMBERS,
     character,
     common_type,
     elementary,
@@ -24,6 +23,7 @@ from plctool.compiler.semantics.conversions import (
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Pos
+from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
     BOOL,
     CHAR,

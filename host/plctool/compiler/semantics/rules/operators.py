@@ -10,10 +10,7 @@ from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import (
     BITS,
-    NUMBERS,
-    SIGNED,
     character,
-    common_number,
     common_type,
     convert,
     elementary,
@@ -28,6 +25,7 @@ from plctool.compiler.semantics.rules.literals import match_literals, untyped_bi
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, Unary, UnaryOp
+from plctool.iec.common_types import NUMBERS, SIGNED, common_number
 from plctool.iec.types import (
     BOOL,
     BYTE,

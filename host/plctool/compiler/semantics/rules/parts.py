@@ -9,7 +9,6 @@ from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import (
-    NUMBERS,
     convert,
     elementary,
     error_value,
@@ -37,6 +36,7 @@ from plctool.compiler.typed import (
     Storage,
     Variable,
 )
+from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
     BOOL,
     BYTE,
