@@ -419,3 +419,94 @@ def test_the_type_of_a_member_or_element_is_known(tmp_path: Path, variable: str,
     with started(tmp_path, project(main, types, CYCLE)) as plc:
         plc.run_cycles(1)
         assert (plc.read("Main.n"), plc.read("Main.m")) == (5, 5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given_values", "declared", "seen"),
+    [
+        ("ADD", ("a", "b"), ("a:INT:=1", "b:DINT:=100000", "r:DINT"), 100001),
+        ("ADD", ("a", "7"), ("a:INT:=1", "r:INT"), 8),
+        ("ADD", ("a", "16#10"), ("a:SINT:=1", "r:SINT"), 17),
+        ("ADD", ("T#1s", "a"), ("a:LTIME:=LT#2s", "r:LTIME"), "LTIME#3s"),
+        ("MUL", ("3", "a"), ("a:TIME:=T#2s", "r:TIME"), "T#6s"),
+        ("DIV", ("a", "2.5"), ("a:REAL:=5.0", "r:REAL"), 2.0),
+        ("MAX", ("a", "b"), ("a:INT:=2", "b:REAL:=3.5", "r:REAL"), 3.5),
+        ("AND", ("a", "b"), ("a:BYTE:=255", "b:WORD:=4095", "r:WORD"), 255),
+        ("SEL", ("TRUE", "a", "b"), ("a:UINT:=2", "b:INT:=-3", "r:DINT"), -3),
+        ("ADD", ("Fast", "a"), ("a:INT:=-1", "r:DINT"), 69999),
+        ("ADD", ("List.Slow", "a"), ("a:SINT:=-1", "r:INT"), 6),
+        ("ADD", ("a", "5"), ("a:Percent:=98", "r:INT"), 103),
+        ("SIN", ("a",), ("a:LREAL:=0", "r:LREAL"), 0.0),
+        ("UINT_TO_BCD", ("a",), ("a:UINT:=12", "r:WORD"), 0x12),
+        ("UINT_TO_BCD_BYTE", ("a",), ("a:UINT:=12", "r:BYTE"), 0x12),
+        ("WORD_BCD_TO_UINT", ("a",), ("a:WORD:=16#12", "r:UINT"), 12),
+        ("REAL_TRUNC_INT", ("a",), ("a:REAL:=1.7", "r:INT"), 1),
+        ("BYTE_TO_HEXSTR", ("a", "2", "FALSE"), ("a:BYTE:=171", "r:STRING"), "AB"),
+        ("CONCAT", ("a", "'b'"), ("a:STRING:='a'", "r:STRING"), "ab"),
+        ("Standard.LEN", ("a",), ("a:STRING:='abc'", "r:INT"), 3),
+    ],
+)
+def test_a_result_has_the_type_that_the_function_gives_it(
+    tmp_path: Path, kind: str, given_values: tuple[str, ...], declared: tuple[str, ...], seen: object
+) -> None:
+    types = """<dataType name="Percent"><baseType><subrangeSigned><range lower="0" upper="100"/>
+<baseType><INT/></baseType></subrangeSigned></baseType></dataType>"""
+    values = [given(10 + i, text) for i, text in enumerate(given_values)]
+    inputs = {f"IN{i}": str(10 + i) for i in range(len(values))}
+    body = network(*values, block(3, kind, inputs), taken(4, "r", "3.OUT"), taken(5, "other", "3.OUT", row=40))
+    other = declared[-1].replace("r:", "other:")
+    main = pou("Main", body, variables("localVars", *declared, other))
+    listed = variables("globalVars", "Fast:DINT:=70000", "Slow:INT:=7").replace(">", ' name="List">', 1)
+    instances = CYCLE.replace("<resource", f"{listed}<resource", 1)
+    with started(tmp_path, project(main, types, instances)) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.r") == plc.read("Main.other") == seen
+
+
+@pytest.mark.parametrize(
+    ("kind", "inputs", "output", "more", "result", "seen"),
+    [
+        ("CTD_DINT", {"LD": "TRUE", "PV": "100000"}, "CV", "1", "DINT", 100001),
+        ("LTON", {"IN": "TRUE", "PT": "LT#1s"}, "ET", "LT#1ms", "LTIME", "LTIME#1ms"),
+        ("Standard.TON", {"IN": "TRUE", "PT": "T#1s"}, "ET", "T#1ms", "TIME", "T#1ms"),
+    ],
+)
+def test_the_outputs_of_a_block_have_the_types_that_the_library_declares(
+    tmp_path: Path, kind: str, inputs: dict[str, str], output: str, more: str, result: str, seen: object
+) -> None:
+    values = [given(10 + i, text) for i, text in enumerate(inputs.values())]
+    body = network(
+        *values,
+        block(3, kind, {name: str(10 + i) for i, name in enumerate(inputs)}, output, "b"),
+        given(4, more),
+        block(5, "ADD", {"IN1": f"3.{output}", "IN2": "4"}),
+        taken(6, "r", "5.OUT"),
+        taken(7, "other", "5.OUT", row=40),
+    )
+    declared = f'<localVars><variable name="b"><type><derived name="{kind}"/></type></variable></localVars>'
+    main = pou("Main", body, declared + variables("localVars", f"r:{result}", f"other:{result}"))
+    with started(tmp_path, project(main, instances=CYCLE)) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.r") == plc.read("Main.other") == seen
+
+
+@pytest.mark.parametrize("values", [("n", "gone"), ("n", "40000"), ("n", "1.0"), ("5", "7")])
+def test_a_type_is_never_guessed(tmp_path: Path, values: tuple[str, str]) -> None:
+    body = network(
+        given(1, values[0]),
+        given(2, values[1]),
+        block(3, "ADD", {"IN1": "1", "IN2": "2"}),
+        taken(4, "n", "3.OUT"),
+        taken(5, "n", "3.OUT", row=40),
+    )
+    text = project(pou("Main", body, variables("localVars", "n:INT")))
+    ((_, message),) = errors(tmp_path, text)
+    assert message.endswith("the type of the result of ADD is not known")
+
+
+def test_a_function_of_the_library_is_called_though_nothing_reads_its_result(tmp_path: Path) -> None:
+    body = network(
+        given(1, "ADR(n)"), given(2, "1"), given(3, "2"),
+        block(4, "MEMSET", {"destAddr": "1", "fillByte": "2", "n": "3"}),
+    )  # fmt: skip
+    assert run(tmp_path, body, ["n:INT"]) == {"n": 0x0101}

@@ -70,6 +70,7 @@ class _Project:
         self.shared: set[str] = set()  # those of files that have more than globals
         self._findings = findings
         self._blocks: dict[str, dict[str, str]] = {}
+        self._globals: dict[str, str] = {}  # types, by case-folded name; of a list of globals its name
         self._programs: list[Element] = []
 
     def read(self, root: Element) -> None:
@@ -82,7 +83,15 @@ class _Project:
             struct = data_type if data_type.tag == "union" else data_type.child("baseType", "struct")
             members = struct.all("variable") if struct is not None else []
             known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in members}
+            known[""] = types.type_of(data_type.child("baseType"))
             self._blocks[data_type.get("name").casefold()] = known
+        for listed in root.every("globalVars"):
+            known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in listed.all("variable")}
+            for name, spec in known.items():
+                self._globals[name] = spec if self._globals.get(name, spec) == spec else ""
+            if listed.get("name"):
+                self._blocks.setdefault(listed.get("name").casefold(), known)
+                self._globals.setdefault(listed.get("name").casefold(), listed.get("name"))
         self._walk(root)
         for configuration in _configurations(root):
             plain = plain_text(configuration)
@@ -99,7 +108,7 @@ class _Project:
             elif child.tag in ("pou", "Interface"):
                 self._unit(child)
             elif child.tag == "globalVars" and child.get("name"):
-                self._globals(child)
+                self._global_list(child)
             elif child.tag not in ("configuration", "task", "globalVars") or child.tag == "configuration":
                 self._walk(child)
 
@@ -117,7 +126,7 @@ class _Project:
         declared = f"{element.get('name')}{base} : {spec}{f' := {value}' if value else ''}"
         self.text.made(f"{types.attributes(element)}TYPE {declared}; END_TYPE\n", element.at)
 
-    def _globals(self, element: Element) -> None:
+    def _global_list(self, element: Element) -> None:
         made = self.lists.setdefault(element.get("name"), Text())
         if element.child_data("sharedlist"):
             self.shared.add(element.get("name"))
@@ -153,7 +162,7 @@ class _Project:
         known = {v.get("name").casefold(): types.type_of(v.child("type")) for s in own for v in s.all("variable")}
         transitions = {t.get("name").casefold(): t for part in pou.all("transitions") for t in part.all("transition")}
         actions = frozenset(a.get("name").casefold() for part in pou.all("actions") for a in part.all("action"))
-        return Unit(name, keeps, known, self._blocks, transitions, actions)
+        return Unit(name, keeps, self._globals | known, self._blocks, transitions, actions)
 
     def _header(self, element: Element, keyword: str, openings: frozenset[str]) -> None:
         """Declaration and variables."""

@@ -15,6 +15,7 @@ import re
 from functools import cmp_to_key
 
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
+from plctool.compiler.formats.plcopen_result_types import COMPARISONS, ResultTypes, declared
 from plctool.compiler.formats.xml_tree import Element
 
 _SIMPLE = re.compile(r"[\w.#%\[\]^$:']+")
@@ -32,23 +33,6 @@ _MODIFIED = {
 
 _TRIGGERS = {"rising": "R_TRIG", "falling": "F_TRIG"}
 
-_OF_FIRST = frozenset((
-    "ADD", "SUB", "MUL", "DIV", "MOD", "MOVE", "MAX", "MIN", "LIMIT", "ABS", "AND", "OR", "XOR", "NOT", "SEL", "MUX",
-    "SHL", "SHR", "ROL", "ROR", "NEG", "SQRT", "EXPT",
-))  # fmt: skip
-"""Functions whose result has the type of what they are given."""
-
-_COMPARISONS = frozenset(("GT", "GE", "EQ", "LE", "LT", "NE"))
-_RESULTS = {"LEN": "INT", "FIND": "INT"}
-_CHOOSERS = frozenset(("SEL", "MUX"))  # the first input says which of the others
-_OUTPUTS = {"Q": "BOOL", "QU": "BOOL", "QD": "BOOL", "Q1": "BOOL", "ET": "TIME", "CV": "INT"}
-_LITERALS = ((re.compile(r"(?i)TRUE|FALSE"), "BOOL"), (re.compile(r"(?i)T(?:IME)?#.*"), "TIME"))
-_TYPED = re.compile(r"(?i)([A-Z]+)#[^#]+")
-_PATH = re.compile(r"\w+(?:\[[^\[\]]*\])?(?:\.\w+(?:\[[^\[\]]*\])?)*")
-_PART = re.compile(r"(\w+)(\[[^\[\]]*\])?(?:\.|$)")
-_ARRAY = re.compile(r"ARRAY\[[^\[\]]*\] OF (.*)")
-_CONVERSION = re.compile(r"(?i)\w+_TO_([A-Z]+)|TO_([A-Z]+)")
-
 
 class Network:
     """The networks of one body."""
@@ -57,6 +41,7 @@ class Network:
         self._unit = unit
         self._body = body
         self._elements = {e.get("localId"): e for e in element.children if e.get("localId")}
+        self._types = ResultTypes(unit, self._elements)
         self._order = list(self._elements.values())
         self._consumers: dict[str, list[Element]] = {}
         for consumer in self._order:
@@ -212,12 +197,16 @@ class Network:
         before, self._now = self._now, number or self._now
         if block.get("instanceName"):
             self._call_instance(block, key)
-        elif wanted or named or number or self._unit.blocks.get(block.get("typeName").casefold()) is not None:
+        elif wanted or named or number or self._may_act(block.get("typeName")):
             self._call_function(block, key)
         self._busy.discard(key)
         self._now = before
         for output, target in named:
             self._body.line(f"{target} := {self._output(block, output.get('formalParameter'))};", output.at)
+
+    def _may_act(self, name: str) -> bool:
+        """Whether a function is called even if nothing reads its result."""
+        return self._unit.blocks.get(name.casefold(), declared(name)) != {}
 
     def _inputs(self, block: Element, key: str) -> tuple[str, list[tuple[str, str]]]:
         """EN, "" without one, and the other inputs that are connected, with their values."""
@@ -255,7 +244,7 @@ class Network:
         own = self._unit.blocks.get(name.casefold())
         values = [f"{n} := {v}" for n, v in inputs] if own is not None else [v for _, v in inputs]
         call = f"{name}({', '.join(values)})"
-        spec = self._result_of(block) if own is None else own.get("", "")
+        spec = self._types.of_function(block) if own is None else own.get("", "")
         if own is not None and not spec:
             self._body.line(f"IF {enable} THEN {call}; END_IF;" if enable else f"{call};", block.at)
             self._done[key] = "FALSE"
@@ -265,10 +254,12 @@ class Network:
             raise NotTranslatedError(block.at, f"the type of the result of {name} is not known")
         if not spec:
             self._done[key] = call
+            if not later and not named and self._may_act(name):
+                self._body.line(f"{call};", block.at)
             return
-        result = f"_TMP_{name}{key}_OUT"
+        result = f"_TMP_{name.rpartition('.')[2]}{key}_OUT"
         self._body.variables[result] = (spec, block.at)
-        if enable and name.upper() in _COMPARISONS and not _has_output(block, "ENO"):
+        if enable and name.upper() in COMPARISONS and not _has_output(block, "ENO"):
             call, enable = f"{enable} AND {_operand(call)}", ""  # in a rung, as a contact
         statement = f"{result} := {call};"
         self._body.line(f"IF {enable} THEN {statement} END_IF;" if enable else statement, block.at)
@@ -291,68 +282,6 @@ class Network:
                 elif passes:
                     count = 2  # there are two ways to it
         return count
-
-    # ---- types ----
-
-    def _result_of(self, block: Element, depth: int = 0) -> str:
-        """The type of the result of a standard function; "" when it is not known."""
-        name = block.get("typeName").upper()
-        if name in _COMPARISONS:
-            return "BOOL"
-        if name in _RESULTS:
-            return _RESULTS[name]
-        conversion = _CONVERSION.fullmatch(name)
-        if conversion:
-            return (conversion[1] or conversion[2]).upper()
-        if name not in _OF_FIRST or depth > 100:
-            return ""
-        inputs = [v for v in _parameters(block, "inputVariables") if v.get("formalParameter").upper() != "EN"]
-        for item in inputs[name in _CHOOSERS :]:
-            for connection in item.every("connection"):
-                spec = self._type_of(connection, depth + 1)
-                if spec:
-                    return spec
-        return ""
-
-    def _type_of(self, connection: Element, depth: int) -> str:
-        element = self._elements.get(connection.get("refLocalId"))
-        if element is None:
-            return ""
-        if element.tag in ("contact", "coil", "leftPowerRail"):
-            return "BOOL"
-        if element.tag in ("inVariable", "inOutVariable"):
-            return self._type_of_expression((element.child("expression") or element).text)
-        if element.tag != "block":
-            return ""
-        formal, own = connection.get("formalParameter"), self._unit.blocks.get(element.get("typeName").casefold())
-        if formal.upper() == "ENO":
-            return "BOOL"
-        if element.get("instanceName"):
-            return own.get(formal.casefold(), "") if own is not None else _OUTPUTS.get(formal.upper(), "")
-        return own.get("", "") if own is not None else self._result_of(element, depth)
-
-    def _type_of_expression(self, text: str) -> str:
-        for pattern, spec in _LITERALS:
-            if pattern.fullmatch(text):
-                return spec
-        typed = _TYPED.fullmatch(text)
-        return typed[1].upper() if typed else self._type_of_variable(text.casefold())
-
-    def _type_of_variable(self, text: str) -> str:
-        """Of `x`, `x.member`, `x[1].member`; "" when a part of it is not known."""
-        if not _PATH.fullmatch(text):
-            return ""
-        spec = ""
-        for i, (name, indices) in enumerate(_PART.findall(text)):
-            if i:
-                members = self._unit.blocks.get(spec.casefold())
-                spec = _OUTPUTS.get(name.upper(), "") if members is None else members.get(name, "")
-            else:
-                spec = self._unit.types.get(name, "")
-            if indices:
-                array = _ARRAY.fullmatch(spec)
-                spec = array[1] if array is not None else ""
-        return spec
 
 
 def _parameters(block: Element, which: str) -> list[Element]:
