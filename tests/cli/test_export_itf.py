@@ -136,8 +136,8 @@ def test_wide_strings_unions_and_a_parameter_called_result(tool: Tool) -> None:
     Path("wide.st").write_text(
         "TYPE Wide : STRUCT w : WSTRING(5); n : INT; both : Both; END_STRUCT; "
         "Both : UNION a : DWORD; b : LREAL; END_UNION; END_TYPE\n"
-        "{attribute 'external' := 'wide'}\nFUNCTION Take : INT VAR_INPUT result : INT; w : WSTRING; s : Wide; END_VAR "
-        "END_FUNCTION\n"
+        "{attribute 'external' := 'wide'}\n"
+        "FUNCTION Take : INT VAR_INPUT result, result_ : INT; w : WSTRING; s : Wide; END_VAR END_FUNCTION\n"
         "{attribute 'external' := 'made'}\nFUNCTION Made : Wide VAR_INPUT result : Wide; END_VAR END_FUNCTION\n"
     )
     tool("export-itf", "wide.st", "-o", ".")

@@ -44,7 +44,7 @@ def test_zip_is_read_in_place(tmp_path: Path, top: str) -> None:
 
 
 def test_what_macos_adds_to_a_zip_is_no_part_of_it(tmp_path: Path) -> None:
-    files = {"lib/library.toml": manifest("Lib"), "lib/get.st": GET, "__MACOSX/lib/._get.st": "\0\1"}
+    files = {"lib/library.toml": manifest("Lib"), "lib/get.st": GET, "__MACOSX/lib/._get.st": "\0\1", ".": ""}
     assert messages(check(tmp_path, USE, zipped(tmp_path / "lib.zip", files))) == []
 
 

@@ -426,6 +426,7 @@ def test_the_type_of_a_member_or_element_is_known(tmp_path: Path, variable: str,
     [
         ("ADD", ("a", "b"), ("a:INT:=1", "b:DINT:=100000", "r:DINT"), 100001),
         ("ADD", ("a", "7"), ("a:INT:=1", "r:INT"), 8),
+        ("MOVE", ("-INT#5",), ("r:DINT",), -5),
         ("ADD", ("a", "16#10"), ("a:SINT:=1", "r:SINT"), 17),
         ("ADD", ("T#1s", "a"), ("a:LTIME:=LT#2s", "r:LTIME"), "LTIME#3s"),
         ("MUL", ("3", "a"), ("a:TIME:=T#2s", "r:TIME"), "T#6s"),

@@ -413,7 +413,7 @@ def test_wrong_options_of_plcrt_are_refused(tmp_path: Path) -> None:
         (("--can", "slcan:/dev/no-such-line"), "cannot open CAN"),
         (("--can", "no-such-interface"), "cannot open CAN"),
         (("--can", "slcan:pty", "--bitrate", "123456"), "SLCAN has no such bit rate"),
-        (("--can", "slcan:pty", "--bitrate", "500000/3000000"), "SLCAN has no such bit rate"),
+        (("--can", "slcan:pty", "--bitrate", "500000/3000000"), "SLCAN has no such data bit rate"),
     ):
         with pytest.raises(PlcError, match=said):
             Plcrt(tmp_path / "other.flash", *options).start()

@@ -203,7 +203,9 @@ bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON 
         return false;
     }
     if (path != NULL && !SlcanKnows(options->bit_rate, options->data_bit_rate)) {
-        PortReason(reason, "cannot open CAN %s: SLCAN has no such bit rate; give for example --bitrate 500000", text);
+        PortReason(reason, "cannot open CAN %s: SLCAN has no such %s; give for example --bitrate 500000%s", text,
+                   SlcanKnows(options->bit_rate, 0) ? "data bit rate" : "bit rate",
+                   options->data_bit_rate != 0 ? "/2000000" : "");
         return false;
     }
     memset(&can, 0, sizeof(can));

@@ -139,13 +139,17 @@ def _parameters(pou: Pou) -> Iterator[str]:
     """The parameters in C. A result that is no scalar comes first, as an address."""
     if pou.result is not None and not is_scalar(pou.result.type):
         yield f"{_target(pou.result.type)}*result"
+    names = {c_name(parameter.variable.name) for parameter in pou.parameters}
     for parameter in pou.parameters:
-        yield from _parameter(parameter)
+        yield from _parameter(parameter, names)
 
 
-def _parameter(parameter: Parameter) -> Iterator[str]:
+def _parameter(parameter: Parameter, names: set[str]) -> Iterator[str]:
+    """`names`: of all parameters, among which the result has to find one of its own."""
     t, name = parameter.variable.type, c_name(parameter.variable.name)
-    name = "result_" if name == "result" else name  # that is what the function gives
+    if name == "result":
+        while name in names:
+            name += "_"
     if is_scalar(t) and not parameter.by_reference:
         value = _value(t)
         yield f"{value}{name}" if value.endswith("*") else f"{value} {name}"

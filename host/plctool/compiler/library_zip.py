@@ -106,7 +106,7 @@ def _is_wanted(name: str) -> bool:
     from plctool.compiler.source_files import READERS
 
     path = PurePosixPath(name)
-    if path.parts[0] == "__MACOSX":  # what macOS knows of the files beside them
+    if path.parts[:1] == ("__MACOSX",):  # what macOS knows of the files beside them
         return False
     return path.name == LIBRARY_FILE or path.suffix.lower() in READERS
 

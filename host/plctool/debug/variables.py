@@ -183,8 +183,10 @@ def walk(symbol: Symbol, text: str, at: int, units: Units) -> Symbol:
             raise UsageError(f"'{text}' cannot be read from '{text[at:]}' on; write for example Main.a[3].x.", "syntax")
         if symbol.bit is not None:
             raise UsageError(f"{symbol.name} is a BOOL and has no parts.", "no-part")
-        at = match.end()
-        symbol = _step(symbol.followed(), match, text[:at], units)
+        symbol = symbol.followed()
+        dotted = _dotted_member(symbol.type, text, at)
+        at = at + len(dotted) if dotted else match.end()
+        symbol = _member(symbol, dotted[1:], text[:at], units) if dotted else _step(symbol, match, text[:at], units)
     symbol = shown(symbol, units)
     if isinstance(symbol.type, OpenArrayType):
         raise _open_array(symbol)
@@ -210,6 +212,16 @@ def _step(symbol: Symbol, match: re.Match[str], name: str, units: Units) -> Symb
     if dereference:
         return _target(symbol)
     return _element(symbol, indices)
+
+
+def _dotted_member(t: object, text: str, at: int) -> str:
+    """`.Base.name` if a path goes on with a member that has a dot in its name, as what methods and bases keep for
+    themselves has; else ""."""
+    if not isinstance(t, StructType):
+        return ""
+    rest = f"{text[at:].casefold()}."
+    ways = (f".{field.name}" for field in t.fields if "." in field.name)
+    return max((way for way in ways if re.match(re.escape(way.casefold()) + r"[.\[^]", rest)), key=len, default="")
 
 
 def _member(symbol: Symbol, member: str, name: str, units: Units) -> Symbol:

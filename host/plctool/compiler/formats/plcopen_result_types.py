@@ -149,9 +149,9 @@ class ResultTypes:
         if text.upper() in ("TRUE", "FALSE"):
             return "BOOL"
         try:
-            if "#" in text and not text[0].isdigit():
-                prefix, _, rest = text.partition("#")
-                return prefix if literals.is_enum_value(prefix, rest) else literals.typed(text)[2]
+            if "#" in text and not text.removeprefix("-")[0].isdigit():
+                prefix, _, rest = text.removeprefix("-").partition("#")
+                return prefix if literals.is_enum_value(prefix, rest) else literals.typed(text.removeprefix("-"))[2]
             value = literals.unsigned(text.removeprefix("-"))[1]
             assert not isinstance(value, str)
             return Untyped(-value if text.startswith("-") else value)

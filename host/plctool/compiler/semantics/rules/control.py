@@ -320,13 +320,15 @@ def _report_changes(c: Checker, node: ast.For, limits: Expr | list[Expr], body: 
 
 
 def _step_value(c: Checker, node: ast.Expr, target: Type) -> Expr:
-    """The step of a FOR loop. One with a sign may lead downwards, whatever counts."""
+    """The step of a FOR loop. One with a sign may lead downwards, whatever counts, unless it is wider than that."""
     e, counter = c.expr(node, target), elementary(target)
     own = elementary(e.type)
-    has_sign = own is not None and own.kind is Kind.INT and own.signed
+    if counter is None or own is None:
+        return c.coerce(e, target)
+    has_sign = own.kind is Kind.INT and own.signed and own.bits <= counter.bits
     if isinstance(e, Const):
         has_sign = isinstance(e.value, int) and e.value < 0
-    return c.coerce(e, SIGNED[counter.bits] if has_sign and counter is not None else target)
+    return c.coerce(e, SIGNED[counter.bits] if has_sign else target)
 
 
 def _noted(c: Checker, loop: While | Repeat | For) -> Statement:

@@ -85,9 +85,17 @@ def unary_operator(c: Checker, node: ast.Unary, expected: Type | None) -> Expr:
         return c.error(node.pos, "type", f"{node.op} needs a number, not {e.type}")
     if node.op is ast.Operator.ADD:
         return e
-    if not base.signed and base.bits < 64 and not is_untyped(e):
-        base = SIGNED[base.bits * 2]
+    if not base.signed and not is_untyped(e):
+        base = _minus_of(base, e)
     return fold_unary(c, UnaryOp.NEG, convert(e, base), node.pos)
+
+
+def _minus_of(base: Elementary, e: Expr) -> Elementary:
+    """The type of minus an unsigned number. Of 64 bits it wraps, unless it is a constant for which there is one."""
+    if base.bits < LINT.bits:
+        return SIGNED[base.bits * 2]
+    fits = isinstance(e, Const) and isinstance(e.value, int) and e.value <= 1 << (LINT.bits - 1)
+    return LINT if fits else base
 
 
 def fold_unary(c: Checker, op: UnaryOp, e: Expr, offset: int) -> Expr:
