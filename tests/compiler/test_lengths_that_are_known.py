@@ -208,7 +208,7 @@ def test_a_string_that_is_longer_than_a_result_is_cut(tmp_path: Path) -> None:
 
 
 def lowered(body: str) -> str:
-    checked = check_sources([Source("main.st", f"PROGRAM Main VAR s : STRING; n : INT; END_VAR {body} END_PROGRAM")])
+    checked = check_sources([Source("main.st", f"PROGRAM Main VAR s, t : STRING; n : INT; END_VAR {body} END_PROGRAM")])
     assert checked.program, checked.diagnostics
     return "".join(part.text for part in lower(checked.program, Options(find_target("cortex-m3"))).parts)
 
@@ -233,6 +233,11 @@ def test_functions_of_known_strings_are_given_the_lengths() -> None:
     text = lowered("s := 'abc'; s := LEFT(s, n); n := FIND(s, 'b'); s := REPLACE(s, 'xy', 1, n);")
     assert "@str.copy" not in text
     assert "@str.span" not in text
+
+
+def test_looking_for_the_end_of_one_string_leaves_the_lengths_of_others_known() -> None:
+    text = lowered("t := 'abc'; IF n > 0 THEN s := 'x'; END_IF s := INSERT(s, t, n);")
+    assert text.count(" call i32 @str.span(") == 1
 
 
 ALIASES = """

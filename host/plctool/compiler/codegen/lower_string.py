@@ -75,7 +75,10 @@ def _copy(frame: Frame, helper: str, target: Ref, position: Value, source: Ref, 
 def span(frame: Frame, ref: Ref) -> Value:
     """How many characters a string has, found by looking for its end."""
     arguments = ["ptr null", f"ptr {frame.address(ref)}", f"i32 {ref.capacity}", "i32 0", f"i32 {ref.capacity}"]
-    return frame.fn.call_value("i32", frame.unit.helper(_helper("span", ref)), arguments)
+    lengths = frame.lengths()
+    length = frame.fn.call_value("i32", frame.unit.helper(_helper("span", ref)), arguments)
+    frame.keep_lengths(lengths)
+    return length
 
 
 def least(frame: Frame, one: Value, other: Value) -> Value:

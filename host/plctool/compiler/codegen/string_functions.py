@@ -106,23 +106,23 @@ class _Strings:
         under = fn.value(f"and {self._integer} {less}, {inverted}")
         return fn.value(f"and {self._integer} {under}, {highs}")
 
-    def marks_of(self, fn: Function, chunk: Value, first: Value | None = None, second: Value | None = None) -> Value:
-        """The first characters of a chunk that are NUL, or those that the pattern `first` is made of. Of a vector only
-        those that the character of `second` may follow, which is any if it is 0."""
-        ends = self.marks(fn, chunk)
-        if first is None:
-            return ends
-        if not self.target.vectors:
-            found = self.marks(fn, fn.value(f"xor {self._chunk_type} {chunk}, {first}"))
+    def marks_of(self, fn: Function, chunk: Value, first: Value, second: Value) -> Value:
+        """The first characters of a chunk that are NUL, or that the pattern `first` is made of. Of a vector only those
+        that the one of `second` may follow, which is any if it is 0."""
+        if self.target.vectors:
+            found = self._pairs(fn, chunk, first, second)
         else:
-            found = self._like(fn, chunk, first)
-        if self.target.vectors and second is not None:
-            any_follows = self._like(fn, second, "zeroinitializer")
-            follow = fn.value(f"or {self._marks_type} {self._like(fn, chunk, second)}, {any_follows}")
-            before = fn.value(f"lshr {self._marks_type} {follow}, 1")
-            before = fn.value(f"or {self._marks_type} {before}, {1 << (self.chunk - 1)}")  # what follows the last one?
-            found = fn.value(f"and {self._marks_type} {found}, {before}")
-        return fn.value(f"or {self._marks_type} {ends}, {found}")
+            found = self.marks(fn, fn.value(f"xor {self._chunk_type} {chunk}, {first}"))
+        return fn.value(f"or {self._marks_type} {self.marks(fn, chunk)}, {found}")
+
+    def _pairs(self, fn: Function, chunk: Value, first: Value, second: Value) -> Value:
+        """Where the first of two characters is in a vector and the second one may follow: that is not known of the
+        last."""
+        any_follows = self._like(fn, second, "zeroinitializer")
+        follow = fn.value(f"or {self._marks_type} {self._like(fn, chunk, second)}, {any_follows}")
+        before = fn.value(f"lshr {self._marks_type} {follow}, 1")
+        before = fn.value(f"or {self._marks_type} {before}, {1 << (self.chunk - 1)}")
+        return fn.value(f"and {self._marks_type} {self._like(fn, chunk, first)}, {before}")
 
     def _like(self, fn: Function, chunk: Value, other: Value | str) -> Value:
         """Which characters of two vectors are the same."""
@@ -255,7 +255,8 @@ def _scan(fn: Function, strings: _Strings, left: Value, count: Value, sought: tu
         patterns = [strings.pattern(fn, character) for character in sought or ()]
 
         def marks(index: Value) -> Value:
-            return strings.marks_of(fn, strings.load_chunk(fn, strings.at(fn, base, index)), *patterns)
+            chunk = strings.load_chunk(fn, strings.at(fn, base, index))
+            return strings.marks_of(fn, chunk, *patterns) if patterns else strings.marks(fn, chunk)
 
         start, length = _walk_chunks(fn, strings, room, count, marks)
         fn.terminate(f"ret i32 {fn.value(f'add i32 %start, {length}')}")
