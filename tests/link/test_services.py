@@ -195,6 +195,19 @@ def test_a_scan_waits_as_many_times_as_long_as_patience_says(monkeypatch: pytest
     assert [node.node_name for node in scan()] == [NODE_NAME]
 
 
+def test_a_reply_that_arrived_while_the_tool_had_to_wait_is_found() -> None:
+    class Stalled(FakeLine):
+        """For a process that gets no time for a minute, right after it has looked."""
+
+        def receive(self, timeout: float) -> bytes | None:
+            if timeout > 0:
+                self._advance(self.now() + 60)
+                return None
+            return super().receive(timeout)
+
+    assert [node.node_name for node in Connection(Stalled(FakeDevice())).scan(0.5)] == [NODE_NAME]
+
+
 def test_identity() -> None:
     identity = services.read_identity(Bench().session)
     assert (identity.device_name, identity.node_name, identity.vendor_name) == (DEVICE_NAME, NODE_NAME, VENDOR_NAME)

@@ -278,24 +278,33 @@ class Connection:
                 self._drop_channel()
 
     def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[names.Node]:
-        """Devices that answer a broadcast name request within `seconds`; stops early when `enough` have answered."""
+        """Devices that answer a broadcast name request within `seconds`; stops early when `enough` have answered.
+
+        Replies that have arrived by then are taken: this process may have had to wait, too.
+        """
         request_id = secrets.randbits(32)
         found: list[names.Node] = []  # two may have one address by mistake
         now = self.transport.now()
         end, ask_at = now + seconds, now
-        while now < end and not (enough and len(found) >= enough):
-            if now >= ask_at:
+        while not (enough and len(found) >= enough):
+            if ask_at <= now < end:
                 request = names.encode_request(request_id)
                 self.transport.send(self._packet(lib.ROUTER_SVC_NAME_REQUEST, router.BROADCAST, request))
                 ask_at = now + _ASK_EVERY
-            packet = self._receive(min(ask_at, end) - now)
-            if packet and packet.service == lib.ROUTER_SVC_NAME_RESPONSE:
-                node = names.decode_reply(packet.payload, request_id, packet.sender)
-                if node:
-                    node = replace(node, place=self.transport.places.get(node.address, ""))
-                    found += [node] if node not in found else []
+            node = self._named(self._receive(max(0.0, min(ask_at, end) - now)), request_id)
+            if node and node not in found:
+                found.append(node)
+            elif now >= end:
+                break
             now = self.transport.now()
         return found
+
+    def _named(self, packet: router.Packet | None, request_id: int) -> names.Node | None:
+        """The device that has sent this reply to a name request; None for other packets."""
+        if not packet or packet.service != lib.ROUTER_SVC_NAME_RESPONSE:
+            return None
+        node = names.decode_reply(packet.payload, request_id, packet.sender)
+        return node and replace(node, place=self.transport.places.get(node.address, ""))
 
     def wait(self, seconds: float) -> None:
         """See MessageLink."""

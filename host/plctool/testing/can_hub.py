@@ -1,4 +1,4 @@
-"""A CAN bus made of pseudo terminals: each is an SLCAN adapter, and a frame from one goes to all others."""
+"""A CAN bus made of pseudo terminals: each is an SLCAN adapter. A frame from one goes to all others that are open."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 _LARGEST_BACKLOG = 1 << 20  # bytes for an adapter that no tool reads, before frames to it are dropped
 _READ = 4096
 _FRAMES = b"tTrRdDbB"  # first letters of lines that are frames; all others are commands to the adapter
+_OPENS, _CLOSES = b"OL", b"C"  # the same of the commands after which an adapter hears the bus, and does not
 
 
 @dataclass
@@ -20,6 +21,7 @@ class _Adapter:
     master: int
     slave: int
     path: str
+    is_open: bool = False
     received: bytearray = field(default_factory=bytearray)
     backlog: bytearray = field(default_factory=bytearray)
 
@@ -69,12 +71,16 @@ class CanHub:
         """Carries the frames an adapter was given to all others."""
         with suppress(BlockingIOError):
             adapter.received += os.read(adapter.master, _READ)
-        *lines, rest = adapter.received.split(b"\r")
-        frames = [line + b"\r" for line in lines if line[:1] and line[:1] in _FRAMES and not self._loses()]
-        adapter.received = rest
+        *lines, adapter.received = adapter.received.split(b"\r")
+        frames = []
+        for line in filter(None, lines):
+            if line[0] in _OPENS + _CLOSES:
+                adapter.is_open = line[0] in _OPENS
+            elif line[0] in _FRAMES and not self._loses():
+                frames.append(line + b"\r")
         self.frames += len(frames)
         for other in self._adapters:
-            if other is not adapter and frames:
+            if other is not adapter and other.is_open and frames:
                 self._give(other, b"".join(frames))
 
     def _loses(self) -> bool:
