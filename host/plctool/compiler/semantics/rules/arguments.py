@@ -11,7 +11,15 @@ from dataclasses import dataclass, replace
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.library import OTHER_BLOCKS
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import elementary, error_value, place_of, same_type, settle, takes_array
+from plctool.compiler.semantics.conversions import (
+    elementary,
+    error_value,
+    place_of,
+    same_type,
+    scaled,
+    settle,
+    takes_array,
+)
 from plctool.compiler.semantics.generics import accepts, group_name, handed, handed_bounds, is_group, total_size
 from plctool.compiler.semantics.rules.members import bound_member, dotted_name
 from plctool.compiler.semantics.rules.places import changeable_place, may_copy
@@ -19,6 +27,7 @@ from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, Funct
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     AddressOf,
+    BinaryOp,
     BitPlace,
     Call,
     Const,
@@ -26,6 +35,8 @@ from plctool.compiler.typed import (
     DerefPlace,
     Direction,
     Expr,
+    Intrinsic,
+    IntrinsicCall,
     Load,
     Parameter,
     Place,
@@ -40,6 +51,7 @@ from plctool.compiler.typed_nodes import is_unaligned
 from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
     BOOL,
+    DINT,
     LREAL,
     REAL,
     ArrayType,
@@ -224,7 +236,7 @@ def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tu
         place = ValuePlace(e, e.type, e.pos)
     elif is_unaligned(place):
         c.warning(offset, "pointer", packed_and_pointed_to(place))
-    return handed(place, symbol.type, total_size(place))
+    return handed(place, symbol.type, size_of(c, place))
 
 
 def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:
@@ -316,6 +328,15 @@ def _has_any_length(pou: Pou | None, variable: Variable) -> bool:
     if pou is None or pou.kind not in (PouKind.FUNCTION, PouKind.METHOD):
         return False
     return any(parameter.by_reference and parameter.variable is variable for parameter in pou.parameters)
+
+
+def size_of(c: Checker, place: Place) -> Expr:
+    """The bytes of a place (DINT): a string that is passed to a function has those of the variable of the caller."""
+    t, pos = place.type, place.pos
+    if isinstance(t, StringType) and isinstance(place, VarPlace) and _has_any_length(c.scope.pou, place.var):
+        capacity = IntrinsicCall(Intrinsic.STRING_SIZE, [Load(place, t, pos)], DINT, pos)
+        return scaled(scaled(capacity, BinaryOp.ADD, 1), BinaryOp.MUL, t.unit)
+    return total_size(place)
 
 
 def packed(place: Place, what: str) -> str:

@@ -8,9 +8,9 @@ from __future__ import annotations
 from plctool.compiler.missing_names import known_name_like
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import elementary, error_value, place_of, settle
-from plctool.compiler.semantics.generics import bounds_of, total_size
+from plctool.compiler.semantics.generics import bounds_of
 from plctool.compiler.semantics.rules import intrinsics
-from plctool.compiler.semantics.rules.arguments import packed, packed_and_pointed_to
+from plctool.compiler.semantics.rules.arguments import packed, packed_and_pointed_to, size_of
 from plctool.compiler.semantics.rules.conversion_calls import conversion, conversion_hint
 from plctool.compiler.semantics.rules.intrinsics import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.members import space_of
@@ -80,9 +80,10 @@ def of_variable(c: Checker, name: str, node: ast.Call, expected: Type | None) ->
             t = c.world.declared.type_named(argument.pos, argument.name, c.scope)
             return error_value(c.pos(node.pos)) if t is ERROR else _size(c, t, node)
     e = settle(c.expr(argument))
-    if isinstance(e.type, OpenArrayType):
-        return total_size(place_of(e))
-    return e if e.type is ERROR else _size(c, e.type, node)
+    if e.type is ERROR:
+        return e
+    size = size_of(c, place_of(e))
+    return _size(c, e.type, node) if isinstance(size, Const) else size
 
 
 def _is_valid(c: Checker, node: ast.Expr) -> Expr:
