@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -356,26 +357,28 @@ def called_aggregate(frame: Frame, e: Call) -> Ref:
 def selected(frame: Frame, e: IntrinsicCall) -> Ref:
     """SEL and MUX choose an address."""
     if _is_lazy(e):
-        ways = _each_way(frame, e, partial(_address_and_capacity, frame))
-        pairs, blocks = [pair for pair, _ in ways], [block for _, block in ways]
+        ways = _each_way(frame, e, partial(_located, frame))
+        refs, blocks = [ref for ref, _ in ways], [block for _, block in ways]
     else:
         choice = truth(frame, e.args[0]) if e.intrinsic is Intrinsic.SELECT else frame.value(e.args[0])
-        pairs, blocks = [_address_and_capacity(frame, arg) for arg in e.args[1:]], []
+        refs, blocks = [_located(frame, arg) for arg in e.args[1:]], []
 
     def chosen(values: list[Value], text: str) -> Value:
         if blocks:
             return _phi(frame, text, list(zip(values, blocks, strict=True)))
         return _pick(frame, e, choice, values, text)
 
-    pointer = chosen([address for address, _ in pairs], "ptr")
-    capacities = [capacity for _, capacity in pairs]
+    pointer = chosen([ref.pointer for ref in refs], "ptr")
+    capacities = [ref.capacity for ref in refs]
     same = all(capacity == capacities[0] for capacity in capacities)
-    return Ref(pointer, 0, e.type, capacity=capacities[0] if same else chosen(capacities, "i32"))
+    capacity = capacities[0] if same else chosen(capacities, "i32")
+    return Ref(pointer, 0, e.type, capacity=capacity, sure=min(ref.align for ref in refs))
 
 
-def _address_and_capacity(frame: Frame, e: Expr) -> tuple[Value, Value]:
+def _located(frame: Frame, e: Expr) -> Ref:
+    """Where a string, array or structure is, with its address as the pointer."""
     ref = frame.aggregate(e)
-    return frame.address(ref), ref.capacity
+    return replace(ref, pointer=frame.address(ref), offset=0)
 
 
 def _pick(frame: Frame, e: IntrinsicCall, choice: Value, values: list[Value], text: str) -> Value:
