@@ -18,7 +18,7 @@ from plctool.compiler.semantics.pitfalls import has_exit
 from plctool.compiler.semantics.rules.jumps import note_loops, report_leaving, report_repeated
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.symbols import ERROR, Role, TypeSymbol, VarSymbol
+from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, Role, TypeSymbol, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Case,
@@ -234,9 +234,7 @@ def _label_value(c: Checker, node: ast.Expr, t: Type) -> int | None:
         return None
     if not is_untyped(e) and isinstance(t, EnumType) and e.type is not t and isinstance(e.type, EnumType):
         c.warning(node.pos, "enum", f"this is a value of {e.type}, CASE is about {t}: the number counts")
-        return e.value if isinstance(e.value, int) else None
-    if isinstance(t, EnumType) and is_untyped(e) and isinstance(e.value, int):
-        return e.value
+        e = Const(e.value, UNTYPED_INT, e.pos)
     target = elementary(t)
     value = c.coerce(e, target) if target is not None else e
     return (
