@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from plctool.compiler.codegen.ir import FALSE, Value, number
+from plctool.compiler.codegen.ir import FALSE, TRUE, Value, number
 from plctool.compiler.codegen.lower_arith import compare
 from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.typed import BinaryOp
@@ -136,13 +136,18 @@ def compare_strings(frame: Frame, op: BinaryOp, left: Ref, right: Ref) -> Value:
 def equals_literal(frame: Frame, ref: Ref, text: str) -> Value | None:
     """The i1 of a comparison with a short constant, without a loop; None when that is not possible."""
     assert isinstance(ref.type, StringType)
-    text = _up_to_nul(text)
-    data, at = encode_text(text + "\0", ref.type), 0
-    size = len(data)
-    if ref.capacity.constant is None or size > _INLINE_COMPARE:
+    text, capacity = _up_to_nul(text), ref.capacity.constant
+    if capacity is None:
         return None
-    if ref.capacity.constant < len(text):
+    end = "\0" if len(text) < capacity else ""  # a string that fills its variable may have none
+    data, at = encode_text(text + end, ref.type), 0
+    size = len(data)
+    if size > _INLINE_COMPARE:
+        return None
+    if capacity < len(text):
         return FALSE
+    if not size:
+        return TRUE
     fn, parts = frame.fn, []
     while at < size:
         width = max(w for w in (1, 2, 4, 8) if w <= min(size - at, frame.unit.target.pointer_size))
