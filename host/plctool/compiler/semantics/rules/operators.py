@@ -215,9 +215,10 @@ def _date_arithmetic(
     if op is BinaryOp.SUB and arithmetic.same_meaning(x, y):
         t = common_type(x, y)
         assert isinstance(t, Elementary)
-        difference = _build(c, op, c.coerce(left, t), c.coerce(right, t), t, offset)
         result = LTIME if t.bits == 64 or expected is LTIME else TIME
-        amount = convert(convert(difference, SIGNED[t.bits]), result)
+        number = SIGNED[result.bits]  # a difference of more than 68 years has no place in 32 bits
+        left, right = (convert(c.coerce(e, t), number) for e in (left, right))
+        amount = convert(_build(c, op, left, right, number, offset), result)
         factor = arithmetic.UNIT_NS[t] // arithmetic.UNIT_NS[result]
         return amount if factor == 1 else scaled(amount, BinaryOp.MUL, factor)
     if y.kind is Kind.TIME and x.kind is Kind.DATE and op in (BinaryOp.ADD, BinaryOp.SUB):
