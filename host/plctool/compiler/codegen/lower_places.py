@@ -155,15 +155,19 @@ def indexed(frame: Frame, place: IndexPlace) -> Ref:
 
 def _open_index(frame: Frame, place: IndexPlace, limits: list[tuple[Expr, Expr]]) -> Value:
     """The number of an element of an ARRAY[*] as a pointer-sized integer. It is computed in 64 bits, where
-    nothing wraps."""
+    nothing wraps but a huge unsigned index."""
     fn = frame.fn
     total: Value | None = None
     for expr, (low_bound, high_bound) in zip(place.indices, limits, strict=True):
         low, high = (resize(frame, frame.value(e), DINT, 64) for e in (low_bound, high_bound))
-        relative = fn.value(f"sub i64 {resize(frame, frame.value(expr), expr.type, 64)}, {low}")
+        index = resize(frame, frame.value(expr), expr.type, 64)
+        relative = fn.value(f"sub i64 {index}, {low}")
         last = fn.value(f"sub i64 {high}, {low}")
         if Check.BOUNDS in frame.checks:
-            frame.require(fn.value(f"icmp ule i64 {relative}, {last}"), ARRAY_BOUNDS, place.pos)
+            ok = fn.value(f"icmp ule i64 {relative}, {last}")
+            if bits_of(expr.type) == 64 and not is_signed(expr.type):  # a huge one would pass for a negative one
+                ok = fn.value(f"and i1 {ok}, {fn.value(f'icmp sge i64 {index}, 0')}")
+            frame.require(ok, ARRAY_BOUNDS, place.pos)
         if total is None:
             total = relative
         else:
