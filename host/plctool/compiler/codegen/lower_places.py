@@ -34,6 +34,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import root_of
 from plctool.iec.areas import EXCLUSIVE_AREAS
 from plctool.iec.types import BYTE, DINT, UDINT, ArrayType, PointerType, StringType, StructType, Type, is_scalar
 
@@ -150,7 +151,12 @@ def indexed(frame: Frame, place: IndexPlace) -> Ref:
         counted = counted and within
         dynamic = part if dynamic is None else frame.fn.value(f"add {frame.pointer_int} {dynamic}, {part}")
     base = base.member(constant_part * element.size, element, base.tag)
-    return frame.element(base, dynamic, element, counted=counted) if dynamic is not None else base
+    if dynamic is None:
+        return base
+    root = root_of(place)
+    if root is not None and root.storage is Storage.AREA and root.area not in EXCLUSIVE_AREAS:
+        base = replace(base, direct=False)  # it may be part of one that another variable has at such an index
+    return frame.element(base, dynamic, element, counted=counted)
 
 
 def _open_index(frame: Frame, place: IndexPlace, limits: list[tuple[Expr, Expr]]) -> Value:
