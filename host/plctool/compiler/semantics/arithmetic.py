@@ -77,7 +77,10 @@ def convert_date(e: Expr, target: Elementary) -> Expr:
     """A date or duration as another one: a DATE has no time of day, a TOD no days."""
     if not same_meaning(e.type, target):
         if same_meaning(target, TOD):
-            e = scaled(e, BinaryOp.MOD, day(e.type))
+            whole = day(e.type)
+            e = scaled(e, BinaryOp.MOD, whole)
+            if same_meaning(e.type, TIME):  # -1s is a second before midnight
+                e = scaled(scaled(e, BinaryOp.ADD, whole), BinaryOp.MOD, whole)
         elif same_meaning(target, DATE):
             e = scaled(scaled(e, BinaryOp.DIV, day(e.type)), BinaryOp.MUL, day(e.type))
     return rescale(e, target)
