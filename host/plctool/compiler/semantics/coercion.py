@@ -152,7 +152,7 @@ class Coercion:
             hint = f"; write '{value}'" if isinstance(target, StringType) and not target.wide else hint
             return self._error(e.pos, "type", f"{what} does not fit {target}{hint}")
         if to.kind is Kind.REAL:
-            number = constants.rounded(float(value), to)
+            number = constants.rounded(value, to)
             if number in (float("inf"), float("-inf")):
                 return self._error(e.pos, "range", f"{value} is too large for {target}")
             return Const(number, target, e.pos)

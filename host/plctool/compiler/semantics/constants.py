@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 from plctool.compiler.semantics.symbols import UNTYPED_INT
@@ -17,6 +18,7 @@ from plctool.iec.types import BOOL, REAL, Elementary, EnumType, Kind, PointerTyp
 Value = int | float | str
 
 _LARGEST = 1 << 64  # no integer type holds more
+_REAL_BITS = 24  # digits of a REAL
 
 
 class ConstantError(Exception):
@@ -38,10 +40,13 @@ def wrap(value: int, t: Elementary) -> int:
     return value - (1 << t.bits) if t.signed and value >> (t.bits - 1) else value
 
 
-def rounded(value: float, t: Type) -> float:
+def rounded(value: int | float, t: Type) -> float:
     """To the precision of REAL or LREAL."""
     if t is not REAL:
-        return value
+        return float(value)
+    if isinstance(value, int):  # not to that of LREAL first: it may be halfway between two REALs then
+        step = 1 << max(0, value.bit_length() - _REAL_BITS)
+        value = float(round(Fraction(value, step)) * step)
     try:
         return float(struct.unpack("<f", struct.pack("<f", value))[0])
     except OverflowError:
@@ -57,7 +62,7 @@ def convert(value: Value, source: Type, target: Type, *, rounding: Rounding = Ro
     if to is BOOL:
         return int(value != 0)
     if to.kind is Kind.REAL:
-        return rounded(float(value), to)
+        return rounded(value, to)
     if isinstance(value, float):
         return _to_integer(value, to, rounding)
     return wrap(value, to)
