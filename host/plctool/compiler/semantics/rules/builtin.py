@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.missing_names import known_name_like
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import elementary, error_value, place_of, settle
+from plctool.compiler.semantics.conversions import convert, elementary, error_value, place_of, settle
 from plctool.compiler.semantics.generics import bounds_of
 from plctool.compiler.semantics.rules import intrinsics
 from plctool.compiler.semantics.rules.arguments import packed, packed_and_pointed_to, size_of
@@ -45,7 +45,9 @@ from plctool.iec.types import (
     BYTE,
     DINT,
     ELEMENTARY,
+    LINT,
     UDINT,
+    ULINT,
     ArrayType,
     InterfaceType,
     OpenArrayType,
@@ -83,7 +85,10 @@ def of_variable(c: Checker, name: str, node: ast.Call, expected: Type | None) ->
     if e.type is ERROR:
         return e
     size = size_of(c, place_of(e))
-    return _size(c, e.type, node) if isinstance(size, Const) else size
+    if isinstance(size, Const):
+        return _size(c, e.type, node)
+    to = None if expected is None else elementary(expected)
+    return convert(size, to) if to in (UDINT, LINT, ULINT) else size  # it is never below zero
 
 
 def _is_valid(c: Checker, node: ast.Expr) -> Expr:
