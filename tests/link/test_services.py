@@ -22,13 +22,11 @@ from fake_device import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool import device
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError
 from plctool.link import bintag, file_services, l7, monitoring, services
 from plctool.link.connection import Connection
 from plctool.link.monitoring import AreaRange, Write
-from plctool.link.names import Node
 from plctool.link.services import AppException, AppState
 from plctool.link.session import Request, Session
 
@@ -174,38 +172,6 @@ def test_answers_with_a_changed_byte_are_values_or_errors_of_ours(reader: str, a
 
 
 # ---- device and application ------------------------------------------------------------------------------------------
-
-
-def test_a_scan_finds_the_device() -> None:
-    (node,) = Connection(FakeLine(FakeDevice())).scan(0.5)
-    assert (node.node_name, node.device_name, node.vendor_name) == (NODE_NAME, DEVICE_NAME, VENDOR_NAME)
-    assert (node.serial_number, node.version, node.address_text) == (SERIAL, "1.2.3.4", "0001")
-    assert node.target_id == lib.TARGET_ID_CORTEX_M3
-
-
-def test_a_scan_waits_as_many_times_as_long_as_patience_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    def scan() -> list[Node]:
-        slow = Connection(FakeLine(FakeDevice(), latency=1.0))
-        monkeypatch.setattr(device, "_open_link", lambda *_: slow)
-        return device.scan("serial:slow")
-
-    with pytest.raises(LinkError, match="No device answers"):
-        scan()
-    monkeypatch.setenv("PLCTOOL_PATIENCE", "3")
-    assert [node.node_name for node in scan()] == [NODE_NAME]
-
-
-def test_a_reply_that_arrived_while_the_tool_had_to_wait_is_found() -> None:
-    class Stalled(FakeLine):
-        """For a process that gets no time for a minute, right after it has looked."""
-
-        def receive(self, timeout: float) -> bytes | None:
-            if timeout > 0:
-                self._advance(self.now() + 60)
-                return None
-            return super().receive(timeout)
-
-    assert [node.node_name for node in Connection(Stalled(FakeDevice())).scan(0.5)] == [NODE_NAME]
 
 
 def test_identity() -> None:

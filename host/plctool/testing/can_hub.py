@@ -1,4 +1,4 @@
-"""A CAN bus made of pseudo terminals: each is an SLCAN adapter. A frame from one goes to all others that are open."""
+"""A CAN bus made of pseudo terminals: each is an SLCAN adapter. A frame goes from one that is open to all others that are."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class CanHub:
         for line in filter(None, lines):
             if line[0] in _OPENS + _CLOSES:
                 adapter.is_open = line[0] in _OPENS
-            elif line[0] in _FRAMES and not self._loses():
+            elif adapter.is_open and line[0] in _FRAMES and not self._loses():
                 frames.append(line + b"\r")
         self.frames += len(frames)
         for other in self._adapters:
