@@ -91,6 +91,7 @@ class Served:
             "baud": BAUD,
             "pid": os.getpid(),
             "tool": "a guest",
+            "patience": 1,
             **hello,
         }
         pipe.send(document_frame(Kind.HELLO, 1, document), PATIENCE)

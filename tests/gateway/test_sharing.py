@@ -13,6 +13,7 @@ from served import PATIENCE, Gate, Served
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError
 from plctool.gateway.shared import Turns
+from plctool.link import l7
 from plctool.link.channel import ChannelLost
 
 
@@ -123,6 +124,25 @@ def test_the_login_to_the_application_of_one_tool_is_taken_over_by_the_others(se
     second.stop()
     assert (first.read("Main.count"), served.plc.state) == (3, lib.AS_STOP)
     assert application_logins(served) == 2
+
+
+def test_a_start_lets_others_wait_for_their_turn(
+    served: Served, gate: Callable[[], Gate], eventually: Callable[[Callable[[], Any]], Any]
+) -> None:
+    """It is sent as two messages at once, as a program is; only a program keeps others out."""
+    starting, reading = served.connect(), served.connect()
+    assert reading.read("Main.count") == 0
+    starting.stop()
+    barred = gate()
+    served.device.handler = lambda m: barred(m) if l7.decode(m).service == lib.SRV_APP_START else served.plc.handle(m)
+    with ThreadPoolExecutor(2) as pool:
+        start = pool.submit(starting.start)
+        assert barred.closed.wait(PATIENCE)
+        read = pool.submit(reading.read, "Main.count")
+        eventually(lambda: read.done() or served.gateway.device.requests == 2)
+        barred.open()
+        start.result(PATIENCE)
+        assert read.result(PATIENCE) == 0
 
 
 def test_the_login_is_renewed_though_the_tool_that_made_it_old_is_gone(served: Served) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 from plctool.errors import DeviceError, LinkError
 from plctool.gateway.frames import (
     AHEAD,
+    BUSY,
     ENDING,
     GOODBYE,
     LOST,
@@ -29,6 +30,7 @@ from plctool.gateway.frames import (
     Pipe,
     Reply,
     Request,
+    Scope,
     document_frame,
 )
 from plctool.gateway.place import NoGateway, Place, find_holder, find_place, locked
@@ -43,6 +45,8 @@ _ATTACH_PATIENCE = 30.0  # to find or start a gateway [s]
 _START_PATIENCE = 20.0  # from its start to its first word [s]
 _ANSWER_PATIENCE = 20.0  # beyond that of the request: it may have to find the device and open a channel [s]
 _SEND_PATIENCE = 10.0
+_FILES_PATIENCE = 30.0  # for a transfer of another tool to end; a file is small [s]
+_FILES_POLL = 0.1  # between two looks whether it has ended [s]
 _RETRY = 0.01  # after a gateway that was just ending [s]
 
 
@@ -69,7 +73,8 @@ def _attach(link: Link, words: str) -> tuple[Place, Pipe]:
         place = find_place(link.place)
         try:
             pipe = connect(place) or _start_once(place, link)
-            greet(pipe, place, {"scheme": link.scheme, **link.options, "tool": words})
+            hello = {"scheme": link.scheme, **link.options, "tool": words, "patience": patience_factor()}
+            greet(pipe, place, hello)
             return place, pipe
         except Ended:
             if time.monotonic() >= end:
@@ -340,6 +345,28 @@ class GatewayConnection:
             with suppress(LinkError):
                 self._call("release")
 
+    @contextmanager
+    def transferring(self, purpose: str) -> Iterator[None]:
+        """Reserves the files of the device. Waits for a tool that has them, but not for long: then, and while one has
+        reserved the device, it raises LinkError."""
+        end = time.monotonic() + patience_factor() * _FILES_PATIENCE
+        while not self._reserves_files(purpose, last=time.monotonic() >= end):
+            time.sleep(_FILES_POLL)
+        try:
+            yield
+        finally:
+            with suppress(LinkError):
+                self._call("release", scope=Scope.FILES.value)
+
+    def _reserves_files(self, purpose: str, *, last: bool) -> bool:
+        try:
+            self._call("claim", purpose=purpose, scope=Scope.FILES.value)
+        except LinkError as error:
+            if last or error.code != BUSY:
+                raise
+            return False
+        return True
+
     # ---- frames ----
 
     def _channel(self) -> int:
@@ -471,6 +498,9 @@ class GatewaySession(Session):
 
     def exclusive(self, purpose: str) -> AbstractContextManager[None]:
         return self._gateway.exclusive(purpose)
+
+    def transferring(self, purpose: str) -> AbstractContextManager[None]:
+        return self._gateway.transferring(purpose)
 
     def forget_login(self) -> None:
         super().forget_login()

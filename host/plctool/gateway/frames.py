@@ -16,7 +16,7 @@ import time
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum
 from typing import Any
 
 from plctool.link.channel import MAX_REQUESTS
@@ -24,7 +24,7 @@ from plctool.link.channel import MAX_REQUESTS
 BUSY = "downloading"  # code of the error while another tool keeps the device to itself
 ENDING = "gateway-ending"  # code of a refusal: the gateway ends, and another one may be started
 LOST = "link-lost"  # code of the error when the line is gone, and the gateway ends with it
-PROTOCOL = 4  # of the gateway; a tool and a gateway work together when theirs are equal
+PROTOCOL = 5  # of the gateway; a tool and a gateway work together when theirs are equal
 AHEAD = MAX_REQUESTS + 1  # messages of a stream that the gateway may have: one waits there for its time
 MAX_PAYLOAD = 0x8000  # bytes; the longest message of the link with its head, or the longest list of tools, fits
 _HEAD = struct.Struct("<IBI")
@@ -45,6 +45,13 @@ class Kind(IntEnum):
     REPLY = 0x82  # Reply: a message of the device
     FAILED = 0x83  # JSON: an error; with request number 0 the gateway ends
     WAIT = 0x84  # nothing: the request waits for its turn
+
+
+class Scope(Enum):
+    """What a tool may keep to itself. For the device all tools of a gateway are one, with one transfer at a time."""
+
+    DEVICE = "device"
+    FILES = "files"
 
 
 _KINDS = frozenset(int(kind) for kind in Kind)

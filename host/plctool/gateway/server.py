@@ -33,11 +33,12 @@ from plctool.gateway.frames import (
     Pipe,
     Reply,
     Request,
+    Scope,
     document_frame,
 )
 from plctool.gateway.shared import CLAIM_SILENCE, SharedDevice, Tool
 from plctool.link.channel import ChannelLost
-from plctool.link.connection import Connection
+from plctool.link.connection import Connection, bounded_factor
 from plctool.link.transports import TRANSPORTS, Link
 from plctool.version import plctool_version
 
@@ -223,7 +224,7 @@ class _Guest:
             pass  # gone, or of no use
         finally:
             if self.tool:
-                self._device.release(self.tool)
+                self._device.release(self.tool, *Scope)
             self._gateway.leave(self)
             self._pipe.close()
 
@@ -252,6 +253,7 @@ class _Guest:
             except LinkError as error:
                 self._send(_failure(frame.number, error))
                 raise Closed from error
+            tool.patience = bounded_factor(_number(hello, "patience"))
         self._done(frame.number, {"pid": os.getpid(), "line": self._gateway.line})
 
     # ---- requests ----
@@ -304,9 +306,10 @@ class _Guest:
             case "forget":
                 self._device.forget_application(self._known(), _integer(call, "session"))
             case "claim":
-                self._device.take(self._known(), _printable(call.get("purpose")) or "using it alone")
+                purpose = _printable(call.get("purpose")) or "using it alone"
+                self._device.take(self._known(), purpose, _scope(call))
             case "release":
-                self._device.release(self._known())
+                self._device.release(self._known(), _scope(call))
             case "others":
                 others = [tool for tool in self._gateway.tools() if tool is not self.tool]
                 return {"tools": [{"tool": tool.words, "pid": tool.pid} for tool in others]}
@@ -414,6 +417,13 @@ def _number(document: dict[str, Any], name: str) -> float:
     if not isinstance(value, (int, float)) or not 0 <= value < math.inf:
         raise FrameError(f"{name} is not a number")
     return float(value)
+
+
+def _scope(document: dict[str, Any]) -> Scope:
+    try:
+        return Scope(document.get("scope", Scope.DEVICE))
+    except ValueError:
+        raise FrameError("scope is not one of those that a tool can keep") from None
 
 
 def _peer_pid(connected: socket.socket) -> int:

@@ -7,12 +7,13 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, field
+from itertools import chain, islice
 
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError
-from plctool.gateway.frames import BUSY
+from plctool.gateway.frames import BUSY, Scope
 from plctool.link import l7
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import Connection
@@ -66,6 +67,7 @@ class Tool:
     beat: Callable[[], None] = lambda: None  # tells it to wait on; raises when it is gone
     since: float = field(default_factory=time.monotonic)
     silent_since: float = field(default_factory=time.monotonic)  # math.inf while it asks for something
+    patience: float = 1.0  # how many times as long as usual a device may be silent, for this tool
     login: int = 0  # the one that it has opened, with the password if the device has one
 
     def __str__(self) -> str:
@@ -74,7 +76,8 @@ class Tool:
 
 @dataclass(frozen=True)
 class Claim:
-    """`owner` keeps the device to itself. `purpose`: shown to the others, such as "downloading app.cdl"."""
+    """`owner` keeps the device, or its files, to itself. `purpose`: shown to the others, such as "downloading
+    app.cdl"."""
 
     owner: Tool
     purpose: str
@@ -100,7 +103,7 @@ class SharedDevice:
         self._session = Session(connection, lambda: self._given)
         self._given: str | None = None  # the password, by the tool whose turn it is
         self._turns = Turns()
-        self._claim: Claim | None = None
+        self._claims: dict[Scope, Claim] = {}
         self._claiming = threading.Lock()
 
     @property
@@ -110,7 +113,8 @@ class SharedDevice:
 
     @property
     def claim(self) -> Claim | None:
-        return self._claim
+        """Of the device; None while tools share it."""
+        return self._claims.get(Scope.DEVICE)
 
     # ---- what tools ask for ----
 
@@ -162,8 +166,11 @@ class SharedDevice:
         reply: Callable[[bytes], None],
         check: Callable[[], None],
     ) -> None:
-        """Requests one after the other; `reply` gets each reply. No other tool has the device until the end. `check`
-        is called again and again; what it raises, or `reply`, ends the stream and closes the channel."""
+        """Requests one after the other; `reply` gets each reply. No other tool has the device until the end; while a
+        program is sent, others are refused. `check` is called again and again; what it raises, or `reply`, ends the
+        stream and closes the channel."""
+        following = iter(messages)
+        first = list(islice(following, 1))
         sent: deque[bytes] = deque()  # without a reply yet
 
         def noted(message: bytes) -> bytes:
@@ -173,8 +180,8 @@ class SharedDevice:
 
         with (
             self._turn(tool, generation),
-            self._claimed_meanwhile(tool),
-            closing(self._connection.stream(map(noted, messages), patience, check)) as answers,
+            self._claimed_meanwhile(tool) if any(map(_sends_program, first)) else nullcontext(),
+            closing(self._connection.stream(map(noted, chain(first, following)), patience, check)) as answers,
         ):
             for answer in answers:
                 self._note_end(sent.popleft(), answer)
@@ -206,6 +213,7 @@ class SharedDevice:
                 self._refuse_others(tool)  # it may have been claimed meanwhile
                 if generation is not None:
                     self._check_generation(tool, generation)
+                self._connection.patience_factor = tool.patience
                 yield
         finally:
             tool.silent_since = time.monotonic()
@@ -218,37 +226,40 @@ class SharedDevice:
 
     # ---- claims ----
 
-    def take(self, tool: Tool, purpose: str) -> None:
-        """Keeps the device for this tool, after the requests that wait already, until `release`."""
-        with self._turn(tool), self._claiming:
-            self._claim = Claim(tool, purpose)
+    def take(self, tool: Tool, purpose: str, scope: Scope = Scope.DEVICE) -> None:
+        """Keeps the device or its files for this tool, after the requests that wait already, until `release`."""
+        with self._turn(tool):
+            self._refuse_others(tool, scope)
+            with self._claiming:
+                self._claims[scope] = Claim(tool, purpose)
 
-    def release(self, tool: Tool) -> None:
+    def release(self, tool: Tool, *scopes: Scope) -> None:
         """Also of a tool that keeps nothing."""
         with self._claiming:
-            if self._claim and self._claim.owner is tool:
-                self._claim = None
+            for scope in scopes:
+                if (claim := self._claims.get(scope)) and claim.owner is tool:
+                    del self._claims[scope]
 
     @contextmanager
     def _claimed_meanwhile(self, tool: Tool) -> Iterator[None]:
-        if self._claim:
+        if self.claim:
             yield
             return
-        self._claim = Claim(tool, "sending a program")
+        self._claims[Scope.DEVICE] = Claim(tool, "sending a program")
         try:
             yield
         finally:
-            self.release(tool)
+            self.release(tool, Scope.DEVICE)
 
-    def _refuse_others(self, tool: Tool) -> None:
-        """Raises LinkError while another tool keeps the device; one that has fallen silent loses it."""
+    def _refuse_others(self, tool: Tool, scope: Scope = Scope.DEVICE) -> None:
+        """Raises LinkError while another tool keeps it; one that has fallen silent loses it."""
         with self._claiming:
-            claim = self._claim
+            claim = self._claims.get(scope)
             if claim is None or claim.owner is tool:
                 return
             if time.monotonic() - claim.owner.silent_since <= CLAIM_SILENCE:
                 raise LinkError(f"{claim.owner} is {claim.purpose}; try again when it is done.", BUSY)
-            self._claim = None
+            del self._claims[scope]
         claim.owner.drop()
 
     # ---- the login to the application ----
@@ -277,3 +288,11 @@ class SharedDevice:
             return
         if ended:
             self._session.forget_login()
+
+
+def _sends_program(message: bytes) -> bool:
+    try:
+        request = l7.decode(message)
+    except LinkError:
+        return False
+    return (request.group, request.service) == (lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT)

@@ -35,9 +35,13 @@ def patience_factor() -> float:
     """How many times as long as usual a device may be silent, by PLCTOOL_PATIENCE in the environment: for lines that
     are interrupted for seconds, and for devices that are processes of a busy machine. 1 if that is not a number."""
     with suppress(ValueError):
-        if 0.1 <= (factor := float(os.environ.get("PLCTOOL_PATIENCE", "1"))) <= 100:
-            return factor
+        return bounded_factor(float(os.environ.get("PLCTOOL_PATIENCE", "1")))
     return 1.0
+
+
+def bounded_factor(factor: float) -> float:
+    """Such a factor, 1 for one that makes no sense."""
+    return factor if 0.1 <= factor <= 100 else 1.0
 
 
 def no_answer(name: str) -> ChannelLost:
@@ -132,7 +136,7 @@ class Connection:
         self._peer: bytes | None = None
         self._channel: Channel | None = None
         self._silent = False  # it was given up, and has not been heard since
-        self._factor = patience_factor()
+        self.patience_factor = patience_factor()
 
     def __enter__(self) -> Connection:
         return self
@@ -214,7 +218,7 @@ class Connection:
     def _find(self, choice: Choice | None) -> names.Node:
         """The device that is meant. Raises LinkError when it does not reply, or there are several."""
         if choice is None or choice.number is not None:
-            found = self.scan(self._factor * self._open_patience, enough=1)
+            found = self.scan(self.patience_factor * self._open_patience, enough=1)
             if not found:
                 raise no_answer(self.name)
             return found[0]
@@ -229,7 +233,7 @@ class Connection:
     def _find_fitting(self, choice: Choice) -> list[names.Node]:
         """The devices that reply within the time that all need, or longer until one of them is meant."""
         found: dict[bytes, names.Node] = {}
-        end = self.now() + self._factor * self._open_patience
+        end = self.now() + self.patience_factor * self._open_patience
         while self.now() < end and not any(map(choice.fits, found.values())):
             found |= {node.address: node for node in self.scan(_ALL_REPLIED)}
         return list(found.values())
@@ -355,7 +359,7 @@ class Connection:
             raise ChannelLost(f"The device on {self.name} does not answer any more; check the line.", "timeout")
 
     def _give_up_at(self, channel: Channel, patience: float) -> float:
-        return channel.give_up_at(self._factor * patience, self.transport.heard_at)
+        return channel.give_up_at(self.patience_factor * patience, self.transport.heard_at)
 
     def _send_some(self, channel: Channel) -> bool:
         """Sends the packages that are due, up to _AT_ONCE. False if there were none."""

@@ -83,7 +83,8 @@ def list_files(session: Session) -> FileList:
 def read_file(session: Session, name: str, progress: Progress = lambda done, total: None) -> bytes:
     """The content of a file. Raises DeviceError when there is none, or it does not stay the same long enough."""
     _check_name(name)
-    return _again(session, lambda: _read_once(session, name, progress))
+    with session.transferring(f"reading {name}"):
+        return _again(session, lambda: _read_once(session, name, progress))
 
 
 def _read_once(session: Session, name: str, progress: Progress) -> bytes:
@@ -112,7 +113,8 @@ def _read_once(session: Session, name: str, progress: Progress) -> bytes:
 def write_file(session: Session, name: str, data: bytes, progress: Progress = lambda done, total: None) -> None:
     """Puts a file in place of the previous one of its name, which stays until all of the new one is there."""
     _check_name(name)
-    _again(session, lambda: _write_once(session, name, data, progress))
+    with session.transferring(f"writing {name}"):
+        _again(session, lambda: _write_once(session, name, data, progress))
 
 
 def _write_once(session: Session, name: str, data: bytes, progress: Progress) -> None:

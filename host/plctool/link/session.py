@@ -156,6 +156,11 @@ class Session:
         shown to them. Without a gateway there are no other tools."""
         return nullcontext()
 
+    def transferring(self, purpose: str) -> AbstractContextManager[None]:
+        """Reserves the files of the device in the same way: it has one transfer at a time. Waits while another tool
+        has them."""
+        return nullcontext()
+
     def recover(self, action: Callable[[], _T], repeatable: bool = True) -> _T:
         """Runs `action`, and again on a new channel when the channel was lost.
 
