@@ -10,7 +10,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
-from itertools import repeat
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
@@ -40,6 +39,10 @@ _MAX_CYCLES = 0xFFFF_FFFF  # of one call of the C core
 _SECTOR = 4096
 _PROGRAM_UNIT = 8
 MAX_NS = 2**62  # at once; the clock goes twice as far
+_NEVER = 2**63 - 1  # the last moment of that clock [ns]
+# What the C core runs before Python is asked whether the user wants it to end.
+_CYCLES_AT_ONCE = 100_000
+_NS_AT_ONCE = 3600 * 10**9
 
 
 class Simulator(Controller):
@@ -75,6 +78,7 @@ class Simulator(Controller):
             self._power_on(cycle_limit_ms)
             self._download(image, restart=True, progress=lambda done: None)
             if start:
+                self.check_running()  # initialisation may have failed
                 self.start()
         except BaseException:
             self.close()
@@ -277,7 +281,7 @@ class Simulator(Controller):
 
     def attach(self, step: Callable[[Simulator], None], every_ms: float = 1) -> None:
         """A plant: `step(plc)` is called each `every_ms` of virtual time, from now on, while time passes. It reads
-        outputs and sets inputs. With `run_cycles` it is called after the cycles in which its time came."""
+        outputs and sets inputs."""
         _check_callable(step)
         every = _ns(every_ms)
         if every <= 0:
@@ -311,18 +315,25 @@ class Simulator(Controller):
         an exception; without `check`, `status()` has it."""
         if not isinstance(count, SupportsIndex) or not 0 <= count <= _MAX_CYCLES:
             raise UsageError(f"At most {_MAX_CYCLES} cycles are run at once, and at least 0, not {count!r}.", "cycles")
-        for step in repeat(1, count) if self._plants else (count,):
+        left = int(count)
+        while left > 0 and self.raw_status().exception is None:
+            step = 1 if self._plants else min(left, _CYCLES_AT_ONCE)
             self._run_cycles(step)
-            self._step_plants()
-            if self.raw_status().exception is not None:
-                break
+            left -= step
         if check:
             self.check_running()
 
     def _run_cycles(self, count: int) -> None:
-        with self._functions.while_running():
-            result = self._lib.SimRunCycles(count) if count > 0 else lib.ERR_OK
-        if result == lib.ERR_TIMEOUT:
+        """With the steps of plants on the way."""
+        limit = self.now_ns + lib.SIM_RUN_LIMIT_MS * 1_000_000
+        while True:
+            due = min([_NEVER, *(plant.due_ns for plant in self._plants)])
+            with self._functions.while_running():
+                result = self._lib.SimRunCyclesUntil(count, due)
+            if result != lib.ERR_PENDING or self.now_ns > limit:
+                break
+            self._step_plants()
+        if result in (lib.ERR_TIMEOUT, lib.ERR_PENDING):
             message = "The first task waits for something that does not happen; give a time (--time) instead."
             raise DeviceError(message, "waits", result)
         if result not in (lib.ERR_OK, lib.ERR_EXCEPTION):
@@ -346,9 +357,13 @@ class Simulator(Controller):
             self.check_running()
 
     def _run_for(self, ns: int) -> None:
-        with self._functions.while_running():
-            result = self._lib.SimRunFor(max(0, ns))
-        _check(result, "Time does not advance")
+        end = self.now_ns + max(0, ns)
+        while True:
+            with self._functions.while_running():
+                result = self._lib.SimRunFor(min(end - self.now_ns, _NS_AT_ONCE))
+            _check(result, "Time does not advance")
+            if self.now_ns >= end:
+                return
 
     def run_devices(self, ns: int) -> None:
         """In a function of the program: virtual time passes for the devices, and the program stands still in its cycle.

@@ -114,7 +114,7 @@ def test_plant_runs_on_the_virtual_clock(plc: Simulator) -> None:
     plc.run_for(100)
     assert times == [25, 50, 75, 100]
     plc.run_cycles(10)
-    assert len(times) == 7  # what was due at 125, 150 and 175 ms, each after the cycle in which that was
+    assert len(times) == 7  # what was due at 125, 150 and 175 ms
     assert plc.output("level") == 7
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
+from plctool.controller import ProgramStopped
 from plctool.sim import Simulator
 
 PROGRAM = """
@@ -62,3 +63,12 @@ def bring_about(plc: Simulator, event: str) -> None:
         plc.run_cycles(1)
     elif event != "download":
         plc.reset("warm" if event == "warm" else "cold")
+
+
+def test_an_exception_in_initialisation_is_one_of_python_with_its_line(tmp_path: Path) -> None:
+    (tmp_path / "main.st").write_text(
+        "FUNCTION F : INT\nVAR_INPUT x : INT; END_VAR\nF := 10 / x;\nEND_FUNCTION\n"
+        "PROGRAM Main VAR zero : INT; n : INT := F(zero); END_VAR END_PROGRAM"
+    )
+    with pytest.raises(ProgramStopped, match=r"DIVIDEBYZERO.*main\.st:3"):
+        Simulator.from_sources(tmp_path)

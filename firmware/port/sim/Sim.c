@@ -31,7 +31,7 @@
 #define COMM_IDLE_NS (1000 * (RTS_I64)NS_PER_MS)
 /* Nor does main of a controller come back sooner. */
 #define COMM_PAUSE_NS ((RTS_I64)NS_PER_MS / 4)
-#define RUN_LIMIT_NS (3600 * 1000 * (RTS_I64)NS_PER_MS)
+#define RUN_LIMIT_NS (SIM_RUN_LIMIT_MS * (RTS_I64)NS_PER_MS)
 
 enum { MAX_TIMERS = APP_MAX_TASKS + 4 };
 
@@ -476,22 +476,33 @@ static RTS_RESULT running_state(void)
     return status.state == AS_RUN ? ERR_OK : ERR_INVALID_STATE;
 }
 
+typedef struct {
+    RTS_UI32 cycles;
+    RTS_I64 until_ns;
+} CYCLE_RUN;
+
 static RTS_RESULT run_cycles(void *arg)
 {
+    const CYCLE_RUN *run = arg;
     RTS_UI32 first = cycles_of_first_task();
-    RTS_UI32 cycles = *(const RTS_UI32 *)arg;
-    RTS_I64 end_ns = sim.now_ns + RUN_LIMIT_NS;
+    RTS_I64 limit_ns = sim.now_ns + RUN_LIMIT_NS;
     RTS_UI32 done = 0;
     RTS_RESULT result = running_state();
 
     SchedNoteEvents();
     serve_bus();
-    while (result == ERR_OK && done < cycles) {
-        if (!run_next(end_ns))
-            return ERR_TIMEOUT;
+    while (result == ERR_OK && done < run->cycles) {
+        if (!run_next(limit_ns < run->until_ns ? limit_ns : run->until_ns)) {
+            if (limit_ns < run->until_ns)
+                return ERR_TIMEOUT;
+            if (sim.now_ns < run->until_ns)
+                sim.now_ns = run->until_ns;
+            result = ERR_PENDING;
+            break;
+        }
         if (cycles_of_first_task() - first != done) {
             done = cycles_of_first_task() - first;
-            end_ns = sim.now_ns + RUN_LIMIT_NS;
+            limit_ns = sim.now_ns + RUN_LIMIT_NS;
         }
         result = running_state();
     }
@@ -499,13 +510,20 @@ static RTS_RESULT run_cycles(void *arg)
     return result;
 }
 
-RTS_RESULT SimRunCycles(RTS_UI32 cycles)
+RTS_RESULT SimRunCyclesUntil(RTS_UI32 cycles, RTS_I64 until_ns)
 {
+    CYCLE_RUN run = {cycles, until_ns};
+
     if (sim.power_lost)
         return SIM_POWER_CUT;
     if (!sim.on)
         return ERR_NOTINITIALIZED;
-    return with_landing(run_cycles, &cycles);
+    return with_landing(run_cycles, &run);
+}
+
+RTS_RESULT SimRunCycles(RTS_UI32 cycles)
+{
+    return SimRunCyclesUntil(cycles, NEVER);
 }
 
 /* ---- time within a cycle ---- */

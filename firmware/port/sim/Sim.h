@@ -48,9 +48,13 @@ RTS_RESULT SimAdvance(RTS_I64 ns);
 RTS_RESULT SimRunFor(RTS_I64 ns);
 
 /* Lets time pass until the first task of the application has run `cycles` more cycles. ERR_INVALID_STATE when the
- * application does not run, ERR_EXCEPTION when it stopped on the way, ERR_TIMEOUT when the task did not run for an hour
- * of virtual time. */
+ * application does not run, ERR_EXCEPTION when it stopped on the way, ERR_TIMEOUT when the task did not run for
+ * SIM_RUN_LIMIT_MS of virtual time. */
+enum { SIM_RUN_LIMIT_MS = 3600 * 1000 };
 RTS_RESULT SimRunCycles(RTS_UI32 cycles);
+
+/* The same, but not beyond the time `until_ns`, which is ERR_PENDING; what is due then does not run yet. */
+RTS_RESULT SimRunCyclesUntil(RTS_UI32 cycles, RTS_I64 until_ns);
 
 /* Lets `ns` of virtual time pass for devices alone: it is called by SIM_FUNCTION, whose cycle lasts until it returns.
  * Outputs leave, and inputs come, at once, at the end, and as often as the first task runs otherwise. Errors as

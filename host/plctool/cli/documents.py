@@ -401,8 +401,11 @@ def _run_traced(plc: Simulator, cycles: int | None, time_ms: float | None, trace
     """As `run`, in steps."""
     from plctool.trace_file import trace_csv
 
-    lines = trace_csv(plc, trace.names, cycles, time_ms)
-    write_output(trace.path, "".join(lines).encode())
+    lines: list[str] = []
+    try:
+        lines.extend(trace_csv(plc, trace.names, cycles, time_ms))
+    finally:  # also of a run that the user or a plant has ended
+        write_output(trace.path, "".join(lines).encode())
     plc.check_running()
 
 
