@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from plctool.st_tests.report import Failure
 
 _WORD = re.compile(rb"T\0?E\0?S\0?T", re.IGNORECASE)
-_TEST = re.compile(r"^(?:\s|\{[^}]*\})*TEST\s*['\"]", re.IGNORECASE | re.MULTILINE)
+_TEST = re.compile(r"\bTEST\s*['\"]", re.IGNORECASE)
 _PROGRAMS: pytest.StashKey[dict[tuple[Path, ...], TestProgram]] = pytest.StashKey()
 _PROJECTS: pytest.StashKey[dict[Path, ProgramFiles]] = pytest.StashKey()
 
@@ -43,8 +43,9 @@ def _has_test(data: bytes) -> bool:
     if not _WORD.search(data):
         return False
     from plctool.compiler.source_files import decode
+    from plctool.compiler.syntax.plain_text import plain_text
 
-    return _TEST.search(decode(data)) is not None
+    return _TEST.search(plain_text(decode(data), strings=True)) is not None
 
 
 class StFile(pytest.File):

@@ -441,6 +441,17 @@ def test_the_environment_names_the_link_of_commands_without_one(
     assert opened == [f"{mine}=9600", f"{mine}=19200", f"{fake}=115200", f"{mine}=9600"]
 
 
+@pytest.mark.parametrize("flag", ["--port", "--tcp", "--udp", "--can"])
+def test_an_empty_place_is_no_way_to_another_device(
+    tool: Any, opened: list[str], monkeypatch: pytest.MonkeyPatch, flag: str
+) -> None:
+    """As a variable of a shell script that is not set."""
+    monkeypatch.setenv("PLC_LINK", "serial:/dev/mine")
+    done = tool("stop", flag, "")
+    assert (done.status, opened) == (2, [])
+    assert done.err.startswith(f"plctool: {flag} is followed by nothing; write for example ")
+
+
 def test_the_project_names_the_link_where_the_environment_does_not(
     tool: Any, opened: list[str], scratch: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

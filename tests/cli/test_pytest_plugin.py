@@ -129,3 +129,15 @@ def test_a_test_is_found_however_it_is_written(scratch: Path, text: str, encodin
     (scratch / "only.st").write_text(text, encoding)
     done = run_pytest(scratch)
     assert "1 passed" in done.stdout, done.stdout
+
+
+@pytest.mark.parametrize("before", ["(* why *) ", "// why\n/* and how */ ", "{attribute 'x'} (* a (* b *) *) "])
+@pytest.mark.parametrize("between", [" ", " (* of it *) "])
+def test_a_test_after_a_comment_is_found(project: Path, before: str, between: str) -> None:
+    (project / "tests.st").write_text(f"{before}TEST{between}'alone'\nASSERT_TRUE(TRUE);\nEND_TEST\n")
+    assert "tests.st::alone PASSED" in run_pytest(project).stdout
+
+
+def test_a_test_in_a_comment_is_none(project: Path) -> None:
+    (project / "tests.st").write_text("(* as in\n   (* nested *) x TEST 'alone' *)\n")
+    assert run_pytest(project).returncode == 5  # no tests

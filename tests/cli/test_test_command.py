@@ -364,6 +364,13 @@ def test_filter_chooses_by_name(tool: Tool) -> None:
     assert tool("test", "program.st", "--filter", "nothing").status == 2
 
 
+def test_brackets_in_a_pattern_are_those_of_the_name(tool: Tool) -> None:
+    path = str(write("".join(f"TEST '{name}'\nEND_TEST\n" for name in ("x[1]", "x[2]", "x1"))))
+    for pattern, names in (("x[1]", ["x[1]"]), ("x[*]", ["x[1]", "x[2]"]), ("[2", ["x[2]"])):
+        done = tool("test", path, "-k", pattern, "--json")
+        assert [test["name"] for test in done.json["tests"]] == names
+
+
 def test_a_filter_without_wildcards_is_a_part_of_the_name(tool: Tool) -> None:
     done = tool("test", str(write(TWO)), "-k", "OO", "--json")
     assert [test["name"] for test in done.json["tests"]] == ["good"]

@@ -72,3 +72,15 @@ def test_a_real_that_is_no_number_is_a_word(tool: Any, scratch: Path) -> None:
     assert tool("run", "app.cdl", *values, "--get", "Main.*").out.startswith("Main.r = NaN\nMain.list = [Infinity, -")
     traced = tool("run", "app.cdl", *values, "--trace", "Main.*", "-o", "-")
     assert traced.out.splitlines()[1] == "0,NaN,Infinity,-Infinity"
+
+
+def test_members_that_are_ours_have_no_column(tool: Any, scratch: Path) -> None:
+    (scratch / "main.st").write_text(
+        "INTERFACE IPump METHOD Go END_METHOD END_INTERFACE\n"
+        "FUNCTION_BLOCK Pump IMPLEMENTS IPump VAR n : INT; END_VAR METHOD Go n := 1; END_METHOD END_FUNCTION_BLOCK\n"
+        "PROGRAM Main VAR p : ARRAY[1..2] OF Pump; m AT %MW0 : INT; END_VAR p[1].Go(); END_PROGRAM\n"
+    )
+    assert tool("build", "main.st").status == 0
+    for names, columns in ((["Main.p"], "Main.p[1].n,Main.p[2].n"), (["Main.p[1]", "%MW0"], "Main.p[1].n,%MW0")):
+        done = tool("run", "app.cdl", "--trace", *names, "-o", "-")
+        assert done.out.splitlines()[0] == f"time_ms,{columns}", done.err

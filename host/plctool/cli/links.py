@@ -36,7 +36,10 @@ def find_link(args: argparse.Namespace) -> Link | None:
         flags = " or ".join(f"--{TRANSPORTS[scheme].flag}" for scheme in given)
         raise UsageError(f"Name one link only, {flags}.", "no-link")
     if given:
-        return make_link(given[0], _argument(args, TRANSPORTS[given[0]].flag), **_options(args))
+        kind = TRANSPORTS[given[0]]
+        if not (place := _argument(args, kind.flag)):
+            raise UsageError(f"--{kind.flag} is followed by nothing; write for example {kind.example}.", "no-link")
+        return make_link(given[0], place, **_options(args))
     link = _default_link()
     return None if link is None else make_link(link.scheme, link.place, **{**link.options, **_options(args)})
 
@@ -53,7 +56,7 @@ def all_serial_ports(args: argparse.Namespace) -> list[Link]:
 
 def _given(args: argparse.Namespace) -> list[str]:
     """The kinds of link that the arguments name."""
-    return [scheme for scheme, kind in TRANSPORTS.items() if kind.flag and _argument(args, kind.flag)]
+    return [scheme for scheme, kind in TRANSPORTS.items() if kind.flag and _argument(args, kind.flag) is not None]
 
 
 def _argument(args: argparse.Namespace, name: str) -> Any:

@@ -179,7 +179,8 @@ class SymbolTable:
 
     def scalars(self, names: Sequence[str]) -> dict[str, Symbol]:
         """The same by their own names, and of structures and arrays all values that they consist of."""
-        leaves = (leaf for symbol in self.select(names).values() for leaf in symbol.leaves())
+        wanted = self.select(names).values()
+        leaves = (leaf for s in wanted for leaf in s.leaves() if "%" not in leaf.name.removeprefix(s.name))  # not ours
         found = {leaf.name: shown(leaf, self._units) for leaf in leaves}
         return {name: symbol for name, symbol in found.items() if not isinstance(symbol.type, OpenArrayType)}
 

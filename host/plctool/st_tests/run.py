@@ -6,7 +6,7 @@ import re
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from fnmatch import fnmatch
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -144,7 +144,7 @@ class TestProgram:
 
 
 def _fits(name: str, pattern: str) -> bool:
-    return fnmatch(name, pattern) if any(c in pattern for c in "*?[") else pattern in name
+    return fnmatchcase(name, pattern.replace("[", "[[]")) if any(c in pattern for c in "*?") else pattern in name
 
 
 @contextmanager

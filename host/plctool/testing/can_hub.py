@@ -1,4 +1,4 @@
-"""A CAN bus made of pseudo terminals: each is an SLCAN adapter. A frame goes from one that is open to all others that are."""
+"""A CAN bus made of pseudo terminals: each is an SLCAN adapter. Frames go from an open one to all others that are."""
 
 from __future__ import annotations
 
