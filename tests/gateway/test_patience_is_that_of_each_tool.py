@@ -1,4 +1,4 @@
-"""PLCTOOL_PATIENCE holds for the tool that has it, whoever started the gateway."""
+"""PLCTOOL_PATIENCE holds for the tool that has it, also if another one started the gateway."""
 
 from __future__ import annotations
 
