@@ -11,7 +11,7 @@ from served import PATIENCE, Served
 
 from plctool.errors import LinkError
 from plctool.gateway import client, shared
-from plctool.gateway.frames import BUSY, Kind, Scope
+from plctool.gateway.frames import BUSY, FILES_BUSY, Kind, Scope
 
 READING = {"purpose": "reading Source.zip", "scope": Scope.FILES.value}
 
@@ -42,7 +42,7 @@ def test_one_that_waits_too_long_learns_for_whom(served: Served, monkeypatch: py
     with served.tool("plctool files get a").transferring("reading a"):
         with refused as caught, served.tool().transferring("reading b"):
             pass
-        assert caught.value.code == BUSY
+        assert caught.value.code == FILES_BUSY
     with served.tool().transferring("reading b"):
         pass
 
@@ -62,6 +62,14 @@ def test_a_tool_that_leaves_or_falls_silent_gives_the_files_back(
     monkeypatch.setattr(shared, "CLAIM_SILENCE", -1.0)
     assert reserves(other)
     eventually(silent.is_gone)
+
+
+def test_no_tool_waits_for_the_files_during_a_download(served: Served) -> None:
+    """It may take minutes; the error comes at once, as for all else."""
+    refused = pytest.raises(LinkError, match="downloading")
+    with served.tool().exclusive("downloading app.cdl"), refused as caught, served.tool().transferring("reading a"):
+        pass
+    assert caught.value.code == BUSY
 
 
 def test_the_files_are_reserved_within_a_download_of_the_same_tool(served: Served) -> None:

@@ -18,8 +18,8 @@ from typing import Any
 from plctool.errors import DeviceError, LinkError
 from plctool.gateway.frames import (
     AHEAD,
-    BUSY,
     ENDING,
+    FILES_BUSY,
     GOODBYE,
     LOST,
     PROTOCOL,
@@ -362,7 +362,7 @@ class GatewayConnection:
         try:
             self._call("claim", purpose=purpose, scope=Scope.FILES.value)
         except LinkError as error:
-            if last or error.code != BUSY:
+            if last or error.code != FILES_BUSY:
                 raise
             return False
         return True

@@ -22,6 +22,7 @@ from typing import Any
 from plctool.link.channel import MAX_REQUESTS
 
 BUSY = "downloading"  # code of the error while another tool keeps the device to itself
+FILES_BUSY = "transferring"  # the same while another one keeps the files
 ENDING = "gateway-ending"  # code of a refusal: the gateway ends, and another one may be started
 LOST = "link-lost"  # code of the error when the line is gone, and the gateway ends with it
 PROTOCOL = 5  # of the gateway; a tool and a gateway work together when theirs are equal

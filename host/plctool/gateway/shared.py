@@ -13,7 +13,7 @@ from itertools import chain, islice
 
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError
-from plctool.gateway.frames import BUSY, Scope
+from plctool.gateway.frames import BUSY, FILES_BUSY, Scope
 from plctool.link import l7
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import Connection
@@ -258,7 +258,8 @@ class SharedDevice:
             if claim is None or claim.owner is tool:
                 return
             if time.monotonic() - claim.owner.silent_since <= CLAIM_SILENCE:
-                raise LinkError(f"{claim.owner} is {claim.purpose}; try again when it is done.", BUSY)
+                code = BUSY if scope is Scope.DEVICE else FILES_BUSY
+                raise LinkError(f"{claim.owner} is {claim.purpose}; try again when it is done.", code)
             del self._claims[scope]
         claim.owner.drop()
 
