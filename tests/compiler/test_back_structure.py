@@ -17,6 +17,7 @@ from plctool.compiler.codegen.partition import Part
 from plctool.compiler.front import check_sources
 from plctool.compiler.source import Source
 from plctool.compiler.typed import TypedProgram
+from plctool.controller import ProgramStopped
 from plctool.image.file import parse_image
 from plctool.image.targets import find_target
 from plctool.sim import Simulator
@@ -137,14 +138,32 @@ def test_blocks_that_are_called_once_may_be_inlined() -> None:
     assert "noinline" not in signature(lowered(large_callers(3)), "st.Block0")
 
 
-@pytest.mark.parametrize(("given", "inlined"), [("source", True), ("5", True), ("10 / source", False)])
-def test_what_a_configuration_connects_is_part_of_the_task_unless_it_may_fail(given: str, inlined: bool) -> None:
-    text = lowered(
-        "VAR_GLOBAL source : INT := 1; END_VAR PROGRAM Work VAR_INPUT x : INT; END_VAR END_PROGRAM CONFIGURATION c "
-        f"TASK t(INTERVAL := T#1ms); PROGRAM p WITH t : Work(x := {given}); END_CONFIGURATION"
+def connected(given: str) -> str:
+    return (
+        "VAR_GLOBAL source : INT; n : INT; END_VAR PROGRAM Work VAR_INPUT x : INT; END_VAR VAR_OUTPUT y : INT; END_VAR\n"
+        "y := x + 1; END_PROGRAM CONFIGURATION c TASK t(INTERVAL := T#1ms);\n"
+        f"PROGRAM p WITH t : Work(x := {given}, y => n); END_CONFIGURATION"
     )
-    assert ("noinline" not in signature(text, "st.p.inputs")) is inlined
-    assert "noinline" in signature(text, "st.p")
+
+
+@pytest.mark.parametrize("given", ["source", "5", "10 / source"])
+def test_what_a_configuration_connects_is_part_of_the_program(given: str) -> None:
+    text = lowered(connected(given))
+    run, *parts_of_it = re.findall(r"^define (.*@st\.p\S*\(.*)\{$", text, re.M)
+    assert "noinline" in run
+    assert len(parts_of_it) == 3 and not any("noinline" in part for part in parts_of_it)
+
+
+def test_a_program_reads_what_is_connected_to_it_from_registers() -> None:
+    module, _ = optimised(parts(connected("source"))[0], Options(find_target("x86_64-linux")))
+    loads = [text for text in str(module).splitlines() if re.search(r"= load i16\b", text)]
+    assert len(loads) == 1  # of `source`; neither of x, nor of y
+
+
+def test_an_exception_in_what_is_connected_has_the_line_of_the_configuration() -> None:
+    built = build_program(checked(connected("10 / source")), Options(find_target("x86_64-linux")))
+    with Simulator(built.image, built.symbols) as plc, pytest.raises(ProgramStopped, match=r"main\.st:3"):
+        plc.run_cycles(1)
 
 
 def test_no_function_grows_without_limit_by_inlining() -> None:

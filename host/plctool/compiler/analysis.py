@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from plctool.compiler.typed import (
-    Assign,
     Call,
-    Const,
     DerefPlace,
     FbCall,
     For,
-    Load,
-    MemberPlace,
     Place,
     Pou,
     SelfPlace,
@@ -21,11 +17,6 @@ from plctool.compiler.typed import (
 from plctool.compiler.typed_nodes import referenced_places, root_of, walk, written_places
 from plctool.iec.areas import EXCLUSIVE_AREAS
 from plctool.iec.types import ArrayType, StructType, Type
-
-
-def only_copies(pou: Pou) -> bool:
-    """Whether a unit does no more than assign variables and constants, which cannot fail."""
-    return all(isinstance(node, Assign | Const | Load | MemberPlace | VarPlace) for node in walk(pou.body))
 
 
 class Effects:

@@ -611,7 +611,7 @@ class Pou:
     cuts_result: bool = False  # the body keeps within STRING_SIZE of its string result, whatever that is
     in_place: bool = False  # the result may be the very variable that is the first argument
     no_init: bool = False  # locals need no zeroing: the body writes each before it reads it (standard library)
-    connection: bool = False  # what a CONFIGURATION assigns to or from a program, before or after it
+    connects: Pou | None = None  # the program before or after which this assigns what a CONFIGURATION says
 
 
 @dataclass(frozen=True)

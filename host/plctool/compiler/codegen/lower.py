@@ -4,6 +4,7 @@ for the end."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import Function
@@ -99,11 +100,15 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
 
 
 def _task_entry(unit: Unit, number: int, task: Task) -> str:
-    """Calls the programs of a task in order."""
+    """Calls the programs of a task in order. What connects one is part of its function, where what is assigned to it
+    is in a register when it is used."""
     name = f"task.{number}"
     fn = Function(f"void @{name}({CONTEXT_PARAMETER})", unit.plain)
-    for pou in task.programs:
-        fn.call(unit.symbol(pou), [CONTEXT])
+    for program, run in groupby(task.programs, lambda pou: pou.connects or pou):
+        pous = list(run)
+        if len(pous) > 1:
+            unit.runs[program] = pous
+        fn.call(unit.symbol(program, Form.RUN if len(pous) > 1 else Form.PLAIN), [CONTEXT])
     fn.terminate("ret void")
     unit.module.add(name, fn, linkage="")
     return name
@@ -113,11 +118,13 @@ def _pou(unit: Unit, pou: Pou, effects: Effects, form: Form) -> None:
     closed = unit.closed.get(pou)
     returned, name = returned_variable(pou, closed), unit.symbol(pou, form)
     signature = f"{returned_type(returned)} @{name}({parameter_list(pou, unit.handed, form, closed)})"
-    fn = Function(signature, unit.attributes(pou), unit.inlining(pou))
+    fn = Function(signature, unit.attributes(pou), unit.inlining(pou, form))
     body = Body(unit, fn, pou, effects, form)
     body.open_scope(pou.name, pou.pos)
     cut = [pou] if pou in unit.sections else sections(pou)
-    if len(cut) > 1:
+    if form is Form.RUN:
+        write_calls(body, [unit.symbol(part) for part in unit.runs[pou]])
+    elif len(cut) > 1:
         write_calls(body, [unit.section(part, form) for part in cut])
     else:
         write_body(body)

@@ -64,7 +64,7 @@ def write_body(frame: Body) -> None:
 
 
 def write_calls(frame: Body, parts: list[str]) -> None:
-    """Writes calls of the parts that the body was cut into."""
+    """Writes calls of the parts that the body was cut into, or of a program and what connects it."""
     assert frame.pou is not None
     take_inputs(frame, frame.pou)
     instance = [f"ptr {SELF}"] if frame.pou.kind is PouKind.FUNCTION_BLOCK else []

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from plctool.compiler.analysis import only_copies
 from plctool.compiler.codegen.closed import Closed
 from plctool.compiler.codegen.firmware_stacks import FirmwareStacks
 from plctool.compiler.codegen.ir import Module, escape
@@ -83,6 +82,7 @@ class Form(Enum):
     PLAIN = 0
     RAISING = 1  # it returns its exceptions
     MEASURED = 2  # a function of the library that is given the lengths of its strings
+    RUN = 3  # a program with what its CONFIGURATION assigns before and after it, as its task runs it
 
 
 def import_symbol(name: str) -> str:
@@ -129,6 +129,7 @@ class Unit:
         self.handed: dict[Pou, list[Variable]] = {}  # inputs that function blocks get as parameters
         self.transient: dict[Pou, list[Variable]] = {}  # variables of function blocks that are not kept in memory
         self.closed: dict[Pou, Closed] = {}  # the blocks that are closed
+        self.runs: dict[Pou, list[Pou]] = {}  # the programs that a CONFIGURATION connects, each with what that takes
         self.pous: dict[tuple[Pou, Form], str] = {}  # the symbol of every form of a POU
         self.structs: dict[str, StructType] = {}  # types whose default initialiser is needed, by symbol
         self.helpers: set[str] = set()
@@ -168,11 +169,11 @@ class Unit:
             return self.strings
         return self._program if pou.checks else self.plain
 
-    def inlining(self, pou: Pou) -> str:
+    def inlining(self, pou: Pou, form: Form) -> str:
         """The attributes for LLVM about inlining a POU: the standard library is made for it, if there is room. A task
-        has no lines, so it takes in only what cannot fail."""
-        is_program = pou.kind is PouKind.PROGRAM and not (pou.connection and only_copies(pou))
-        if is_program or self.options.debug or pou in self.sections:
+        has no lines, so it takes in nothing."""
+        is_called_by_task = pou.kind is PouKind.PROGRAM and not self._is_within_run(pou, form)
+        if is_called_by_task or self.options.debug or pou in self.sections:
             return "noinline"
         if self.options.size and pou in self.closed and self.closed[pou].calls > 1:
             return "noinline"  # with its inputs and outputs in registers a call is smaller than any body
@@ -180,6 +181,9 @@ class Unit:
         if sum(variable.type.size for variable in pou.locals) > large:
             return "noinline"  # or its caller would need that room, and probe it, also when it does not call
         return "inlinehint" if not pou.checks and (pou.no_init or not self.options.compact) else ""
+
+    def _is_within_run(self, pou: Pou, form: Form) -> bool:
+        return pou.connects is not None or (pou in self.runs and form is not Form.RUN)
 
     # ---- what is referred to ----
 

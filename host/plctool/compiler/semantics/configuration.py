@@ -326,7 +326,7 @@ class _Builder:
         (before, behind), pou = handed, program.pou
         at = task.programs.index(pou)
         inputs, outputs = (
-            [Pou(f"{pou.name}.{name}", PouKind.PROGRAM, pou.pos, body=body, connection=True)] if body else []
+            [Pou(f"{pou.name}.{name}", PouKind.PROGRAM, pou.pos, body=body, connects=pou)] if body else []
             for name, body in (("inputs", before), ("outputs", behind))
         )
         task.programs[at : at + 1] = [*inputs, pou, *outputs]
