@@ -140,7 +140,7 @@ def test_blocks_that_are_called_once_may_be_inlined() -> None:
 
 def connected(given: str) -> str:
     return (
-        "VAR_GLOBAL source : INT; n : INT; END_VAR PROGRAM Work VAR_INPUT x : INT; END_VAR VAR_OUTPUT y : INT; END_VAR\n"
+        "VAR_GLOBAL source, n : INT; END_VAR PROGRAM Work VAR_INPUT x : INT; END_VAR VAR_OUTPUT y : INT; END_VAR\n"
         "y := x + 1; END_PROGRAM CONFIGURATION c TASK t(INTERVAL := T#1ms);\n"
         f"PROGRAM p WITH t : Work(x := {given}, y => n); END_CONFIGURATION"
     )

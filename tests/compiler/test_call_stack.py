@@ -34,22 +34,27 @@ UNITS = st.lists(
 
 
 class Program:
-    """Main calls unit 0, that calls unit 1 ..., the last one divides by zero in the fourth cycle."""
+    """Main calls unit 0, that calls unit 1 ..., the last one divides by zero in the fourth cycle. `connected`: what a
+    CONFIGURATION assigns before and after it is part of Main."""
 
-    def __init__(self, units: list[Unit]) -> None:
+    def __init__(self, units: list[Unit], connected: bool) -> None:
         self.lines = ["VAR_GLOBAL seen : DINT; END_VAR"]
         self.places: list[tuple[str, int]] = []  # unit and line of the calls, the innermost first
         for n in reversed(range(len(units))):
             self._unit(n, units)
         self.lines += [
             "PROGRAM Main",
-            "VAR cycle, x : DINT;",
+            "VAR_INPUT given : DINT; END_VAR VAR_OUTPUT x : DINT; END_VAR",
+            "VAR cycle : DINT;",
             *self._instance(0, units),
             "END_VAR",
             "cycle := cycle + 1;",
         ]
         self._body("Main", 0, units, "4 - cycle")
         self.lines += ["END_PROGRAM"]
+        if connected:
+            instance = "PROGRAM Main WITH T : Main(given := 7 / (seen + 1), x => seen);"
+            self.lines += ["CONFIGURATION C TASK T(INTERVAL := T#1ms);", instance, "END_CONFIGURATION"]
 
     @property
     def text(self) -> str:
@@ -97,14 +102,15 @@ def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
 
 @pytest.mark.parametrize("level", LEVELS)
 @settings(max_examples=25)
-@given(units=UNITS)
+@given(units=UNITS, connected=st.booleans())
 @example(
     units=[
         Unit("METHOD", 0, True),
         Unit("METHOD", 0, True),
         Unit("FUNCTION_BLOCK", 2, True),
         Unit("FUNCTION_BLOCK", 2, False),
-    ]
+    ],
+    connected=False,
 )
 @example(
     units=[
@@ -112,16 +118,42 @@ def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
         Unit("FUNCTION_BLOCK", 57, False),
         Unit("FUNCTION", 0, False),
         Unit("FUNCTION_BLOCK", 57, False),
-    ]
+    ],
+    connected=False,
 )
-def test_each_call_is_reported(tmp_path_factory, level: Level, units: list[Unit]) -> None:
-    program = Program(units)
+def test_each_call_is_reported(tmp_path_factory, level: Level, units: list[Unit], connected: bool) -> None:
+    program = Program(units, connected)
     path = tmp_path_factory.mktemp("calls") / "calls.st"
     path.write_text(program.text)
     built = compile_sources([path], level=level)
     with Simulator(built.image, built.symbols) as plc:
         plc.run_cycles(4, check=False)
         assert places(plc, built.symbols) == program.places
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("statement", ["n := n + n * 3 - 1; m := m + n;", "f(n := n); n := f.n + 1;"])
+def test_the_parts_of_a_long_body_are_one_place(tmp_path, level: Level, statement: str) -> None:
+    path = tmp_path / "long.st"
+    block = "FUNCTION_BLOCK F VAR_INPUT n : DINT; END_VAR n := n * 3; END_FUNCTION_BLOCK"
+    lines = [f"{block} PROGRAM Main VAR n, m : DINT; f : F; END_VAR", *[statement] * 2000, "n := 10 / (m - m);"]
+    path.write_text("\n".join([*lines, "END_PROGRAM"]))
+    built = compile_sources([path], level=level)
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1, check=False)
+        assert places(plc, built.symbols) == [("Main", len(lines))]
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_what_a_configuration_assigns_is_one_place(tmp_path, level: Level) -> None:
+    path = tmp_path / "connected.st"
+    task = "CONFIGURATION c TASK t(INTERVAL := T#1ms);"
+    lines = ["VAR_GLOBAL n : INT; END_VAR PROGRAM Work VAR_INPUT x : INT; END_VAR n := x; END_PROGRAM", task]
+    path.write_text("\n".join([*lines, "PROGRAM p WITH t : Work(x := 10 / n);", "END_CONFIGURATION"]))
+    built = compile_sources([path], level=level)
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1, check=False)
+        assert places(plc, built.symbols) == [("p.inputs", 3)]
 
 
 def test_a_function_of_the_runtime_and_the_jump_to_it_are_reported_by_their_caller(tmp_path) -> None:

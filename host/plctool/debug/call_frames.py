@@ -26,7 +26,8 @@ _MOST_PUSHED = 128  # bytes, by a function of the runtime
 
 @dataclass(frozen=True)
 class Scope:
-    """Code that came from the source of `pou`. When it was inlined: the line with the call, else line 0."""
+    """Code that came from the source of `pou`. When it was inlined: the line with the call, else line 0. Without a POU
+    it does no more than call its parts, for which the source has no call."""
 
     pou: str
     call_file: str
@@ -145,7 +146,8 @@ class _Unit:
             origin = origin.get_DIE_from_attribute("DW_AT_abstract_origin")
         values = {name: attribute.value for name, attribute in die.attributes.items()}
         file = self._files[values.get("DW_AT_call_file", 0)]
-        return Scope(origin.attributes["DW_AT_name"].value.decode(), file, values.get("DW_AT_call_line", 0))
+        name = origin.attributes["DW_AT_name"].value.decode() if "DW_AT_name" in origin.attributes else ""
+        return Scope(name, file, values.get("DW_AT_call_line", 0))
 
     def _places(self, die: Any, top: Any) -> Iterator[tuple[int, int]]:
         values = {name: attribute.value for name, attribute in die.attributes.items()}

@@ -30,7 +30,7 @@ from plctool.image.limits import Need
 from plctool.project import SYMBOL_SUFFIX
 
 if TYPE_CHECKING:
-    from plctool.debug.call_frames import DebugInfo
+    from plctool.debug.call_frames import DebugInfo, Scope
 
 FORMAT = 3
 
@@ -196,12 +196,15 @@ class SymbolTable:
 
     def address_to_line(self, code_offset: int) -> SourceLine | None:
         """The source line of a code offset; None when it is not the program's own code."""
-        unit = next((u for u in self.pous if u.offset <= code_offset < u.offset + u.size), None)
+        unit = self._unit_of(code_offset)
         i = self._row_of(code_offset, unit)
-        if i < 0 or self.lines[i][1] < 0:
+        if i < 0 or self.lines[i][1] < 0 or self.lines[i][2] == 0:
             return SourceLine(unit.name, unit.file, unit.line) if unit else None
         _, file_index, line = self.lines[i]
         return SourceLine(self._pou_at(self.files[file_index], line, unit), self.files[file_index], line)
+
+    def _unit_of(self, code_offset: int) -> CodeUnit | None:
+        return next((u for u in self.pous if u.offset <= code_offset < u.offset + u.size), None)
 
     def _row_of(self, code_offset: int, unit: CodeUnit | None) -> int:
         """The row of the line table. Code without a line of its own, such as what is loaded again at the beginning of
@@ -226,10 +229,17 @@ class SymbolTable:
         for offset in offsets + self._debug_info.callers(code_offset, trace):
             scopes = self._debug_info.scopes(offset)
             place = self.address_to_line(offset)
-            if place is not None:
-                places.append(self._in_pou(scopes[0].pou, place.file, place.line) if scopes else place)
+            if place is not None and (not places or self._is_call(offset, scopes)):
+                pou = scopes[0].pou if scopes else ""
+                places.append(self._in_pou(pou, place.file, place.line) if pou else place)
             places += [self._in_pou(o.pou, i.call_file, i.call_line) for i, o in pairwise(scopes) if i.call_line]
         return places
+
+    def _is_call(self, code_offset: int, scopes: list[Scope]) -> bool:
+        """Whether a call on the stack is one of the source, and not how the compiler calls the parts of a POU."""
+        if scopes:
+            return scopes[0].pou != ""
+        return self.lines[self._row_of(code_offset, self._unit_of(code_offset))][2] > 0
 
     def what_was_outside(self, place: SourceLine, read: Read) -> str:
         """In words, the index or value that a program which stopped there with ARRAYBOUNDS has; "" if unknown."""

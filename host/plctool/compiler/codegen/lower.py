@@ -120,13 +120,13 @@ def _pou(unit: Unit, pou: Pou, effects: Effects, form: Form) -> None:
     signature = f"{returned_type(returned)} @{name}({parameter_list(pou, unit.handed, form, closed)})"
     fn = Function(signature, unit.attributes(pou), unit.inlining(pou, form))
     body = Body(unit, fn, pou, effects, form)
-    body.open_scope(pou.name, pou.pos)
     cut = [pou] if pou in unit.sections else sections(pou)
     if form is Form.RUN:
         write_calls(body, [unit.symbol(part) for part in unit.runs[pou]])
     elif len(cut) > 1:
         write_calls(body, [unit.section(part, form) for part in cut])
     else:
+        body.open_scope(pou.name, pou.pos)
         write_body(body)
     body.write_given_up(returned)
     unit.module.add(name, fn)

@@ -64,8 +64,10 @@ def write_body(frame: Body) -> None:
 
 
 def write_calls(frame: Body, parts: list[str]) -> None:
-    """Writes calls of the parts that the body was cut into, or of a program and what connects it."""
+    """Writes calls of the parts that the body was cut into, or of a program and what connects it. They are no calls of
+    the source, so they have no line, and their function no name that a call stack would show."""
     assert frame.pou is not None
+    frame.open_scope("", frame.pou.pos._replace(line=0))
     take_inputs(frame, frame.pou)
     instance = [f"ptr {SELF}"] if frame.pou.kind is PouKind.FUNCTION_BLOCK else []
     handed_on = [] if frame.raised is None else [f"ptr {frame.raised}"]
