@@ -19,11 +19,15 @@ def report_uncalled_blocks(pous: Iterable[Pou], diagnostics: Diagnostics) -> Non
     """Warns at the first input that an instance is given. What is handed on, or called from elsewhere, is called."""
     units = list(pous)
     inputs = {member: name for unit in units for member, name in _inputs(unit)}
+    if not inputs:
+        return
     used: set[Variable | _Member] = set()
     given: dict[Variable, tuple[Pos, str, Pou]] = {}
     for unit in units:
-        bases = {id(node.base) for node in walk(unit.body) if isinstance(node, MemberPlace)}
+        bases: set[int] = set()  # each is after what it is the base of
         for node in walk(unit.body):
+            if isinstance(node, MemberPlace):
+                bases.add(id(node.base))
             if isinstance(node, VarPlace) and id(node) not in bases:
                 used.add(node.var)
             elif isinstance(node, MemberPlace) and id(node) not in bases and isinstance(node.base.type, StructType):
