@@ -154,7 +154,6 @@ def compile_sources(
     does not fit its device, InternalError when the compiler has a bug.
     """
     from plctool.compiler.build import build_program
-    from plctool.compiler.codegen.firmware_stacks import FirmwareStacks
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
     from plctool.compiler.diagnostics import render_all
     from plctool.compiler.fit import board_meant, check_program_fits
@@ -173,7 +172,11 @@ def compile_sources(
     if board is not None or firmware is not None:
         known = board_of(board, None if firmware is None else read_firmware(firmware))
     processor = find_target(_target(target, known, description))
-    stacks = None if firmware is None or not processor.stubs else FirmwareStacks(firmware, processor.machine)
+    stacks = None
+    if firmware is not None and processor.stubs:
+        from plctool.compiler.codegen.firmware_stacks import FirmwareStacks  # late, as it loads a reader of ELF files
+
+        stacks = FirmwareStacks(firmware, processor.machine)
     options = Options(processor, number, parse_checks(checks), debug, size, stacks)
     if known is not None and known.target != options.target.name:
         raise UsageError(

@@ -21,6 +21,7 @@ from plctool.compiler.warnings import WARNINGS
 from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import read_utf8
 from plctool.iec.dialect import DIALECTS
+from plctool.image.board import known_boards
 from plctool.image.file import ApplicationInfo
 from plctool.image.targets import TARGETS
 from plctool.io.tables import Entry, Table
@@ -97,8 +98,6 @@ def _board(table: Table) -> str | None:
     if "board" not in table:
         table.text("board")  # so that it is among the keys that messages name
         return None
-    from plctool.image.board import known_boards  # not for each project: it reads ELF files, too
-
     return table.choice("board", {board.slug: board.slug for board in known_boards()})
 
 

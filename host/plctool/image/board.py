@@ -13,9 +13,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from elftools.common.exceptions import ELFError
-from elftools.elf.elffile import ELFFile
-
 from plctool.core import ffi, lib
 from plctool.errors import UsageError, did_you_mean
 from plctool.iec.areas import Area
@@ -182,6 +179,9 @@ def find_board(text: str) -> Board:
 
 def read_firmware(path: Path) -> Firmware:
     """Raises UsageError when it is not a firmware that says what its board is."""
+    from elftools.common.exceptions import ELFError  # late, as most programs are built without a firmware
+    from elftools.elf.elffile import ELFFile
+
     try:
         with path.open("rb") as file:
             head = file.read(len(ELF_TAG))

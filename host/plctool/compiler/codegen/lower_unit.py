@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from plctool.compiler.codegen.closed import Closed
-from plctool.compiler.codegen.firmware_stacks import FirmwareStacks
 from plctool.compiler.codegen.ir import Module, escape
 from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
 from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable, runtime_function
@@ -19,6 +19,9 @@ from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import Elementary, Kind, PointerType, StructType, Type, base_of
 from plctool.image.targets import FASTEST, Target
+
+if TYPE_CHECKING:
+    from plctool.compiler.codegen.firmware_stacks import FirmwareStacks
 
 _ALWAYS = 'nounwind "no-builtins"'
 _PROBES = ' "probe-stack"="inline-asm"'
