@@ -60,7 +60,6 @@ def optimised(part: Part, options: Options) -> tuple[llvm.ModuleRef, llvm.Target
     tuning = llvm.create_pipeline_tuning_options(speed_level=1 if shorter else opt_level)
     tuning.loop_unrolling = not target.saves_room(opt_level)
     tuning.loop_vectorization = opt_level >= 2 and not shorter
-    tuning.slp_vectorization = opt_level >= FASTEST  # slow, and seldom of use for what programs of controllers do
     builder = llvm.create_pass_builder(machine, tuning)
     if shorter and part.plain:
         _simplify(module, builder)
