@@ -6,7 +6,6 @@ Absolute times depend on the machine and its load; the ratios are what counts.
 from __future__ import annotations
 
 import gc
-import struct
 import subprocess
 import tempfile
 import time
@@ -18,6 +17,7 @@ import links
 import modbus
 import overheads
 import serial_share
+import tanks
 import targets
 
 from plctool.compiler import IoFiles, compile_sources
@@ -30,10 +30,8 @@ from plctool.testing.line import BITS_PER_BYTE, SerialLine
 from plctool.testing.plcrt import Plcrt
 
 ROOT = Path(__file__).parents[1]
-TANKS = [ROOT / f"examples/tanks/{name}.st" for name in ("types", "blocks", "control", "plant")]
-TANKS += [ROOT / "bench/tanks.st"]
 BAUD = 115200
-CYCLES = 1000  # of the control task before its state is compared with that of the C twin
+CYCLES = 1000  # before the time is taken
 CALLS = 900_000
 
 EMPTY = "PROGRAM Main VAR x : INT; END_VAR END_PROGRAM"
@@ -169,44 +167,6 @@ def bench_image() -> None:
         )
 
 
-def checksum(plc: Simulator) -> int:
-    """As tanks_checksum() in the C twin."""
-    bits = [int.from_bytes(struct.pack("<f", plc.read(f"Plant.level{i}")), "little") for i in (1, 2)]
-    return (bits[0] * 31 + bits[1]) % (1 << 32)
-
-
-def run_twin(optimisation: str) -> tuple[int, float, float]:
-    """Checksum, ns per control cycle, ns per plant cycle of the C twin."""
-    with tempfile.TemporaryDirectory() as folder:
-        program = Path(folder) / "tanks"
-        sources = [ROOT / "bench/tanks_main.c", ROOT / "examples/tanks/c/tanks.c"]
-        flags = ["-std=c99", "-ffp-contract=off", optimisation, f"-I{ROOT / 'examples/tanks/c'}"]
-        subprocess.run(["cc", *flags, "-o", program, *sources, "-lm"], check=True)
-        outs = [
-            subprocess.run([program, str(CYCLES), str(CALLS)], check=True, capture_output=True, text=True)
-            for _ in range(3)
-        ]
-    runs = [out.stdout.split() for out in outs]
-    return int(runs[0][0]), min(float(r[1]) for r in runs), min(float(r[2]) for r in runs)
-
-
-def bench_tanks() -> None:
-    print("\nexamples/tanks, ns per cycle of each task, beside the same program in C")
-    twins = {level: run_twin(level) for level in ("-O2", "-O3")}
-    for checks, level in (("all", 2), ("none", 2), ("all", 3)):
-        result = compile_sources(TANKS, checks=checks, level=level, io=IoFiles(wanted=False))
-        with Simulator(result.image, result.symbols) as plc:
-            plc.run_cycles(CYCLES)
-            same = {level: checksum(plc) == twin[0] for level, twin in twins.items()}
-        for i, (name, code, _) in enumerate(best_bench(result)):
-            beside = ", ".join(
-                f"gcc {level} {twin[1 + i]:.1f} ns: {code / twin[1 + i]:.2f} of it"
-                + ("" if same[level] else " (OTHER RESULT)")
-                for level, twin in twins.items()
-            )
-            line(f"{name}, checks {checks}, -O{level}", f"{code:.1f} ns", beside)
-
-
 BUS = """[[modbus.rs485]]
 port = "/dev/null"
 baud = 115200
@@ -247,7 +207,7 @@ def main() -> None:
     with targets.one_processor():
         bench_empty_task()
         bench_image()
-        bench_tanks()
+        tanks.main()
     targets.main()
     overheads.main()
     bench_day()

@@ -45,3 +45,15 @@ def test_program_is_measured_beside_its_twin(
     printed = capsys.readouterr().out
     assert "OTHER CHECKSUM" not in printed
     assert "geometric" in printed or "left out" in printed
+
+
+def test_the_tanks_are_measured_beside_their_twin(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import tanks
+
+    monkeypatch.setattr(tanks, "ROUNDS", 1)
+    tanks.main()
+    printed = capsys.readouterr().out
+    assert printed.count("ControlTask") == printed.count("PlantTask") == len(tanks.HOST_VARIANTS)
+    assert "OTHER CHECKSUM" not in printed
