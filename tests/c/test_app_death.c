@@ -6,7 +6,9 @@
  * How the run before ended is what the port says (SysStart.h), and what the flash says about an initialisation that was
  * not finished.
  */
+#include "../../firmware/src/app/AppCommit.h"
 #include "../../firmware/src/app/AppImage.h"
+#include "../../firmware/src/app/AppLife.h"
 #include "AppAddress.h"
 #include "SysFileFlash.h"
 #include "app_device.h"
@@ -74,6 +76,48 @@ static void start_unproven_after_proven(void)
 }
 
 /* ---- in its cycles ---- */
+
+static bool proved_in_its_cycle;
+
+static bool both_are_proven(void)
+{
+    return AppCommitIsProven(FILE_SLOT_A) && AppCommitIsProven(FILE_SLOT_B);
+}
+
+/* What main does while a cycle runs, where it has a core of its own. */
+static void check_proof(RTS_UI32 unused)
+{
+    RTS_UNUSED(unused);
+    AppCheckProof();
+    proved_in_its_cycle = both_are_proven();
+}
+
+static const CMP_EXT_FUNCTION proof_checker[] = {{"checkproof", 1, 0x00010000, (RTS_PFN)check_proof}};
+
+/* Its watchdog may take longer than the proof. */
+static void nothing_is_proven_in_a_long_cycle_that_may_never_end(void)
+{
+    enum { SIMBURN_SIGNATURE = 0x76DDCD81, LONG_US = 4000000 };
+    APP_BYTES image;
+    APP_SPEC spec;
+
+    start_proven();
+    CHECK_EQUAL(CMRegisterExternal(proof_checker, 1), ERR_OK);
+    spec_init(&spec);
+    add_import(&spec, "simburn", SIMBURN_SIGNATURE, 0x00010000);
+    add_import(&spec, "checkproof", 1, 0x00010000);
+    add_task(&spec, "Main", KIND_CYCLIC, 10000, here(&spec));
+    emit_call(&spec, 0, LONG_US);
+    emit_call(&spec, 1, 0);
+    emit_ret(&spec);
+    build_image(&image, &spec);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    proved_in_its_cycle = true;
+    CHECK_EQUAL(SimAdvance(ms(1)), ERR_OK);
+    CHECK(!proved_in_its_cycle);
+    CHECK(both_are_proven()); /* it has ended */
+}
 
 static void one_crash_of_an_unproven_application_rolls_it_back(void)
 {
@@ -406,6 +450,7 @@ static void a_program_that_was_never_started_is_the_boot_project(void)
 int main(void)
 {
     NEEDS_X86_64;
+    RUN(nothing_is_proven_in_a_long_cycle_that_may_never_end);
     RUN(one_crash_of_an_unproven_application_rolls_it_back);
     RUN(a_first_application_that_crashed_stays_stopped_until_it_is_started_by_hand);
     RUN(pointers_of_one_that_stays_stopped_can_be_followed);

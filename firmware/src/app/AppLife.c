@@ -29,6 +29,7 @@
 #include "SysTime.h"
 
 #define PROVE_MS (APP_PROVE_US / 1000)
+#define STUCK_NS ((RTS_I64)1000000000)
 
 /* What a loaded application waits for: nothing, its initial values, those of retain variables too. */
 enum { INIT_DONE = 0, INIT_WARM = 1, INIT_COLD = 2 };
@@ -358,9 +359,25 @@ RTS_RESULT AppRunOnce(void)
 }
 #endif
 
+/* Whether a cycle lasts that may never end: its watchdog may take longer than the proof. On one core main does not run
+ * meanwhile. */
+static bool is_stuck(void)
+{
+    IEC_GUARD guard;
+    RTS_UI32 i;
+
+    for (i = 0; i < IecTaskGetCount(); i++) {
+        if (IecTaskReadGuard(i, &guard) && SysTimeGetNs() - guard.start_ns > STUCK_NS)
+            return true;
+    }
+    return false;
+}
+
 void AppCheckProof(void)
 {
     if (app.state != AS_RUN || is_proven() || SysTimeGetMs() - app.run_since_ms < PROVE_MS)
+        return;
+    if (!RTS_ONE_CORE && is_stuck())
         return;
     if (AppCommitSetState(app.image.file, SLOT_PROVEN) == ERR_OK)
         RetainKeepNone();
