@@ -143,6 +143,36 @@ static void firmware_that_refuses_it_for_some_starts_costs_nothing(void)
     CHECK_EQUAL(running_step(), 1);
 }
 
+/* Application 2, which came for the device `id` with `version`, meets the firmware of application 1 for a start. */
+static void start_with_the_firmware_before(RTS_UI32 id, RTS_UI32 version, const char *reason)
+{
+    APP_BYTES newest = images[2];
+    CDL_HEADER header = image_header(&newest);
+
+    prepare(1, 1);
+    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, id, version);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    header.device_id = id;
+    header.device_version = version;
+    image_set_header(&newest, header);
+    CHECK_EQUAL(download(&newest), ERR_OK);
+    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, TARGET_ID_X86_64_LINUX, 0x01000000);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_NONE);
+    CHECK(log_has(reason));
+    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, id, version);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 2);
+    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, TARGET_ID_X86_64_LINUX, 0x01000000);
+}
+
+static void a_program_for_another_device_waits_for_its_firmware(void)
+{
+    start_with_the_firmware_before(7, 0x01000000, "Boot project refused: The image is for device id");
+    start_with_the_firmware_before(TARGET_ID_X86_64_LINUX, 0x02000000,
+                                   "Boot project refused: The image is for device version 2.x");
+}
+
 /* ---- a fault in a download, and in what follows ---- */
 
 static RTS_RESULT story_result;
@@ -469,6 +499,7 @@ int main(void)
         build_counter(&images[step], step);
     RUN(a_call_that_fails_at_a_start_costs_nothing);
     RUN(firmware_that_refuses_it_for_some_starts_costs_nothing);
+    RUN(a_program_for_another_device_waits_for_its_firmware);
     RUN(a_call_that_fails_in_a_download_leaves_the_old_or_the_new_application);
     RUN(a_download_whose_commit_is_not_synced_is_refused);
     RUN(a_call_that_fails_in_a_rollback_delays_it_at_most);

@@ -27,7 +27,7 @@ static RTS_RESULT load_from_slot(RTS_UI32 slot, RTS_UI32 retain_until)
     RTS_RESULT result = AppLoaderCheck(slot, committed->size, committed->crc, &image, &refusal);
 
     if (result != ERR_OK && result != ERR_DEVICE && image.code.size == 0)
-        result = ERR_CRC_FAILED; /* not the image that was committed: the loader knows the code when it is */
+        result = ERR_CRC_FAILED; /* not the image that was committed (AppLoader.h) */
     if (result == ERR_OK) {
         code = AppMapCode(&image);
         if (code == NULL)

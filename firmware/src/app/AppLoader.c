@@ -18,7 +18,7 @@
 #include "SysFileFlash.h"
 #include "SysTarget.h"
 
-/* ---- header, CRC, target ---- */
+/* ---- header, CRC, code, target ---- */
 
 static RTS_RESULT check_header(LOADER *l)
 {
@@ -60,6 +60,20 @@ static RTS_RESULT check_crc(LOADER *l)
     return ERR_OK;
 }
 
+static RTS_RESULT check_code(LOADER *l)
+{
+    const CDL_HEADER *h = &l->header;
+
+    if (h->code.size == 0)
+        return refuse(l, ERR_OUT_OF_LIMITS, "The image has no code.");
+    if (h->code_area_index != APP_AREA_CODE || h->code_area_size < h->code.size)
+        return refuse(l, ERR_OUT_OF_LIMITS, "Code of %u bytes is not in area %u, or above its %u bytes.",
+                      U(h->code.size), U(APP_AREA_CODE), U(h->code_area_size));
+    l->image->code = h->code; /* whatever this firmware may refuse later, it is the image (AppLoader.h) */
+    l->image->area_size[APP_AREA_CODE] = h->code.size;
+    return ERR_OK;
+}
+
 static RTS_RESULT check_target(LOADER *l)
 {
     const SYS_TARGET *target = SysTargetGet();
@@ -78,20 +92,6 @@ static RTS_RESULT check_target(LOADER *l)
 }
 
 /* ---- areas ---- */
-
-static RTS_RESULT check_code(LOADER *l)
-{
-    const CDL_HEADER *h = &l->header;
-
-    if (h->code.size == 0)
-        return refuse(l, ERR_OUT_OF_LIMITS, "The image has no code.");
-    if (h->code_area_index != APP_AREA_CODE || h->code_area_size < h->code.size)
-        return refuse(l, ERR_OUT_OF_LIMITS, "Code of %u bytes is not in area %u, or above its %u bytes.",
-                      U(h->code.size), U(APP_AREA_CODE), U(h->code_area_size));
-    l->image->code = h->code;
-    l->image->area_size[APP_AREA_CODE] = h->code.size;
-    return ERR_OK;
-}
 
 static RTS_RESULT check_area(LOADER *l)
 {
@@ -127,8 +127,8 @@ static RTS_RESULT check_areas(LOADER *l)
 RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE *image, APP_REFUSAL *refusal)
 {
     static const CHECK checks[] = {
-        check_header,         check_crc,          check_target,
-        LoaderCheckSegments,  check_code,         check_areas,
+        check_header,         check_crc,          LoaderCheckSegments,
+        check_code,           check_target,       check_areas,
         LoaderCheckFunctions, LoaderCheckImports, LoaderCheckIecFunctions,
         LoaderCheckInfo,      LoaderCheckBlobs,
 #if IO_MAX_CONNECTORS > 0

@@ -12,8 +12,8 @@
 #include "AppRefusal.h"
 #include "CmpErrors.h"
 
-/* Checks the image of `size` bytes in `file`, whose header names `crc`. On an error *image is undefined and *refusal
- * says why. */
+/* Checks the image of `size` bytes in `file`, whose header names `crc`. On an error *refusal says why, and *image is
+ * undefined but for its code: none when it is another image, or damaged. */
 RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE *image, APP_REFUSAL *refusal);
 
 #endif
