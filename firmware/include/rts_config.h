@@ -208,7 +208,8 @@
  * A save takes the size of the area and 20 bytes, rounded up to 16, of one half of the retain log; a half is erased
  * when it is full. So 500 bytes that change all the time, saved every second in two halves of 8 KiB, erase each sector
  * once in 30 s (100 000 erases: 35 days); every 60 s it is almost six years. The retain area is in RAM twice: it is
- * compared with the last saved copy. On one core the copy has to fit between two cycles. */
+ * compared with the last saved copy; an eighth of it more says what was put back. On one core the copy has to fit
+ * between two cycles. */
 #ifndef APP_RETAIN_SAVE_US
 #define APP_RETAIN_SAVE_US 1000000
 #endif

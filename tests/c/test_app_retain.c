@@ -522,6 +522,80 @@ static void runs_are_taken_over_by_index(void)
     CHECK(memcmp(AppGetAreaAddress(APP_AREA_RETAIN, 16, sizeof expected), expected, sizeof expected) == 0);
 }
 
+/* data[ASKED_OFFSET] += 1 when a value among the `size` bytes of the retain area at `offset` was put back. */
+enum { ASKED_OFFSET = 40 };
+static void emit_ask(RTS_UI32 offset, RTS_UI32 size)
+{
+    emit(&spec, "\x57\x48\x8B\x57\x40", 5); /* push rdi; mov rdx, [rdi + 64] */
+    emit_load_area(&spec, APP_AREA_RETAIN);
+    emit(&spec, "\x48\x8D\xB8", 3); /* lea rdi, [rax + offset] */
+    emit_u32(&spec, offset);
+    emit(&spec, "\xBE", 1); /* mov esi, size */
+    emit_u32(&spec, size);
+    emit(&spec, "\xFF\x12\x5F\x0F\xB6\xC8", 6); /* call [rdx]; pop rdi; movzx ecx, al */
+    emit_load_area(&spec, APP_AREA_DATA);
+    emit(&spec, "\x01\x88", 2); /* add [rax + ASKED_OFFSET], ecx */
+    emit_u32(&spec, ASKED_OFFSET);
+}
+
+/* An application with a PERSISTENT value at 0 and a RETAIN value at 12, which asks `times` for `size` bytes at `offset`. */
+static void load_asking(RTS_UI32 times, RTS_UI32 offset, RTS_UI32 size)
+{
+    start_blank();
+    spec_counter(&spec, 1);
+    spec.kept[0].variable.place |= CDL_KEPT_PERSISTENT;
+    add_import(&spec, "ieckept", 0xEBCA3613, 0x00010000);
+    spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
+    while (times-- > 0)
+        emit_ask(offset, size);
+    emit_ret(&spec);
+    load();
+}
+
+static RTS_UI32 answers(void)
+{
+    return read_u32(APP_AREA_DATA, ASKED_OFFSET);
+}
+
+static void check_answers(RTS_UI32 offset, RTS_UI32 size, RTS_UI32 warm, RTS_UI32 cold)
+{
+    load_asking(1, offset, size);
+    CHECK_EQUAL(answers(), 0);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(answers(), warm);
+    CHECK_EQUAL(AppReset(RESET_OPTION_COLD), ERR_OK);
+    CHECK_EQUAL(answers(), cold);
+}
+
+static void an_initialisation_learns_what_was_put_back(void)
+{
+    check_answers(0, 16, 1, 1);
+    check_answers(0, 1, 1, 1);
+    check_answers(1, 11, 0, 0);
+    check_answers(1, 12, 1, 0);
+    check_answers(12, 4, 1, 0);
+    check_answers(13, 0xFFFFFFFF, 0, 0);
+}
+
+/* Calls that a reset makes to read the flash. */
+static RTS_UI32 reads_of_a_reset(RTS_UI32 questions)
+{
+    RTS_UI32 before;
+
+    load_asking(questions, 0, 16);
+    before = SimFlashCalls(SIM_READ);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(answers(), questions);
+    return SimFlashCalls(SIM_READ) - before;
+}
+
+static void what_was_put_back_is_looked_up_once_for_all_questions(void)
+{
+    SimFlashSetMapped(0);
+    CHECK_EQUAL(reads_of_a_reset(50), reads_of_a_reset(1));
+    SimFlashSetMapped(1);
+}
+
 static void what_is_not_in_the_table_is_not_kept(void)
 {
     start_blank();
@@ -600,6 +674,8 @@ int main(void)
     RUN(a_value_that_was_dropped_does_not_come_back);
     RUN(origin_ends_persistent_values_too);
     RUN(runs_are_taken_over_by_index);
+    RUN(an_initialisation_learns_what_was_put_back);
+    RUN(what_was_put_back_is_looked_up_once_for_all_questions);
     RUN(what_is_not_in_the_table_is_not_kept);
     RUN(a_flash_fault_does_not_stop_the_application);
     RUN(a_large_retain_area_is_saved_whole);

@@ -38,6 +38,7 @@ static struct {
 /* It is sized by the application's retain area, as that is. */
 enum { HAS_RETAIN = APP_RETAIN_SIZE > 0 };
 static RTS_UI8 saved_area[HAS_RETAIN ? APP_RETAIN_SIZE : 1];
+static RTS_UI8 taken_at[sizeof saved_area / 8 + 1]; /* a bit for each byte: a value that was put back begins there */
 
 #define SAVE_NS ((RTS_I64)APP_RETAIN_SAVE_US * 1000)
 
@@ -103,15 +104,8 @@ void RetainCapture(bool cold)
 
 /* ---- putting them back ---- */
 
-/* A part of the retain area, of which it is to be found out whether a value in it is kept. */
-typedef struct {
-    RTS_UI32 offset;
-    RTS_UI32 size;
-    bool found;
-} QUERY;
-
-/* Puts the elements back that both entries have, or looks whether `query` is about one of them. */
-static void take(const KEPT *to, const KEPT *from, QUERY *query)
+/* Puts the elements back that both entries have. */
+static void take(const KEPT *to, const KEPT *from)
 {
     RTS_UI32 place = KeptOffset(to);
     RTS_UI32 number = (RTS_UI32)to->run.first - (RTS_UI32)from->run.first; /* in `from`; wraps where that has none */
@@ -120,10 +114,8 @@ static void take(const KEPT *to, const KEPT *from, QUERY *query)
     for (i = 0; i < to->run.count; i++, number++, place += to->run.stride) {
         if (number >= from->run.count)
             continue;
-        if (query == NULL)
-            memcpy(retain.area + place, saved_area + KeptOffset(from) + number * from->run.stride, from->run.size);
-        else if (place - query->offset < query->size)
-            query->found = true;
+        memcpy(retain.area + place, saved_area + KeptOffset(from) + number * from->run.stride, from->run.size);
+        taken_at[place / 8] |= (RTS_UI8)(1u << place % 8);
     }
 }
 
@@ -143,35 +135,39 @@ static bool is_taken(const KEPT *to, const KEPT *from)
     return compare(to, from) == 0 && to->run.size >= from->run.size && (is_persistent(to) || !kept.persistent_only);
 }
 
-/* Goes through both tables, which are in the same order. Returns the number of values taken; *dropped: those that were
- * PERSISTENT and are not taken. */
-static unsigned take_all(QUERY *query, unsigned *dropped)
+/* Goes through both tables, which are in the same order. */
+void RetainPutBack(void)
 {
-    RETAIN_TABLE own = *kept.table;
+    RETAIN_TABLE own;
     RETAIN_TABLE source = kept.source;
     unsigned taken = 0;
+    unsigned dropped = 0; /* PERSISTENT, and not taken */
     bool more;
     KEPT to;
     KEPT from;
 
-    *dropped = 0;
+    if (!HAS_RETAIN)
+        return;
+    memset(taken_at, 0, sizeof taken_at);
+    own = *kept.table;
     more = RetainTableNext(&own, &to) == ERR_OK;
     while (RetainTableNext(&source, &from) == ERR_OK) {
         while (more && compare(&to, &from) < 0)
             more = RetainTableNext(&own, &to) == ERR_OK;
         if (more && is_taken(&to, &from)) {
-            take(&to, &from, query);
+            take(&to, &from);
             taken++;
         } else if (is_persistent(&from)) {
-            ++*dropped;
+            dropped++;
         }
     }
-    return taken;
+    if (is_of_application_before())
+        LogAdd(CMPID_CmpRetain, dropped > 0 ? LOG_WARNING : LOG_INFO, ERR_OK,
+               "PERSISTENT values: %u taken over, %u dropped", taken, dropped);
 }
 
 RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range)
 {
-    unsigned dropped;
     RTS_RESULT result;
 
     if (!HAS_RETAIN)
@@ -187,37 +183,25 @@ RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE r
     kept.persistent_only = is_of_application_before();
     if (kept.persistent_only)
         return ERR_OK;
-    (void)take_all(NULL, &dropped);
+    RetainPutBack(); /* at once, to be read while the application waits */
     kept.saved_valid = true;
     kept.settled = true;
     return ERR_OK;
 }
 
-void RetainPutBack(void)
-{
-    unsigned dropped;
-    unsigned taken;
-
-    if (!HAS_RETAIN || kept.source.size == 0)
-        return;
-    taken = take_all(NULL, &dropped);
-    if (is_of_application_before())
-        LogAdd(CMPID_CmpRetain, dropped > 0 ? LOG_WARNING : LOG_INFO, ERR_OK,
-               "PERSISTENT values: %u taken over, %u dropped", taken, dropped);
-}
-
 static RTS_UI8 ieckept(const RTS_UI8 *address, RTS_UI32 size)
 {
-    QUERY query = {(RTS_UI32)((uintptr_t)address - (uintptr_t)retain.area), size, false};
-    unsigned dropped;
+    RTS_UI32 place = (RTS_UI32)((uintptr_t)address - (uintptr_t)retain.area);
 
-    (void)take_all(&query, &dropped);
-    return query.found;
+    for (; size > 0 && place < sizeof saved_area; place++, size--) {
+        if ((taken_at[place / 8] >> place % 8 & 1) != 0)
+            return 1;
+    }
+    return 0;
 }
-APP_GATE(ieckept); /* reads the flash */
 
 static const CMP_EXT_FUNCTION externals[] = {
-    {"ieckept", 0xEBCA3613, 0x00010000, (RTS_PFN)APP_GATED(ieckept)}, /* ieckept(POINTER TO BYTE,UDINT):BOOL */
+    {"ieckept", 0xEBCA3613, 0x00010000, (RTS_PFN)ieckept}, /* ieckept(POINTER TO BYTE,UDINT):BOOL */
 };
 
 /* ---- saving ---- */

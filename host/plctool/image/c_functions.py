@@ -15,7 +15,7 @@ _FUNCTIONS = {
     "CmpIecTask": """
         iecraise(UDINT)                                     48    80""",
     "CmpRetain": """
-        ieckept(POINTER TO BYTE,UDINT):BOOL                304   288""",
+        ieckept(POINTER TO BYTE,UDINT):BOOL                 32    16""",
     "CmpMath": """
         sin(LREAL):LREAL                                  1008  1856
         cos(LREAL):LREAL                                  1008  1856
