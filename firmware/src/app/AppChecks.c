@@ -11,7 +11,7 @@ RTS_RESULT LoaderRead(LOADER *l, RTS_UI32 offset, void *data, RTS_UI32 size)
 {
     RTS_RESULT result = SysFileRead(l->image->file, offset, data, size);
 
-    return result == ERR_OK ? ERR_OK : refuse(l, result, "Flash cannot be read at offset %u.", U(offset));
+    return result == ERR_OK ? ERR_OK : refuse(l, result, "The flash cannot be read.");
 }
 
 /* ---- segments ---- */

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "AppException.h"
+#include "AppLoader.h"
 #include "AppPassword.h"
 #include "CMUtils.h"
 #include "CmpBytes.h"
@@ -72,20 +73,28 @@ RTS_UI32 AppSealCheck(const APP_SEAL *seal)
     return ~(seal->number ^ seal->crc ^ seal->retain_after);
 }
 
-/* Takes over a slot when the image that its header tells of has a seal with a number above `known`. Returns whether the
- * record may be true: false when it must have known the seal, and tells of another image. */
+/* Takes over a slot when the image in it is whole and has a seal with a number above `known`. Returns whether the record
+ * may be true: false when it must have known the seal, and tells of another image. A seal may remain from an image of
+ * which a download has written only a part again. */
 static bool take_seal(RTS_UI32 slot, RTS_UI32 known)
 {
     const COMMIT_SLOT *recorded = &state.commit.slot[slot];
     CDL_HEADER header;
     APP_SEAL seal;
+    bool newer;
+    RTS_UI32 crc;
 
     if (SysFileRead(slot, 0, &header, sizeof header) != ERR_OK ||
         SysFileRead(slot, SysFileAlign(header.total_size), &seal, sizeof seal) != ERR_OK ||
         seal.check != AppSealCheck(&seal) || seal.crc != header.crc)
         return true;
-    if ((RTS_I32)(seal.number - known) <= 0)
-        return recorded->size == 0 || recorded->crc == seal.crc;
+    newer = (RTS_I32)(seal.number - known) > 0;
+    if (!newer && (recorded->size == 0 || recorded->crc == seal.crc))
+        return true;
+    if (AppLoaderCRC32(slot, &header, &crc) == ERR_OK && crc != seal.crc)
+        return true;
+    if (!newer)
+        return false;
     state.commit.slot[slot] = (COMMIT_SLOT){header.total_size, seal.crc, seal.retain_after};
     state.commit.state[slot] = SLOT_TRIAL;
     if ((RTS_I32)(seal.number - state.commit.number) > 0) {

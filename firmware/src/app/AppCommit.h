@@ -5,8 +5,8 @@
  *
  * A slot says itself that its image is a program of the device: after the image follows a seal (AppRecord.h), so that the
  * newest program is found even when nothing else is left. What happened to the programs since is in a log of commit
- * records, each with the complete state of both slots: the newest valid one counts, unless a slot has a newer seal. From
- * main only.
+ * records, each with the complete state of both slots: the newest valid one counts, unless a slot has a whole
+ * image with a newer seal. From main only.
  */
 #ifndef APPCOMMIT_H
 #define APPCOMMIT_H

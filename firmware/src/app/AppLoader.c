@@ -42,17 +42,21 @@ static RTS_RESULT check_header(LOADER *l)
     return ERR_OK;
 }
 
+RTS_RESULT AppLoaderCRC32(RTS_UI32 file, CDL_HEADER *header, RTS_UI32 *crc)
+{
+    header->crc = 0;
+    *crc = CRC32Update(0, header, sizeof *header);
+    return SysFileCRC32(file, CDL_HEADER_SIZE, header->total_size - CDL_HEADER_SIZE, crc);
+}
+
 static RTS_RESULT check_crc(LOADER *l)
 {
     RTS_UI32 expected = l->header.crc;
     RTS_UI32 crc;
-    RTS_RESULT result;
+    RTS_RESULT result = AppLoaderCRC32(l->image->file, &l->header, &crc);
 
-    l->header.crc = 0;
-    crc = CRC32Update(0, &l->header, sizeof l->header);
-    result = SysFileCRC32(l->image->file, CDL_HEADER_SIZE, l->image->size - CDL_HEADER_SIZE, &crc);
     if (result != ERR_OK)
-        return refuse(l, result, "Flash cannot be read.");
+        return refuse(l, result, "The flash cannot be read.");
     if (crc != expected)
         return refuse(l, ERR_CRC_FAILED, "The image is damaged: CRC %X, not %X.", U(crc), U(expected));
     if (crc != l->image->crc)

@@ -16,4 +16,7 @@
  * undefined but for its code: none when it is another image, or damaged. */
 RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE *image, APP_REFUSAL *refusal);
 
+/* The CRC of the image in `file`, of which only the header has been read; what that says of it becomes 0. */
+RTS_RESULT AppLoaderCRC32(RTS_UI32 file, CDL_HEADER *header, RTS_UI32 *crc);
+
 #endif
