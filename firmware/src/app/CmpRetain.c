@@ -19,7 +19,7 @@
 
 static struct {
     FLASH_LOG log;
-    RTS_I64 last_check_ns; /* when the area was last found saved, or was saved */
+    RTS_UI32 last_check_ms; /* when the area was last found saved, or was saved */
     RTS_UI8 *area;
     RTS_UI32 tag; /* of its records */
     bool failed;  /* the last save failed, and was logged */
@@ -40,7 +40,7 @@ enum { HAS_RETAIN = APP_RETAIN_SIZE > 0 };
 static RTS_UI8 saved_area[HAS_RETAIN ? APP_RETAIN_SIZE : 1];
 static RTS_UI8 taken_at[sizeof saved_area / 8 + 1]; /* a bit for each byte: a value that was put back begins there */
 
-#define SAVE_NS ((RTS_I64)APP_RETAIN_SAVE_US * 1000)
+#define SAVE_MS (APP_RETAIN_SAVE_US / 1000)
 
 RTS_UI32 RetainCapacity(void)
 {
@@ -63,7 +63,7 @@ void RetainAttach(RTS_UI8 *area, const RETAIN_TABLE *table, RTS_UI32 tag)
     kept.table = table;
     retain.area = area;
     retain.tag = tag;
-    retain.last_check_ns = SysTimeGetNs();
+    retain.last_check_ms = SysTimeGetMs();
 }
 
 /* ---- where values come from ---- */
@@ -83,10 +83,15 @@ static bool is_saved(void)
     return kept.saved_valid && memcmp(saved_area, retain.area, kept.table->area_size) == 0;
 }
 
+static void take_copy(void)
+{
+    memcpy(saved_area, retain.area, kept.table->area_size);
+}
+
 static void copy(void)
 {
     kept.saved_valid = is_saved();
-    memcpy(saved_area, retain.area, kept.table->area_size);
+    take_copy();
 }
 
 void RetainCapture(bool cold)
@@ -99,7 +104,7 @@ void RetainCapture(bool cold)
         kept.persistent_only = false;
         kept.settled = false;
     }
-    kept.persistent_only = kept.persistent_only || cold;
+    kept.persistent_only |= cold;
 }
 
 /* ---- putting them back ---- */
@@ -214,7 +219,7 @@ static RTS_RESULT save_copy(void)
         LogAdd(CMPID_CmpRetain, LOG_ERROR, result, "Retain variables cannot be saved");
     retain.failed = result != ERR_OK;
     kept.saved_valid = result == ERR_OK;
-    retain.last_check_ns = SysTimeGetNs();
+    retain.last_check_ms = SysTimeGetMs();
     return result;
 }
 
@@ -255,19 +260,14 @@ void RetainKeepNone(void)
 /* Whether a copy is wanted. */
 static bool is_due(void)
 {
+    RTS_UI32 now_ms = SysTimeGetMs();
+
     if (kept.asked)
         return true;
-    if (!kept.settled || SysTimeGetNs() - retain.last_check_ns < SAVE_NS)
+    if (!kept.settled || now_ms - retain.last_check_ms < SAVE_MS)
         return false;
-    if (!is_saved())
-        return true;
-    retain.last_check_ns = SysTimeGetNs();
-    return false;
-}
-
-static void take_copy(void)
-{
-    memcpy(saved_area, retain.area, kept.table->area_size);
+    retain.last_check_ms = now_ms;
+    return !is_saved();
 }
 
 static void save_when_due(void)
