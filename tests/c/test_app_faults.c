@@ -260,6 +260,47 @@ static void a_download_whose_commit_is_not_synced_is_refused(void)
     CHECK_EQUAL(refused, 2);
 }
 
+/* ---- a fault in an origin reset ---- */
+
+/* Returns whether the call was made at all. */
+static bool fail_one_call_of_an_origin_reset(RTS_UI32 kind, RTS_UI32 call)
+{
+    RTS_UI32 before;
+    bool made;
+
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    before = SimFlashCalls(kind);
+    SimFlashFail(kind, call);
+    if (AppReset(RESET_OPTION_ORIGIN) != ERR_OK) {
+        CHECK_EQUAL(AppCommitGet()->active, FILE_SLOT_A);
+        CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+        CHECK_EQUAL(AppStartApplication(), ERR_OK);
+        CHECK_EQUAL(running_step(), 1);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(running_step(), 1);
+        return true;
+    }
+    made = SimFlashCalls(kind) - before >= call;
+    CHECK_EQUAL(app_state(), AS_NONE);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_NONE);
+    return made;
+}
+
+static void an_origin_reset_that_fails_leaves_the_application_as_it_was(void)
+{
+    RTS_UI32 kind;
+
+    prepare(1, 1);
+    for (kind = SIM_PROGRAM; kind <= SIM_SYNC; kind++) {
+        RTS_UI32 call = 1;
+        while (fail_one_call_of_an_origin_reset(kind, call))
+            call++;
+        CHECK(call > 1);
+    }
+}
+
 /* ---- a fault in a rollback ---- */
 
 static void fail_one_call_of_a_rollback(RTS_UI32 kind, RTS_UI32 call)
@@ -560,6 +601,7 @@ int main(void)
     RUN(a_program_for_another_device_waits_for_its_firmware);
     RUN(a_call_that_fails_in_a_download_leaves_the_old_or_the_new_application);
     RUN(a_download_whose_commit_is_not_synced_is_refused);
+    RUN(an_origin_reset_that_fails_leaves_the_application_as_it_was);
     RUN(a_call_that_fails_in_a_rollback_delays_it_at_most);
     RUN(a_cut_in_a_rollback_leaves_it_to_the_next_start);
     RUN(a_lost_commit_log_costs_no_application);

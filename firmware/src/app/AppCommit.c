@@ -255,11 +255,17 @@ static RTS_RESULT write_record(const char *text)
 
 RTS_RESULT AppCommitErase(void)
 {
-    RTS_UI32 number = state.commit.number;
+    const COMMIT before = state.commit;
+    RTS_RESULT result;
 
     forget_record();
-    state.commit.number = number;
-    return write_record("");
+    state.commit.number = before.number;
+    result = write_record("");
+    if (result != ERR_OK) {
+        state.commit = before;
+        (void)write_record(""); /* the record may be there in spite of the error */
+    }
+    return result;
 }
 
 RTS_RESULT AppCommitRollBack(RTS_UI32 failed, RTS_UI32 retain_after)
