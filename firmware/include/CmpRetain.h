@@ -3,8 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The retain area lives in RAM. It is saved as a whole: on stop and shutdown, and at most every APP_RETAIN_SAVE_US when
- * it changed. A record is the state of one moment between the cycles of all tasks, and belongs to one image.
+ * The retain area lives in RAM. It is saved as a whole: on stop, at the end of the application, and at most every
+ * APP_RETAIN_SAVE_US when it changed. A record is the state of one moment between the cycles of all tasks, and belongs
+ * to one image.
  *
  * When an application begins, values come from a source: the last record, the record of the previous application, or what
  * the variables are at a reset. The source is chosen first (RetainLoad, RetainCapture); the values are put back, variable

@@ -82,6 +82,38 @@ static void shutdown_saves(void)
     CHECK_EQUAL(retain_value(), 134);
 }
 
+/* GlobalExit adds it to both numbers. */
+static void add_exit(RTS_UI32 value)
+{
+    spec.function[CDL_FUNCTION_GLOBAL_EXIT] = (RTS_I32)here(&spec);
+    emit_add(&spec, APP_AREA_RETAIN, RETAIN_A_OFFSET, value);
+    emit_add(&spec, APP_AREA_RETAIN, RETAIN_B_OFFSET, value);
+    emit_ret(&spec);
+}
+
+static void shutdown_saves_what_the_end_of_the_program_writes(void)
+{
+    start_blank();
+    spec_counter(&spec, 1);
+    add_exit(1000);
+    load();
+    CHECK_EQUAL(SimAdvance(ms(330)), ERR_OK);
+    SimStop();
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(retain_value(), 1134);
+}
+
+static void shutdown_saves_what_was_written_after_a_stop(void)
+{
+    start_and_load(1);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    *AppGetAreaAddress(APP_AREA_RETAIN, RETAIN_A_OFFSET, 1) = 7;
+    *AppGetAreaAddress(APP_AREA_RETAIN, RETAIN_B_OFFSET, 1) = 7;
+    SimStop();
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(retain_value(), 7);
+}
+
 static void an_exception_saves(void)
 {
     start_blank();
@@ -250,11 +282,14 @@ static void a_rollback_brings_back_the_values_of_its_application(void)
     CHECK(retain_value() > 700);
 }
 
-/* The same when application 1 ran until application 2 took over: what it had then, not what was saved some time
+/* The same when application 1 ran until application 2 took over: what it had in the end, not what was saved some time
  * before. */
 static void a_rollback_brings_back_the_last_values_of_an_application_that_ran(void)
 {
-    start_and_load(1);
+    start_blank();
+    spec_counter(&spec, 1);
+    add_exit(1000);
+    load();
     CHECK_EQUAL(SimAdvance(ms(5330)), ERR_OK);
     CHECK_EQUAL(retain_value(), 634);
     spec_counter(&spec, 2);
@@ -265,7 +300,7 @@ static void a_rollback_brings_back_the_last_values_of_an_application_that_ran(vo
     CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
     CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
-    CHECK_EQUAL(retain_value(), 634);
+    CHECK_EQUAL(retain_value(), 1634);
 }
 
 static void start_up(void *unused)
@@ -353,13 +388,14 @@ static void damaged_values_give_way_to_initial_ones(void)
 
 enum { PLAIN_OFFSET = RETAIN_A_OFFSET, MOVED_OFFSET = RETAIN_B_OFFSET };
 
-/* Application 1, with its first number PERSISTENT, has run until `spec` takes its place, where that number is the
- * second. */
-static void prepare_take_over(void)
+/* Application 1, with its first number PERSISTENT, to which its end adds `at_exit`, has run until `spec` takes its place,
+ * where that number is the second. */
+static void prepare_take_over_of(RTS_UI32 at_exit)
 {
     start_blank();
     spec_counter(&spec, 1);
     spec.kept[0].variable.place |= CDL_KEPT_PERSISTENT;
+    add_exit(at_exit);
     load();
     CHECK_EQUAL(SimAdvance(ms(5330)), ERR_OK);
     CHECK_EQUAL(retain_value(), 634);
@@ -367,6 +403,11 @@ static void prepare_take_over(void)
     spec.kept_count = 0;
     add_kept(&spec, 'A', MOVED_OFFSET, CDL_KEPT_PERSISTENT);
     add_kept(&spec, 'C', PLAIN_OFFSET, CDL_KEPT_PERSISTENT);
+}
+
+static void prepare_take_over(void)
+{
+    prepare_take_over_of(0);
 }
 
 static bool is_application(RTS_UI32 step)
@@ -416,14 +457,40 @@ static void download_and_run(void *unused)
     (void)SimAdvance(ms(2000));
 }
 
-/* Power fails at any operation of the download, of the first start and of the first saves: the old application goes on
- * with its values, or the new one with those it takes over. A second cut follows at once. */
-static void a_take_over_survives_every_power_cut(void)
+static void a_download_keeps_what_the_end_of_the_program_writes(void)
+{
+    prepare_take_over_of(1000);
+    build_image(&image, &spec);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK(moved() == 1634 && plain() == 200);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK(is_application(2) && moved() == 1634 && plain() == 200);
+}
+
+/* Application 1 goes on with its values, or application 2 with those that it takes over: what was saved while
+ * application 1 ran, when it stopped, or when it ended. */
+static void check_taken_over(RTS_UI32 at_exit)
+{
+    RTS_UI32 begun_with = moved() - plain() + 200;
+
+    if (is_application(1)) {
+        CHECK(retain_value() >= 534 && retain_value() <= 1000);
+        return;
+    }
+    CHECK(is_application(2) && plain() % 2 == 0);
+    if (begun_with >= 534 + at_exit)
+        begun_with -= at_exit;
+    CHECK(begun_with >= 534 && begun_with <= 634);
+}
+
+/* Power fails at any operation of the download, of the first start and of the first saves. A second cut follows at
+ * once. */
+static void cut_take_over_anywhere(RTS_UI32 at_exit)
 {
     RTS_UI32 k;
     RTS_UI32 taken_over = 0;
 
-    prepare_take_over();
+    prepare_take_over_of(at_exit);
     build_image(&image, &spec);
     CHECK_EQUAL(SimFlashSave(), ERR_OK);
     for (k = 1; k < 1000; k++) {
@@ -435,16 +502,65 @@ static void a_take_over_survives_every_power_cut(void)
         SimFlashCut(k % 7 + 1, SIM_CUT_AFTER);
         (void)SimCall(start_up, NULL);
         CHECK_EQUAL(SimStart(), ERR_OK);
-        if (is_application(1)) {
-            CHECK(retain_value() >= 534);
-        } else {
-            CHECK(is_application(2) && plain() % 2 == 0);
-            CHECK(moved() >= 534 && moved() <= 2000);
-            CHECK(moved() - plain() >= 534 - 200 && moved() - plain() <= 634 - 200);
+        check_taken_over(at_exit);
+        taken_over += is_application(2);
+    }
+    CHECK(k < 1000 && taken_over > 3);
+    CHECK_EQUAL(SimFlashViolations(), 0);
+}
+
+static void a_take_over_survives_every_power_cut(void)
+{
+    cut_take_over_anywhere(0);
+}
+
+static void a_take_over_of_what_the_end_of_the_program_writes_survives_every_power_cut(void)
+{
+    cut_take_over_anywhere(1000);
+}
+
+/* An application whose first number is PERSISTENT, with so large an area that a half of the log has one record only. */
+static void spec_large(RTS_UI32 step)
+{
+    spec_counter(&spec, step);
+    spec.areas[APP_AREA_RETAIN] = APP_RETAIN_SIZE;
+    spec.kept[0].variable.place |= CDL_KEPT_PERSISTENT;
+    add_exit(1000);
+}
+
+/* The same when application 1 has not proven itself, so that the record of application 3 is kept: until
+ * application 2 is in its place. */
+static void a_take_over_from_a_new_application_survives_every_power_cut(void)
+{
+    RTS_UI32 least;
+    RTS_UI32 k;
+    RTS_UI32 taken_over = 0;
+
+    CHECK_EQUAL(SimFlashConfigure(1024 * 1024, 4096, 16, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    spec_large(3);
+    load();
+    CHECK_EQUAL(SimAdvance(ms(5330)), ERR_OK);
+    spec_large(1);
+    load();
+    CHECK_EQUAL(SimAdvance(ms(2330)), ERR_OK);
+    least = plain() - 100; /* saved a second ago */
+    spec_large(2);
+    build_image(&image, &spec);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
+    for (k = 1; k < 100000; k += 41) {
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        SimFlashCut(k, SIM_CUT_AFTER);
+        if (SimCall(download_and_run, NULL) == ERR_OK)
+            break;
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        if (is_application(2)) {
+            CHECK(plain() >= least);
             taken_over++;
         }
     }
-    CHECK(k < 1000 && taken_over > 3);
+    CHECK(k < 100000 && taken_over > 300);
     CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
@@ -653,6 +769,8 @@ int main(void)
     RUN(a_power_cut_loses_at_most_a_second);
     RUN(stop_saves_at_once);
     RUN(shutdown_saves);
+    RUN(shutdown_saves_what_the_end_of_the_program_writes);
+    RUN(shutdown_saves_what_was_written_after_a_stop);
     RUN(an_exception_saves);
     RUN(unchanged_variables_are_not_saved_again);
     RUN(changing_variables_are_saved_once_per_second);
@@ -669,7 +787,10 @@ int main(void)
     RUN(damaged_values_give_way_to_initial_ones);
     RUN(a_download_keeps_persistent_values_wherever_they_lie_then);
     RUN(what_a_download_drops_is_counted);
+    RUN(a_download_keeps_what_the_end_of_the_program_writes);
     RUN(a_take_over_survives_every_power_cut);
+    RUN(a_take_over_of_what_the_end_of_the_program_writes_survives_every_power_cut);
+    RUN(a_take_over_from_a_new_application_survives_every_power_cut);
     RUN(a_program_that_fails_at_once_hands_values_on);
     RUN(a_value_that_was_dropped_does_not_come_back);
     RUN(origin_ends_persistent_values_too);

@@ -135,12 +135,13 @@ static void put_back(RTS_UI32 failed_slot, bool ran)
 static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
 {
     const RTS_UI8 *code = AppMapCode(image);
-    RTS_UI32 retain_after = RetainGetSequence() + 1; /* stopping the old application may write one more record */
+    RTS_UI32 retain_after = RetainGetSequence() + 2; /* the old application is saved when it stops and when it ends */
     RTS_RESULT result;
     bool ran;
 
     if (code == NULL)
         return APP_REFUSE(refusal, ERR_NOMEMORY, "There is no executable memory for the code.");
+    RetainKeepNone(); /* of the application that was in this slot */
     result = AppCommitInstall(image->file, image->crc, retain_after);
     if (result != ERR_OK) {
         SysFlashReleaseCode(image->file);

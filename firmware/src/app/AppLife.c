@@ -239,6 +239,7 @@ void AppUnload(void)
     if (!is_loaded())
         return;
     run_global_exit();
+    (void)RetainSave(false); /* what that, or a tool since the stop, has written */
     unload();
 }
 
