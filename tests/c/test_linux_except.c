@@ -216,14 +216,12 @@ static uintptr_t here(void)
     return (uintptr_t)__builtin_frame_address(0);
 }
 
-/* A break does not hit it: it is not IEC code. */
 static void run_outside(void *arg)
 {
     OUTSIDE *o = arg;
     char frame[2 * 1024 * 1024]; /* larger than all of the IEC stack */
     memset(frame, 1, sizeof frame);
     o->outside = here();
-    SysExceptBreak(arg, RTSEXCPT_WATCHDOG);
     o->returned = frame[sizeof frame - 1];
 }
 
@@ -231,7 +229,7 @@ static void call_outside(void *arg)
 {
     OUTSIDE *o = arg;
     o->iec = here();
-    IecStackCallOutside(IecStackOfThread, run_outside, o);
+    CHECK_EQUAL(IecStackCallOutside(IecStackOfThread, run_outside, o), RTSEXCPT_NOEXCEPTION);
     if (o->code != RTSEXCPT_NOEXCEPTION) {
         SysExceptRaise(o->code, 0x1234, NULL);
     }
@@ -264,7 +262,40 @@ static void fail_outside(void *arg)
 
 static void call_what_fails(void *arg)
 {
-    IecStackCallOutside(IecStackOfThread, fail_outside, arg);
+    (void)IecStackCallOutside(IecStackOfThread, fail_outside, arg);
+}
+
+static void break_outside(void *arg)
+{
+    bool *returned = arg;
+    SysExceptBreak(NULL, RTSEXCPT_WATCHDOG);
+    *returned = true;
+}
+
+static void be_broken_outside(void *arg)
+{
+    bool returned = false;
+    RTS_UI32 code = IecStackCallOutside(IecStackOfThread, break_outside, &returned);
+    RTS_UNUSED(arg);
+    CHECK(returned);
+    CHECK_EQUAL(code, RTSEXCPT_WATCHDOG);
+    SysExceptRaise(code, 0x1234, NULL);
+}
+
+static void nothing_outside(void *arg)
+{
+    RTS_UNUSED(arg);
+}
+
+static void call_outside_again(void *arg)
+{
+    CHECK_EQUAL(IecStackCallOutside(IecStackOfThread, nothing_outside, arg), RTSEXCPT_NOEXCEPTION);
+}
+
+static void a_break_in_a_call_outside_is_for_its_caller_to_raise(void)
+{
+    CHECK_EQUAL(code_of(be_broken_outside), RTSEXCPT_WATCHDOG);
+    CHECK_EQUAL(code_of(call_outside_again), RTSEXCPT_NOEXCEPTION); /* it is over with that try */
 }
 
 /* It is a fault of the process, not of the program. */
@@ -468,6 +499,7 @@ int main(void)
     RUN(a_break_of_a_thread_that_ended_does_nothing);
     RUN(a_break_of_something_else_does_nothing);
     RUN(a_call_outside_runs_on_the_stack_of_the_thread);
+    RUN(a_break_in_a_call_outside_is_for_its_caller_to_raise);
     RUN(a_fault_in_a_call_outside_ends_the_process);
     RUN(threads_do_not_disturb_each_other);
     RUN(threads_that_end_leave_room_for_others);

@@ -284,6 +284,22 @@ def test_a_long_function_is_not_interrupted(tmp_path: Path) -> None:
         assert plc.read("Main.n") == 0
 
 
+def test_an_endless_loop_that_calls_a_function_is_aborted_each_time(tmp_path: Path) -> None:
+    """Most of the time it is in the function, which is not interrupted."""
+
+    def busy(channel: int) -> float:
+        return float(sum(range(2000)) > 0)
+
+    path = tmp_path / "main.st"
+    path.write_text(ADC.replace("n := n + 1;", "WHILE first < 2.0 DO first := BoardAdc(1); END_WHILE"))
+    with Simulator.from_sources(path, cycle_limit_ms=20, functions={"BoardAdc": busy}) as plc:
+        for _ in range(10):
+            with pytest.raises(ProgramStopped, match="WATCHDOG"):
+                plc.run_cycles(1)
+            plc.reset("cold")
+            plc.start()
+
+
 def test_python_in_several_simulators(tmp_path: Path) -> None:
     with (
         simulator(tmp_path, ADC, BoardAdc=lambda channel: 1.0) as a,

@@ -86,10 +86,10 @@ static void call(void *arg)
     CALL *call = arg;
     IEC_STACK *stack = call->stack;
     __sanitizer_finish_switch_fiber(NULL, (const void **)&stack->sanitizer.own_bottom, &stack->sanitizer.own_size);
-    __atomic_store_n(&stack->running, 1, __ATOMIC_RELEASE);
+    __atomic_store_n(&stack->running, IEC_STACK_RUNS, __ATOMIC_RELEASE);
     call->fn(call->arg);
     stack = IecStackOfThread; /* the register that held it may have been destroyed */
-    __atomic_store_n(&stack->running, 0, __ATOMIC_RELEASE);
+    __atomic_store_n(&stack->running, IEC_STACK_UNUSED, __ATOMIC_RELEASE);
     before_back(stack);
 }
 
@@ -97,7 +97,7 @@ bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
     CALL arguments = {stack, fn, arg};
     __sanitizer_start_switch_fiber(&stack->sanitizer.own_state, (void *)stack->bottom, STACK_SIZE);
-    bool left = IecStackSwitch(call, &arguments, stack, 0);
+    bool left = IecStackSwitch(call, &arguments, stack, IEC_STACK_UNUSED);
     __sanitizer_finish_switch_fiber(stack->sanitizer.own_state, NULL, NULL);
     return !left;
 }
@@ -133,7 +133,7 @@ static void call_below(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 
 bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
-    return IecStackSwitch(fn, arg, stack, 1) == 0;
+    return IecStackSwitch(fn, arg, stack, IEC_STACK_RUNS) == 0;
 }
 
 void IecStackLeave(IEC_STACK *stack)
@@ -148,9 +148,10 @@ static void call_below(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 
 #endif
 
-void IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
+RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
-    __atomic_store_n(&stack->running, 0, __ATOMIC_RELEASE);
+    __atomic_store_n(&stack->running, IEC_STACK_WAITS, __ATOMIC_SEQ_CST);
     call_below(stack, fn, arg);
-    __atomic_store_n(&stack->running, 1, __ATOMIC_RELEASE);
+    __atomic_store_n(&stack->running, IEC_STACK_RUNS, __ATOMIC_SEQ_CST);
+    return IecStackBreakCode();
 }

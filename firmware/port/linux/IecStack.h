@@ -12,11 +12,14 @@
 
 #include "CmpStd.h"
 
+/* What a stack is used for. */
+enum { IEC_STACK_UNUSED = 0, IEC_STACK_RUNS = 1, IEC_STACK_WAITS = 2 /* for a call outside */ };
+
 /* The layout of the first three is known to IecStackSwitch.S. */
 typedef struct {
     uintptr_t back;   /* stack pointer of the thread, saved while IEC code runs */
     uintptr_t top;    /* past the highest address of the IEC stack */
-    RTS_UI32 running; /* IEC code runs; atomic */
+    RTS_UI32 running; /* IEC_STACK_...; atomic */
     uintptr_t bottom; /* lowest address */
     struct {
         void *own_state, *own_bottom; /* of the address sanitizer */
@@ -37,12 +40,16 @@ bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
 /* Ends the running IecStackRun of this thread, from the IEC stack or from a signal handler. */
 void IecStackLeave(IEC_STACK *stack) __attribute__((noreturn));
 
-/* Calls fn(arg) on the stack of the thread, from the IEC stack. It is not IEC code: no break hits it, and it must return. */
-void IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
+/* Calls fn(arg) on the stack of the thread, from the IEC stack. It is not IEC code: it must return, and a break that comes
+ * meanwhile is for the caller to raise. Returns its code, RTSEXCPT_NOEXCEPTION without one. */
+RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
 
 /* The record of the calling thread, NULL without: found whatever its registers hold. Reading it in a handler never
  * allocates. */
 extern __thread IEC_STACK *IecStackOfThread __attribute__((tls_model("initial-exec"), visibility("hidden")));
+
+/* In SysExcept.c: the code of a break of the running SysExceptTry of this thread that came while no IEC code ran. */
+RTS_UI32 IecStackBreakCode(void);
 
 /* In SysExcept.c, for the handler of a signal that ends the process: the last address of the application's code that the
  * calling thread was at, 0 when it is not in IEC code. *arg: what its latest SysExceptTry was called with, NULL when it

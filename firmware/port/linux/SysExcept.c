@@ -83,7 +83,7 @@ static void fatal(const char *message)
 
 static bool runs_iec_code(const CONTEXT *context)
 {
-    return context != NULL && __atomic_load_n(&context->stack.running, __ATOMIC_ACQUIRE) != 0;
+    return context != NULL && __atomic_load_n(&context->stack.running, __ATOMIC_ACQUIRE) == IEC_STACK_RUNS;
 }
 
 /* ---- in the handler ---- */
@@ -136,7 +136,9 @@ static const uintptr_t *readable(const IEC_STACK *stack, uintptr_t pointer)
  * what leaves it (with a sanitizer, more than is here) is not made to be interrupted by itself. */
 static bool begin_to_leave(CONTEXT *context)
 {
-    return context != NULL && __atomic_exchange_n(&context->stack.running, 0, __ATOMIC_ACQ_REL) != 0;
+    RTS_UI32 expected = IEC_STACK_RUNS;
+    return context != NULL && __atomic_compare_exchange_n(&context->stack.running, &expected, IEC_STACK_UNUSED, false,
+                                                          __ATOMIC_ACQ_REL, __ATOMIC_ACQUIRE);
 }
 
 static void leave(CONTEXT *context, RTS_UI32 code, PLACE place)
@@ -212,12 +214,23 @@ static void on_fault(int number, siginfo_t *info, void *ucontext)
     chain(signal, info, ucontext);
 }
 
+/* A break of the round that runs, which may have come when a call outside ran. */
+static bool is_broken(const CONTEXT *context)
+{
+    return __atomic_load_n(&context->break_round, __ATOMIC_SEQ_CST) == context->round;
+}
+
+RTS_UI32 IecStackBreakCode(void)
+{
+    const CONTEXT *context = self();
+    return is_broken(context) ? context->break_code : (RTS_UI32)RTSEXCPT_NOEXCEPTION;
+}
+
 static void on_break(int number, siginfo_t *info, void *ucontext)
 {
     CONTEXT *context = self();
     const struct sigaction *previous = &find_signal(number)->previous;
-    if (runs_iec_code(context) && __atomic_load_n(&context->break_round, __ATOMIC_ACQUIRE) == context->round &&
-        begin_to_leave(context)) {
+    if (runs_iec_code(context) && is_broken(context) && begin_to_leave(context)) {
         leave(context, context->break_code, place_of(ucontext));
     }
     if ((previous->sa_flags & SA_SIGINFO) != 0) {
@@ -399,14 +412,16 @@ static void break_round(CONTEXT *context, RTS_UI32 round, RTS_UI32 code)
 {
     if (context->break_round != round) {
         context->break_code = code;
-        __atomic_store_n(&context->break_round, round, __ATOMIC_RELEASE);
+        __atomic_store_n(&context->break_round, round, __ATOMIC_SEQ_CST);
         pthread_kill(context->thread, SIGRTMIN + BREAK_SIGNAL_OFFSET);
     }
 }
 
+/* Its code, or a call outside that it waits for. */
 static bool runs(const CONTEXT *context, const void *arg)
 {
-    return context->used && runs_iec_code(context) && __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg;
+    return context->used && __atomic_load_n(&context->stack.running, __ATOMIC_ACQUIRE) != IEC_STACK_UNUSED &&
+           __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg;
 }
 
 /* The round is read first: when the thread goes on to its next one meanwhile, the break misses. */

@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * IEC code runs on a stack of its own and may be left in the middle. The host's function may not: it is called on the
- * stack of the thread, and is not IEC code meanwhile, so that no break and no fault of its own ends it.
+ * stack of the thread, and is not IEC code meanwhile: a break ends the IEC code after it, and no fault of its own does.
  */
 #include "CmpItf.h"
 #include "../linux/IecStack.h"
@@ -52,10 +52,12 @@ static void simpass(RTS_UI64 address)
 static void simpython(RTS_UI32 number, RTS_UI64 result)
 {
     HOST_CALL call = {number, (RTS_UI8 *)(uintptr_t)result, RTSEXCPT_NOEXCEPTION};
+    RTS_UI32 code = IecStackCallOutside(IecStackOfThread, call_host, &call);
 
-    IecStackCallOutside(IecStackOfThread, call_host, &call);
     if (call.code != RTSEXCPT_NOEXCEPTION)
-        SysExceptRaise(call.code, (uintptr_t)__builtin_return_address(0) - 1, __builtin_dwarf_cfa());
+        code = call.code;
+    if (code != RTSEXCPT_NOEXCEPTION)
+        SysExceptRaise(code, (uintptr_t)__builtin_return_address(0) - 1, __builtin_dwarf_cfa());
 }
 
 static const CMP_EXT_FUNCTION externals[] = {
