@@ -7,7 +7,7 @@
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each (ARGS="--only tcp,lines --seed 7")
-# make properties what holds for all values, tried with other ones than `make test` does (ARGS="-k telegrams")
+# make properties what holds for all values, tried with other ones than `make test` does (ARGS="-k call")
 #
 # Everything is installed into .venv and built in build*/; Debian packages that are missing are installed when you are root.
 
