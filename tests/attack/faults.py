@@ -80,6 +80,8 @@ MACHINE_CODE = {
         "stack pointer lost": "31 E4 50",
         "stack overwritten upwards": "48 89 E7 B9 00 00 10 00 31 C0 FC F3 AA",
         "direction flag left set": "FD C3",
+        "alignment check left set": "9C 81 0C 24 00 00 04 00 9D C3",
+        "floating-point exceptions left on": "6A 00 0F AE 14 24 58 C3",
         "single step": "9C 81 0C 24 00 01 00 00 9D 90 C3",
         "end of the process": "B8 E7 00 00 00 31 FF 0F 05",
     },

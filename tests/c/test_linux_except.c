@@ -265,6 +265,29 @@ static void call_what_fails(void *arg)
     (void)IecStackCallOutside(IecStackOfThread, fail_outside, arg);
 }
 
+#if defined(__x86_64__)
+enum { DIRECTION_AND_ALIGNMENT_CHECK = 1 << 10 | 1 << 18 };
+
+static void set_flags(void *arg)
+{
+    __asm__ volatile("pushfq\n\torq %0, (%%rsp)\n\tpopfq" ::"i"(DIRECTION_AND_ALIGNMENT_CHECK) : "cc", "memory");
+    if (arg != NULL) {
+        SysExceptRaise(RTSEXCPT_ARRAYBOUNDS, 0x1234, NULL);
+    }
+}
+
+static void the_flags_are_those_of_c_afterwards(void)
+{
+    for (uintptr_t raises = 0; raises < 2; raises++) {
+        RTS_EXCEPTION exception;
+        uint64_t flags;
+        CHECK_EQUAL(SysExceptTry(set_flags, (void *)raises, &exception), !raises);
+        __asm__ volatile("pushfq\n\tpopq %0\n\tpushq $0\n\tpopfq" : "=r"(flags)::"cc", "memory");
+        CHECK((flags & DIRECTION_AND_ALIGNMENT_CHECK) == 0);
+    }
+}
+#endif
+
 static void break_outside(void *arg)
 {
     bool *returned = arg;
@@ -500,6 +523,9 @@ int main(void)
     RUN(a_break_of_something_else_does_nothing);
     RUN(a_call_outside_runs_on_the_stack_of_the_thread);
     RUN(a_break_in_a_call_outside_is_for_its_caller_to_raise);
+#if defined(__x86_64__)
+    RUN(the_flags_are_those_of_c_afterwards);
+#endif
     RUN(a_fault_in_a_call_outside_ends_the_process);
     RUN(threads_do_not_disturb_each_other);
     RUN(threads_that_end_leave_room_for_others);

@@ -8,9 +8,9 @@
  *   void IecStackCallBelow(void (*fn)(void *arg), void *arg, uintptr_t stack_pointer);
  *
  * All registers that a function preserves are saved on the stack of the thread, so that nothing that IEC code may have
- * destroyed is used after it: neither its stack nor a register it should have preserved. The record's `running` is set once
- * the way back is known, and cleared once it has been taken. The copy of the saved stack pointer on the IEC stack is for
- * debuggers only.
+ * destroyed is used after it: neither its stack, nor a register it should have preserved, nor the flags of x86-64. The
+ * record's `running` is set once the way back is known, and cleared once it has been taken. The copy of the saved stack
+ * pointer on the IEC stack is for debuggers only.
  */
 #define BACK 0
 #define TOP 8
@@ -66,6 +66,10 @@ IecStackSwitch:
 go_back:
     movq BACK(%rax), %rsp
     .cfi_restore_state
+    pushq $0 /* the flags: neither backwards, nor with checks of the alignment */
+    .cfi_adjust_cfa_offset 8
+    popfq
+    .cfi_adjust_cfa_offset -8
     movl $0, RUNNING(%rax)
     movl %ecx, %eax
     popq %r15
