@@ -88,6 +88,7 @@ static void call(void *arg)
     __sanitizer_finish_switch_fiber(NULL, (const void **)&stack->sanitizer.own_bottom, &stack->sanitizer.own_size);
     __atomic_store_n(&stack->running, IEC_STACK_RUNS, __ATOMIC_RELEASE);
     call->fn(call->arg);
+    IecStackResetFlags();
     stack = IecStackOfThread; /* the register that held it may have been destroyed */
     __atomic_store_n(&stack->running, IEC_STACK_UNUSED, __ATOMIC_RELEASE);
     before_back(stack);

@@ -12,6 +12,10 @@
 
 #include "CmpStd.h"
 
+#if defined(__x86_64__)
+#include <x86intrin.h>
+#endif
+
 /* What a stack is used for. */
 enum { IEC_STACK_UNUSED = 0, IEC_STACK_RUNS = 1, IEC_STACK_WAITS = 2 /* for a call outside */ };
 
@@ -47,6 +51,16 @@ RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 /* The record of the calling thread, NULL without: found whatever its registers hold. Reading it in a handler never
  * allocates. */
 extern __thread IEC_STACK *IecStackOfThread __attribute__((tls_model("initial-exec"), visibility("hidden")));
+
+/* For C code that goes on after IEC code, which may have set flags with which C code faults: that string instructions go
+ * backwards, which the kernel clears for a handler, and that alignment is checked, which it does not. IecStackSwitch does
+ * it on its way back. */
+static inline void IecStackResetFlags(void)
+{
+#if defined(__x86_64__)
+    __writeeflags(0);
+#endif
+}
 
 /* In SysExcept.c: the code of a break of the running SysExceptTry of this thread that came while no IEC code ran. */
 RTS_UI32 IecStackBreakCode(void);

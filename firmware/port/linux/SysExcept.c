@@ -206,6 +206,7 @@ static void chain(const SIGNAL *signal, siginfo_t *info, void *ucontext)
 
 static void on_fault(int number, siginfo_t *info, void *ucontext)
 {
+    IecStackResetFlags();
     CONTEXT *context = self();
     SIGNAL *signal = find_signal(number);
     if (begin_to_leave(context)) {
@@ -228,6 +229,7 @@ RTS_UI32 IecStackBreakCode(void)
 
 static void on_break(int number, siginfo_t *info, void *ucontext)
 {
+    IecStackResetFlags();
     CONTEXT *context = self();
     const struct sigaction *previous = &find_signal(number)->previous;
     if (runs_iec_code(context) && is_broken(context) && begin_to_leave(context)) {
@@ -399,6 +401,7 @@ bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
+    IecStackResetFlags();
     CONTEXT *context = self();
     if (!begin_to_leave(context)) {
         fatal("an exception was raised outside of IEC code");
