@@ -280,6 +280,18 @@ def test_sources_of_a_project_with_a_board_make_its_image_again(tool: Any, proje
     assert archive.build[archive.build.index("--board") + 1] == "mps2-an385/full"
 
 
+@pytest.mark.parametrize("words", [["--board", "mps2-an385/full"], ["--target", "cortex-m7"]])
+def test_source_put_takes_another_board_than_the_project_as_build_does(
+    tool: Any, project: Path, words: list[str]
+) -> None:
+    write(project, 'sources = ["src"]\nboard = "mps2-an500/full"')
+    (project / "plc.io.toml").write_text("[gpio.in]\nDI0 = '%IX0.0'\n")
+    assert tool("build", *words).status == 0
+    settings = settings_of(parser().parse_args(["source", "put", *words]))
+    archive, _ = prepared_source(settings, image_crc((project / "app.cdl").read_bytes()))
+    assert set(words) <= set(archive.build)
+
+
 ARCHIVED = """\
 sources = ["src"]
 io = "main.io.toml"

@@ -88,10 +88,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build.add_argument(
         "-o", "--output", type=file_path, metavar="IMAGE", help="default: app.cdl, of a project beside plc.toml"
     )
-    target = build.add_argument(
-        "--target", metavar="NAME", help=f"processor; default: that of the board, or {DEFAULT_TARGET}"
-    )
-    target.completer = lambda **words: TARGETS  # type: ignore[attr-defined]  # for argcomplete
+    _add_target(build, f"processor; default: that of the board, or {DEFAULT_TARGET}")
     _add_board(build, "whose limits the program must keep, such as mps2-an385/standard")
     _add_firmware(build, "the same for a board of your own: what runs on it")
     build.add_argument(
@@ -326,7 +323,10 @@ def _add_file_actions(command: Callable[..., argparse.ArgumentParser]) -> None:
     get.add_argument("-o", "--output", type=file_path, default=Path("source"), metavar="DIR", help="default: source")
     _add_link(get)
     put = action("put", "put the sources of the program that is on the device there as well")
+    put.set_defaults(no_warn=[], werror=None)
     _add_sources(put)
+    _add_target(put, "processor, where it is not that of the board in plc.toml")
+    _add_board(put, "that the program was built for, such as mps2-an385/full")
     _add_build_options(put)
     _add_dialect(put)
     _add_io_files(put)
@@ -366,6 +366,11 @@ def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     param.add_argument("parameter", type=_text, metavar="NAME|ID[=VALUE]", help="set: with its value")
     param.add_argument("--type", metavar="TYPE", help="of one that the description does not have; default: UDINT")
     _add_link(param, symbols=True)
+
+
+def _add_target(parser: argparse.ArgumentParser, text: str) -> None:
+    target = parser.add_argument("--target", metavar="NAME", help=text)
+    target.completer = lambda **words: TARGETS  # type: ignore[attr-defined]  # for argcomplete
 
 
 def _add_firmware(parser: argparse.ArgumentParser, text: str) -> None:

@@ -412,7 +412,6 @@ def _source(args: argparse.Namespace) -> int:
         return _with_progress(
             args, lambda plc, show: file_documents.get_source(plc, args.output, show), file_documents.source_text
         )
-    args.no_warn, args.werror = [], None
     settings = _settings(args)
     return _with_progress(
         args,

@@ -98,8 +98,8 @@ def archive_of(settings: Settings, crc: int, target: str) -> Archive:
     if found != crc:
         raise UsageError(
             f"These sources do not make this image (CRC {crc:08X}, they make {found:08X}): build it again from them, "
-            "with the options that are in plc.toml. Of a program with inputs and outputs the board is named there, or "
-            "by the name in device.toml.",
+            "with the options that are in plc.toml. Of a program with inputs and outputs the board is named there, by "
+            "the name in device.toml, or by --board of 'plctool source put'.",
             "other-source",
         )
     return archive
