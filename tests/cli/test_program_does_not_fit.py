@@ -49,6 +49,17 @@ def refused(tool: Any, scratch: Path) -> Any:
     return build
 
 
+SUM = """FUNCTION Sum : DINT
+VAR_INPUT x : ANY_INT; list : ARRAY[1..3000] OF ANY_INT := [2, 3]; END_VAR
+Sum := TO_DINT(x + list[1]);
+END_FUNCTION
+PROGRAM Main
+VAR i : INT; d : DINT; END_VAR
+i := TO_INT(Sum(i)); d := Sum(d);
+END_PROGRAM
+"""
+
+
 def test_too_many_tasks(refused: Any) -> None:
     message = refused(tasks(20), "--target", "cortex-m3")
     assert "It needs 20 tasks, the device has 4 (T0, T1, T2 and 17 more)." in message
@@ -180,3 +191,15 @@ END_PROGRAM
     assert tool("build", "fits.st", "-o", "fits.cdl").status == 0
     assert tool("run", "fits.cdl", "--cycles", "1", "--get", "Main.n").status == 0
     assert "bytes of stack, the device has 1047552" in refused(text.format(last=1024 * 1024))
+
+
+def test_default_of_a_parameter_is_named_after_its_function(refused: Any) -> None:
+    message = refused(SUM, "--board", "mps2-an385/minimal")
+    assert "default of Sum(DINT).list 12000, default of Sum(INT).list 6000" in message
+
+
+def test_each_default_of_a_parameter_is_listed(tool: Any, scratch: Path) -> None:
+    (scratch / "app.st").write_text(SUM)
+    assert tool("build", "app.st", "-o", "app.cdl").status == 0
+    names = {v["name"] for v in tool("symbols", "app.cdl", "--json").json["variables"]}
+    assert {"default of Sum(DINT).list", "default of Sum(INT).list"} <= names

@@ -233,7 +233,7 @@ class Construction:
             elif isinstance(symbol.default, ScalarInit):
                 args.append(Const(symbol.default.value, symbol.type, pos))
             elif symbol.given and isinstance(symbol.type, StructType | ArrayType):
-                constant = VarPlace(self._world.default_of(symbol), symbol.type, pos)
+                constant = VarPlace(self._world.default_of(symbol, info.pou), symbol.type, pos)
                 args.append(Load(constant, symbol.type, pos))
             elif symbol.given:
                 args.append(Const("" if isinstance(symbol.type, StringType) else 0, symbol.type, pos))

@@ -151,11 +151,12 @@ class World:
         block = self.blocks.get(t)
         return block.cls if block is not None else self.interfaces.get(t)
 
-    def default_of(self, symbol: VarSymbol) -> Variable:
-        """What a parameter that is a structure or an array holds when a call leaves it out: a constant in memory."""
+    def default_of(self, symbol: VarSymbol, pou: Pou) -> Variable:
+        """What a parameter of `pou` that is a structure or an array holds when a call leaves it out: a constant in
+        memory."""
         variable = self._parameter_defaults.get(symbol)
         if variable is None:
-            name = f"{symbol.name} default {symbol.pos.line}.{symbol.pos.column}"
+            name = f"default of {pou.name}.{symbol.name}"
             variable = Variable(name, symbol.type, Storage.AREA, symbol.pos, initial=symbol.default, constant=True)
             self._parameter_defaults[symbol] = variable
             self.allocation.add(variable)

@@ -150,16 +150,16 @@ class UnitVariables:
                 self.declare_stack_variables(block, pou, scope)
             elif block.keyword is Section.VAR_TEMP:
                 yield replace(block, keyword=Section.VAR)
-                self._start_anew(block, scope)
+                self._start_anew(block, pou, scope)
             else:
                 yield block
 
-    def _start_anew(self, block: ast.VarBlock, scope: Scope) -> None:
+    def _start_anew(self, block: ast.VarBlock, pou: Pou, scope: Scope) -> None:
         """Lets the body begin with the initial values of VAR_TEMP that actions see, and that are kept for them."""
         for symbol in (scope.names.get(name.casefold()) for line in block.decls for _, name in line.names):
             if isinstance(symbol, VarSymbol) and symbol.variable is not None and symbol.type not in self._world.blocks:
                 pos, t = symbol.pos, symbol.type
-                first = VarPlace(self._world.default_of(symbol), t, pos)
+                first = VarPlace(self._world.default_of(symbol, pou), t, pos)
                 scope.prologue.append(Assign(VarPlace(symbol.variable, t, pos), Load(first, t, pos), pos))
 
     def _declare_constants(self, decl: ast.PouDecl, scope: Scope) -> None:

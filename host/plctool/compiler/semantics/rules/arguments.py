@@ -197,7 +197,7 @@ def typed_call(
                 c.error(offset, "arguments", f"the argument {symbol.name} of {name} is missing")
                 ok = False
                 continue
-            args.append(_default_value(c, symbol, parameter, offset))
+            args.append(_default_value(c, info.pou, symbol, parameter, offset))
             continue
         if symbol.group and actual is not None:
             described = _described(c, actual, symbol, offset)
@@ -239,10 +239,10 @@ def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tu
     return handed(place, symbol.type, size_of(c, place))
 
 
-def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:
+def _default_value(c: Checker, pou: Pou, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:
     pos, t = c.pos(offset), symbol.type
     if isinstance(t, StructType | ArrayType) and t not in c.world.blocks:
-        variable = c.world.default_of(symbol)
+        variable = c.world.default_of(symbol, pou)
         place = VarPlace(variable, t, pos)
         return place if parameter.by_reference else Load(place, t, pos)
     value: int | float | str = "" if isinstance(t, StringType) else 0
