@@ -4,8 +4,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Only its own failure counts against an application, and is noted in flash before anything else is done. When it cannot
- * be loaded for another reason (a fault of the flash, a function that this firmware lacks), nothing is written and
- * nothing runs: the next start finds all as it was.
+ * be loaded for another reason (a fault of the flash, a firmware for another device, a function that this one lacks),
+ * nothing is written and nothing runs: the next start finds all as it was.
  */
 #include "AppBoot.h"
 

@@ -91,7 +91,7 @@ static bool take_seal(RTS_UI32 slot, RTS_UI32 known)
     newer = (RTS_I32)(seal.number - known) > 0;
     if (!newer && (recorded->size == 0 || recorded->crc == seal.crc))
         return true;
-    if (AppLoaderCRC32(slot, &header, &crc) == ERR_OK && crc != seal.crc)
+    if (AppLoaderCRC32(slot, &header, &crc) != ERR_OK || crc != seal.crc)
         return true;
     if (!newer)
         return false;

@@ -45,7 +45,7 @@ void AppCommitTakeBack(RTS_UI32 slot);
  * stays, or it is this one but may be lost when power is.
  */
 
-/* Nothing boots. AppCommitWipe follows, if there is no error: then the previous one stays. */
+/* Nothing boots. AppCommitWipe follows. On an error the previous record stays. */
 RTS_RESULT AppCommitErase(void);
 
 /* The slot that is not `failed` is what boots; its retain records are those after `retain_after`. The other is wiped. */

@@ -59,7 +59,7 @@ void AppHandlePendingException(void);
 
 void AppPostEvent(RTS_UI32 event);
 
-/* An application that has run for APP_PROVE_US has proven itself. In each pass of main. */
+/* An application that has run for APP_PROVE_US, and is in no long cycle, has proven itself. In each pass of main. */
 void AppCheckProof(void);
 
 /* The state as after power on, without an application. */
