@@ -79,7 +79,7 @@ class SimFunctions:
     def connect(self, core: Core) -> None:
         """The program in this runtime calls them from now on."""
 
-        def call(number: int, addresses: Any, count: int, result: Any) -> int:
+        def call(number: int, addresses: Any, result: Any) -> int:
             try:
                 self._call(core, self._functions[number], addresses, result)
             except EndProgram as end:

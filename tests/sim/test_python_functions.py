@@ -284,11 +284,15 @@ def test_a_long_function_is_not_interrupted(tmp_path: Path) -> None:
         assert plc.read("Main.n") == 0
 
 
-def test_an_endless_loop_that_calls_a_function_is_aborted_each_time(tmp_path: Path) -> None:
-    """Most of the time it is in the function, which is not interrupted."""
+@pytest.mark.parametrize("work", [0, 2000])
+def test_an_endless_loop_that_calls_a_function_is_aborted_each_time(tmp_path: Path, work: int) -> None:
+    """The function is not interrupted; what is passed to it may be, and leaves nothing to the next call."""
 
     def busy(channel: int) -> float:
-        return float(sum(range(2000)) > 0)
+        channels.add(channel)
+        return float(sum(range(work)) >= 0)
+
+    channels = set[int]()
 
     path = tmp_path / "main.st"
     path.write_text(ADC.replace("n := n + 1;", "WHILE first < 2.0 DO first := BoardAdc(1); END_WHILE"))
@@ -298,6 +302,14 @@ def test_an_endless_loop_that_calls_a_function_is_aborted_each_time(tmp_path: Pa
                 plc.run_cycles(1)
             plc.reset("cold")
             plc.start()
+    assert channels == {1, 2}
+
+
+def test_a_function_with_too_many_parameters_is_refused(tmp_path: Path) -> None:
+    names = ", ".join(f"p{n}" for n in range(65))
+    source = f"FUNCTION F : DINT VAR_INPUT {names} : DINT; END_VAR END_FUNCTION PROGRAM Main END_PROGRAM"
+    with pytest.raises(UsageError, match="it has 65 parameters; at most 64 are possible"):
+        simulator(tmp_path, source, F=lambda *numbers: 0)
 
 
 def test_python_in_several_simulators(tmp_path: Path) -> None:

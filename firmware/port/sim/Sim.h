@@ -94,11 +94,11 @@ bool SimHasExternal(const char *name);
 enum { SIM_MAX_PASSED = 64 };
 
 /*
- * A function of the program that the host implements: its number, the addresses of its parameters (`count`, at most
+ * A function of the program that the host implements: its number, the addresses of its parameters (at most
  * SIM_MAX_PASSED), and where its result goes (NULL for none). Returns RTSEXCPT_NOEXCEPTION, or what the program ends
  * with. It is called in the thread that lets time pass; it must let time pass by SimRunDevices only, and not switch power.
  */
-typedef RTS_UI32 (*SIM_FUNCTION)(RTS_UI32 number, RTS_UI8 **parameters, RTS_UI32 count, RTS_UI8 *result);
+typedef RTS_UI32 (*SIM_FUNCTION)(RTS_UI32 number, RTS_UI8 **parameters, RTS_UI8 *result);
 
 /* All functions of the program that the host implements; NULL: it implements none. Kept when power is off. */
 void SimSetFunction(SIM_FUNCTION function);

@@ -14,7 +14,6 @@
 
 static struct {
     SIM_FUNCTION function;
-    RTS_UI32 count;
     RTS_UI8 *passed[SIM_MAX_PASSED];
 } host;
 
@@ -32,20 +31,18 @@ void SimSetFunction(SIM_FUNCTION function)
 static void call_host(void *arg)
 {
     HOST_CALL *call = arg;
-    RTS_UI32 count = host.count;
 
-    host.count = 0;
     call->code = host.function == NULL ? (RTS_UI32)RTSEXCPT_UNRESOLVED_EXTREFS
-                                       : host.function(call->number, host.passed, count, call->result);
+                                       : host.function(call->number, host.passed, call->result);
 }
 
 /* ---- what IEC code calls ---- */
 
-/* The address of a parameter of the next simpython. */
-static void simpass(RTS_UI64 address)
+/* The address of parameter `index` of the next simpython. */
+static void simpass(RTS_UI32 index, RTS_UI64 address)
 {
-    if (host.count < SIM_MAX_PASSED)
-        host.passed[host.count++] = (RTS_UI8 *)(uintptr_t)address;
+    if (index < SIM_MAX_PASSED)
+        host.passed[index] = (RTS_UI8 *)(uintptr_t)address;
 }
 
 /* `number`: of the function; `result`: where its result goes. */
@@ -61,7 +58,7 @@ static void simpython(RTS_UI32 number, RTS_UI64 result)
 }
 
 static const CMP_EXT_FUNCTION externals[] = {
-    {"simpass", 0x27CB0838, 0x00010000, (RTS_PFN)simpass},     /* simpass(LWORD) */
+    {"simpass", 0xB25885DD, 0x00010000, (RTS_PFN)simpass},     /* simpass(UDINT,LWORD) */
     {"simpython", 0x71638572, 0x00010000, (RTS_PFN)simpython}, /* simpython(UDINT,LWORD) */
 };
 

@@ -15,6 +15,7 @@ from plctool.compiler.semantics.program import Program
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Direction, Pou
+from plctool.core import lib
 from plctool.errors import UsageError, did_you_mean
 from plctool.iec.types import ArrayType, StringType
 
@@ -37,7 +38,7 @@ class PythonFunctions:
 
     def interface(self) -> list[ast.Declaration]:
         """The functions of the simulator that the bodies call."""
-        return [_external(_PASS, "simpass", "LWORD"), _external(_CALL, "simpython", "UDINT", "LWORD")]
+        return [_external(_PASS, "simpass", "UDINT", "LWORD"), _external(_CALL, "simpython", "UDINT", "LWORD")]
 
     def finish(self, program: Program) -> None:
         """Notes what they are. Raises UsageError for one that is not declared, or that cannot be called in Python."""
@@ -67,7 +68,7 @@ class PythonFunctions:
             line = ast.VarDecl(pos, [(pos, _RESULT)], None, decl.result, None)
             blocks.append(ast.VarBlock(pos, ast.Section.VAR, set(), [line]))
             where = _address(pos, _RESULT)
-        body = [_call(pos, _PASS, _address(pos, name)) for name in parameters]
+        body = [_call(pos, _PASS, _number(pos, n), _address(pos, name)) for n, name in enumerate(parameters)]
         body.append(_call(pos, _CALL, _number(pos, number), where))
         if decl.result is not None:
             body.append(ast.Assign(pos, [ast.Name(pos, decl.name)], ast.Assigning.VALUE, ast.Name(pos, _RESULT)))
@@ -76,6 +77,9 @@ class PythonFunctions:
 
 
 def _callable(pou: Pou) -> Pou:
+    if len(pou.parameters) > lib.SIM_MAX_PASSED:
+        most = f"{len(pou.parameters)} parameters; at most {lib.SIM_MAX_PASSED} are possible"
+        raise UsageError(f"{pou.name} cannot be a function in Python: it has {most}.", "python")
     for parameter in pou.parameters:
         t = parameter.variable.type
         if isinstance(t, StringType) and parameter.direction is not Direction.INPUT:
