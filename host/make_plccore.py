@@ -7,6 +7,7 @@ no second copy of a struct, a number or a prototype that could drift.
 from __future__ import annotations
 
 import argparse
+import shlex
 import subprocess
 from pathlib import Path
 
@@ -41,13 +42,13 @@ SHARED = [
 def preprocess(cc: str, include: list[str], *flags: str) -> str:
     """What the preprocessor prints for all shared headers with RTS_CFFI defined."""
     source = "".join(f'#include "{name}"\n' for name in SHARED)
-    command = [cc, "-E", "-xc", "-std=c99", "-DRTS_CFFI", *(f"-I{path}" for path in include), *flags, "-"]
+    command = [*shlex.split(cc), "-E", "-xc", "-std=c99", "-DRTS_CFFI", *(f"-I{path}" for path in include), *flags, "-"]
     return subprocess.run(command, input=source, capture_output=True, text=True, check=True).stdout
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cc", required=True, help="the C compiler, for its preprocessor")
+    parser.add_argument("--cc", required=True, help="the C compiler, for its preprocessor; with ccache in front of it if meson found one")
     parser.add_argument("--include", nargs="+", required=True, help="where the shared headers are")
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--depfile", type=Path, required=True, help="for the build system: the headers that were read")
