@@ -129,12 +129,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     )
 
     run = command("run", "run a program in this process, on a virtual clock")
-    run.add_argument(
-        "image",
-        type=usable_path,
-        nargs="?",
-        help="what 'plctool build' wrote; without one the project is compiled and run",
-    )
+    _add_image(run, "which is compiled for this machine")
     length = run.add_mutually_exclusive_group()
     length.add_argument("--cycles", type=_count, metavar="N", help="number of cycles of the first task; default: 1")
     length.add_argument("--time", type=_duration_ms, metavar="T#10s", help="how much virtual time, instead of cycles")
@@ -218,7 +213,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_io_files(export, "write the C header of this board instead")
 
     bench = command("bench", "measure the time of a cycle on this machine")
-    _add_image(bench)
+    _add_image(bench, "which is compiled for this machine")
     bench.add_argument("--cycles", type=_count, default=BENCH_CYCLES, metavar="N", help=f"default: {BENCH_CYCLES}")
 
 
@@ -413,8 +408,11 @@ def _add_build_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_image(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("image", type=usable_path, help="what 'plctool build' wrote")
+def _add_image(parser: argparse.ArgumentParser, built: str = "which is built first if it has changed") -> None:
+    parser.add_argument(
+        "image", type=usable_path, nargs="?", metavar="IMAGE|PROJECT",
+        help=f"what 'plctool build' wrote, or a project, {built}; default: the project of the current folder (plc.toml)",
+    )  # fmt: skip
 
 
 def _add_names(parser: argparse.ArgumentParser) -> None:

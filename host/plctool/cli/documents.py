@@ -52,6 +52,7 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
     Raises CompileError when the program has errors, UsageError when the image would overwrite one of its files. Files
     appear complete or not at all.
     """
+    from plctool.cli.fresh_image import fingerprint
     from plctool.debug.symbols import symbol_path
     from plctool.files import make_folder
 
@@ -59,7 +60,9 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
     inputs = settings.every_file
     check_output(output, inputs(), f"-o {output.stem}.cdl", is_image=True)
     check_not_read(symbol_path(output), inputs(), f"-o {output.stem}-image.cdl")
+    made_of = fingerprint(settings)  # before the sources are read: a change during the build makes the image stale
     result = _compile(settings, settings.target)
+    result.symbols.made_of = made_of
     if settings.own_folder:
         make_folder(output.parent)
     result.write(output)
@@ -409,11 +412,9 @@ def _run_traced(plc: Simulator, cycles: int | None, time_ms: float | None, trace
     plc.check_running()
 
 
-def bench(path: Path, cycles: int) -> Document:
+def bench(program: Path | Built, cycles: int) -> Document:
     """Real time per cycle of each task."""
-    from plctool.sim import Simulator
-
-    with Simulator.from_file(path) as plc:
+    with _simulator(program) as plc:
         tasks = []
         for index, task in enumerate(plc.tasks()):
             code_ns, cycle_ns = plc.bench(index, cycles)

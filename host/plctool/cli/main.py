@@ -80,22 +80,66 @@ def _info(args: argparse.Namespace) -> int:
     from plctool.cli.image_documents import production_info
     from plctool.image.production import is_production
 
-    if is_production(args.image):
-        return _show(args, production_info(args.image), output.production_info_text)
-    return _show(args, documents.info(args.image), output.info_text)
+    image = _image_of(args)
+    if is_production(image):
+        return _show(args, production_info(image), output.production_info_text)
+    return _show(args, documents.info(image), output.info_text)
+
+
+def _image_of(args: argparse.Namespace) -> Path:
+    """Returns the image that the arguments name. Builds that of a project first if it is not fresh."""
+    return _fresh_image(args, _project_of(args))
+
+
+def _fresh_image(args: argparse.Namespace, settings: Settings | None) -> Path:
+    if settings is None:
+        return Path(args.image)
+    from plctool.cli.fresh_image import is_fresh
+
+    if not is_fresh(settings):
+        document, warnings = documents.build(settings)
+        _print_warnings(args, warnings)
+        if not args.json:
+            print(f"Built {output.build_text(document)}", file=sys.stderr)
+    return settings.output
+
+
+def _project_of(args: argparse.Namespace) -> Settings | None:
+    """Returns the project that the arguments name instead of an image, or that of the current folder if they name
+    neither. None: they name an image."""
+    from plctool.cli.projects import needed_project, settings_of_project
+    from plctool.project import project_named
+
+    file = needed_project() if args.image is None else project_named([args.image])
+    return None if file is None else settings_of_project(file)
 
 
 def _image(args: argparse.Namespace) -> int:
     from plctool.cli.image_documents import production
     from plctool.cli.overwriting import check_not_read
 
-    inputs = [file for file in (args.image, args.firmware) if file is not None]
+    project = _project_of(args)
+    image = _fresh_image(args, project)
+    if args.board is None and args.firmware is None and project is not None:
+        args.board = project.board
+    inputs = [file for file in (image, args.firmware) if file is not None]
     check_not_read(args.output, inputs, f"-o {args.output.stem}-production{args.output.suffix}")
-    return _show(args, production(args.image, args.board, args.firmware, args.output), output.production_text)
+    return _show(args, production(image, args.board, args.firmware, args.output), output.production_text)
 
 
 def _symbols(args: argparse.Namespace) -> int:
-    return _show(args, documents.variables(args.image, args.patterns), output.variables_text)
+    if args.image is not None and _is_pattern(args.image):
+        args.image, args.patterns = None, [str(args.image), *args.patterns]
+    return _show(args, documents.variables(_image_of(args), args.patterns), output.variables_text)
+
+
+def _is_pattern(image: Path) -> bool:
+    """True if the first argument of `symbols` names variables of the project of the current folder."""
+    from plctool.image.production import is_production
+    from plctool.project import find_project
+
+    is_image = image.exists() or image.suffix.lower() == IMAGE_SUFFIX or is_production(image)
+    return not is_image and find_project() is not None
 
 
 def _run(args: argparse.Namespace) -> int:
@@ -122,13 +166,10 @@ def _run(args: argparse.Namespace) -> int:
 
 def _program_to_run(args: argparse.Namespace) -> Path | documents.Built:
     """The image that the arguments name, or the project, compiled for this machine."""
-    from plctool.cli.projects import needed_project, settings_of_project
-    from plctool.project import project_named
-
-    file = needed_project() if args.image is None else project_named([args.image])
-    if file is None:
+    settings = _project_of(args)
+    if settings is None:
         return Path(args.image)
-    built, warnings = documents.built_for_here(settings_of_project(file))
+    built, warnings = documents.built_for_here(settings)
     _print_warnings(args, warnings)
     return built
 
@@ -158,7 +199,7 @@ def _export_itf(args: argparse.Namespace) -> int:
 
 
 def _bench(args: argparse.Namespace) -> int:
-    return _show(args, documents.bench(args.image, args.cycles), lambda d: output.table(d["tasks"], d["tasks"][0]))
+    return _show(args, documents.bench(_program_to_run(args), args.cycles), lambda d: output.table(d["tasks"], d["tasks"][0]))
 
 
 def _completion(args: argparse.Namespace) -> int:
@@ -222,7 +263,7 @@ def _gateway_wanted(args: argparse.Namespace) -> bool | None:
 
 def _me(args: argparse.Namespace) -> str:
     """How this tool is shown to others on the line: the command and its arguments without options."""
-    image = [args.image.name] if "image" in args else []
+    image = [args.image.name] if getattr(args, "image", None) else []
     option = [args.option] if "option" in args else []
     return " ".join(["plctool", args.command, *option, *image, *getattr(args, "names", getattr(args, "values", []))])
 
@@ -255,7 +296,9 @@ def _flash_several(args: argparse.Namespace, link: Link) -> int:
 def _flash(args: argparse.Namespace) -> int:
     from plctool.cli.file_documents import store_source
 
-    if len((link := link_of(args)).nodes or ()) > 1:
+    link = link_of(args)
+    args.image = _image_of(args)
+    if len(link.nodes or ()) > 1:
         if args.with_source is not None:
             raise UsageError("--with-source is for one device; name one with --node.", "usage")
         return _flash_several(args, link)
@@ -515,7 +558,7 @@ def _io(args: argparse.Namespace) -> int:
 
 
 def _io_map(args: argparse.Namespace) -> int:
-    return _show(args, io_documents.channels_of(args.image), output.io_map_text)
+    return _show(args, io_documents.channels_of(_image_of(args)), output.io_map_text)
 
 
 def _io_init(args: argparse.Namespace) -> int:

@@ -75,7 +75,9 @@ class SymbolTable:
     `constants`: those that are not in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
     lose. `io`: devices and channels of inputs and outputs (`compiler/io_configuration.py`), empty for none. `bounds`:
     what the code checks. `unkept`: variables of function blocks, by the name of the block, that live in registers.
-    `stack`: what the deepest calls of a task need; None in a file of a version that did not say."""
+    `stack`: what the deepest calls of a task need; None in a file of a version that did not say. `made_of`: the
+    fingerprint of sources and options (`cli/fresh_image.py`), empty if `build` did not write the file. `internal`: the
+    variables of blocks of the standard library that are neither inputs nor outputs, by the name of the block."""
 
     image_crc: int
     target: str
@@ -94,6 +96,8 @@ class SymbolTable:
     bounds: list[BoundsCheck] = field(default_factory=list)
     unkept: dict[str, list[str]] = field(default_factory=dict)
     stack: Need | None = None
+    made_of: str = ""
+    internal: dict[str, list[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -293,6 +297,8 @@ class SymbolTable:
             "bounds": [check.to_list() for check in self.bounds],
             "stack": self.stack and {name: getattr(self.stack, name) for name in ("amount", "parts", "at_least")},
             "unkept": self.unkept,
+            "made_of": self.made_of,
+            "internal": self.internal,
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))
@@ -326,6 +332,8 @@ class SymbolTable:
                 [BoundsCheck.from_list(entry) for entry in document.get("bounds", [])],
                 document.get("unkept", {}),
                 _read_need(document.get("stack")),
+                document.get("made_of", ""),
+                document.get("internal", {}),
             )
         except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None
