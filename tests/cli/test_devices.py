@@ -101,7 +101,9 @@ def test_what_is_no_image_exits_2(tool: Any, plc: FakePlc, scratch: Path) -> Non
 
 
 def test_status_without_application(tool: Any, plc: FakePlc) -> None:
-    assert tool("status", *PORT, "--json").json == {"state": "none", "image_crc": None, "exception": None}
+    assert tool("status", *PORT, "--json").json == {
+        "state": "none", "image_crc": None, "exception": None, "program": None
+    }  # fmt: skip
     assert tool("status", *PORT).out == "state: none\n"
 
 
@@ -112,7 +114,22 @@ def test_a_crc_has_eight_digits(tool: Any, running: FakePlc, monkeypatch: pytest
 
 def test_status_of_a_running_program_has_the_crc_that_build_printed(tool: Any, running: FakePlc) -> None:
     document = tool("status", *PORT, "--json").json
-    assert document == {"state": "run", "image_crc": f"{running.crc:08X}", "exception": None}
+    assert (document["state"], document["image_crc"], document["exception"]) == ("run", f"{running.crc:08X}", None)
+
+
+def test_status_shows_name_and_version_of_the_program(tool: Any, running: FakePlc) -> None:
+    assert tool("status", *PORT, "--json").json["program"] == {"name": "demo", "version": "1.2"}
+    assert "program: demo 1.2\n" in tool("status", *PORT).out
+
+
+def test_status_of_a_firmware_without_application_information_leaves_the_program_out(
+    tool: Any, running: FakePlc, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    handlers = running._handlers()
+    del handlers[(lib.SG_APPLICATION, lib.SRV_APP_READ_APPLICATION_INFO)]
+    monkeypatch.setattr(running, "_handlers", lambda: handlers)
+    assert tool("status", *PORT, "--json").json["program"] is None
+    assert "program" not in tool("status", *PORT).out
 
 
 def test_status_after_an_exception_names_task_pou_file_and_line(tool: Any, running: FakePlc) -> None:
@@ -195,6 +212,18 @@ def test_scan_lists_the_devices(tool: Any, plc: FakePlc) -> None:
     assert found["node_name"] == "press-3"
     assert (found["device_name"], found["target"], found["address"]) == ("Fake controller", "cortex-m3", "0001")
     assert "press-3" in tool("scan", *PORT).out
+
+
+def test_a_long_scan_shows_state_and_program_of_each_device(tool: Any, running: FakePlc) -> None:
+    (found,) = tool("scan", "--long", *PORT, "--json").json["devices"]
+    assert (found["state"], found["program"], found["program_version"]) == ("run", "demo", "1.2")
+    assert "demo" in tool("scan", "--long", *PORT).out
+
+
+def test_a_long_scan_lists_a_device_that_wants_a_password(tool: Any, running: FakePlc) -> None:
+    running.password = b"x" * 32
+    (found,) = tool("scan", "--long", *PORT, "--json").json["devices"]
+    assert (found["node_name"], found["state"], found["program"]) == ("press-3", "password-needed", "")
 
 
 # ---- variables -------------------------------------------------------------------------------------------------------

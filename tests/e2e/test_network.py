@@ -276,6 +276,19 @@ def test_a_scan_by_broadcast_finds_all_devices(
         assert "is not the address of a device" in done.err
 
 
+def test_a_long_scan_by_broadcast_shows_the_program_of_each_device(
+    plcrt: Plcrt, tmp_path: Path, tool: Any, eventually: Callable[..., Any], counter: Path
+) -> None:
+    def states() -> set[tuple[str, str]]:
+        done = tool("scan", "--long", "--udp", "127.255.255.255", "--json")
+        return {(device["place"], device["state"]) for device in done.json["devices"]} if done.status == 0 else set()
+
+    with Plcrt(tmp_path / "second.flash", "--udp", f"{_own_loopback()}:3") as second:
+        with plctool.connect(f"udp:{plcrt.udp}") as plc:
+            plc.flash(counter)
+        eventually(lambda: {(plcrt.udp, "run"), (second.udp, "none")} <= states())
+
+
 def test_a_connection_through_a_forwarded_port_works(plcrt: Plcrt, counter: Path) -> None:
     """As with NAT: the device sees another peer address than the tool has."""
     host, port = plcrt.tcp.split(":")

@@ -228,7 +228,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     )  # fmt: skip
     _add_link(flash)
 
-    _add_link(command("scan", "list the devices that answer; without a link, on all serial ports"))
+    scan = command("scan", "list the devices that answer; without a link, on all serial ports")
+    scan.add_argument("--long", action="store_true", help="also show the state and the program of each device")
+    _add_link(scan)
     _add_link(command("status", "show the state of the program"))
     _add_link(command("start", "start the program"))
     _add_link(command("stop", "stop the program"))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ from plctool.cli import io_documents
 from plctool.cli.io_documents import Document
 from plctool.cli.overwriting import check_not_read, check_output
 from plctool.cli.plants import attached, files_of_plant, plan_faults
-from plctool.errors import EXIT_INTERRUPTED, LinkError, PlcError, UsageError
+from plctool.errors import EXIT_INTERRUPTED, DeviceError, LinkError, PlcError, UsageError
 from plctool.files import STDOUT, read_image, write_atomically, write_output
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from plctool.debug.symbols import SymbolTable
     from plctool.device import Plc
     from plctool.io.faults import Fault
+    from plctool.link.names import Node
     from plctool.link.transports import Link
     from plctool.port_check import Outcome
     from plctool.port_check import Report as PortReport
@@ -513,13 +514,13 @@ def flash_several(
     return {"devices": devices}, errors
 
 
-def start(plc: Controller) -> Document:
+def start(plc: Plc) -> Document:
     """Starts the program; the state that it leads to."""
     plc.start()
     return status(plc)
 
 
-def stop(plc: Controller) -> Document:
+def stop(plc: Plc) -> Document:
     """Stops the program; the state that it leads to."""
     plc.stop()
     return status(plc)
@@ -531,15 +532,24 @@ def cycle(plc: Plc) -> Document:
     return status(plc)
 
 
-def reset(plc: Controller, option: str) -> Document:
+def reset(plc: Plc, option: str) -> Document:
     """Resets the program; the state that it leads to."""
     plc.reset(option)
     return status(plc)
 
 
-def status(plc: Controller) -> Document:
-    """What the program does."""
-    return status_document(plc.status())
+def status(plc: Plc) -> Document:
+    """Returns the state of the program, with the name and version that plc.toml gave it."""
+    status = plc.status()
+    return status_document(status) | {"program": _program(plc) if status.image_crc else None}
+
+
+def _program(plc: Plc) -> Document | None:
+    """Returns name and version of the program; None from a firmware without application information."""
+    with suppress(DeviceError):
+        info = plc.info()
+        return {"name": info.get("project", ""), "version": info.get("version", "")}
+    return None
 
 
 def status_document(status: PlcStatus) -> Document:
@@ -615,19 +625,20 @@ def log(plc: Controller) -> Document:
 # ---- on a link -------------------------------------------------------------------------------------------------------
 
 
-def scan(link: Link, gateway: bool | None, tool: str) -> Document:
-    """The controllers that answer on a link. Raises LinkError when there are none."""
-    return {"devices": _scan(link, gateway, tool)}
+def scan(link: Link, gateway: bool | None, tool: str, long: bool = False) -> Document:
+    """Returns the controllers that answer on a link; if `long`, with what each of them runs. Raises LinkError when
+    there are none."""
+    return {"devices": _scan(link, gateway, tool, long)}
 
 
-def scan_all(links: Sequence[Link], gateway: bool | None, tool: str) -> Document:
-    """The controllers that answer on any of the links, which are asked at the same time, each with its link. Raises
+def scan_all(links: Sequence[Link], gateway: bool | None, tool: str, long: bool = False) -> Document:
+    """Returns the same for several links, which are asked at the same time, each device with its link. Raises
     LinkError when there are none, with the reason of each link."""
     from concurrent.futures import ThreadPoolExecutor
 
     def ask(link: Link) -> list[Document] | LinkError:
         try:
-            return [{"link": f"{link.scheme}:{link.place}", **found} for found in _scan(link, gateway, tool)]
+            return [{"link": f"{link.scheme}:{link.place}", **found} for found in _scan(link, gateway, tool, long)]
         except LinkError as error:
             return error
 
@@ -640,7 +651,7 @@ def scan_all(links: Sequence[Link], gateway: bool | None, tool: str) -> Document
     return {"devices": devices}
 
 
-def _scan(link: Link, gateway: bool | None, tool: str) -> list[Document]:
+def _scan(link: Link, gateway: bool | None, tool: str, long: bool) -> list[Document]:
     from plctool.device import scan as nodes_on
     from plctool.image.file import target_name
 
@@ -654,9 +665,31 @@ def _scan(link: Link, gateway: bool | None, tool: str) -> list[Document]:
             "version": node.version,
             "serial_number": node.serial_number,
             **({"place": node.place} if node.place else {}),
+            **(_runs_on(link, node, gateway, tool) if long else {}),
         }
         for node in nodes_on(link, gateway=gateway, tool=tool)
     ]
+
+
+def _runs_on(link: Link, node: Node, gateway: bool | None, tool: str) -> Document:
+    """Returns the state of a device and its program. A device that does not say gives the reason in place of its
+    state, so that the others are listed."""
+    from plctool.device import connect
+
+    try:
+        with connect(_link_to(link, node), gateway=gateway, tool=tool) as plc:
+            found = status(plc)
+    except PlcError as error:
+        return {"state": error.code, "program": "", "program_version": ""}
+    program = found["program"] or {"name": "", "version": ""}
+    return {"state": found["state"], "program": program["name"], "program_version": program["version"]}
+
+
+def _link_to(link: Link, node: Node) -> Link:
+    """Returns the link to one of the devices that a scan of `link` found."""
+    if link.nodes is not None:
+        return link.of_node(str(int.from_bytes(node.address, "big")))
+    return replace(link, place=node.place) if node.place else link
 
 
 def watch(

@@ -377,9 +377,9 @@ class _Progress:
 def _scan(args: argparse.Namespace) -> int:
     link = find_link(args)
     if link is None:
-        document = documents.scan_all(all_serial_ports(args), _gateway_wanted(args), _me(args))
+        document = documents.scan_all(all_serial_ports(args), _gateway_wanted(args), _me(args), args.long)
     else:
-        document = documents.scan(link, _gateway_wanted(args), _me(args))
+        document = documents.scan(link, _gateway_wanted(args), _me(args), args.long)
     return _show(args, document, lambda d: output.table(d["devices"], d["devices"][0]))
 
 

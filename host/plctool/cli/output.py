@@ -209,6 +209,8 @@ def tasks_text(document: dict[str, Any]) -> str:
 
 def status_text(document: dict[str, Any]) -> str:
     lines = [f"state: {document['state']}"]
+    if program := document.get("program"):
+        lines.append(f"program: {' '.join(filter(None, program.values()))}")
     if document["image_crc"]:
         lines.append(f"image: {document['image_crc']}")
     if exception := document["exception"]:
