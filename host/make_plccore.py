@@ -48,7 +48,11 @@ def preprocess(cc: str, include: list[str], *flags: str) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cc", required=True, help="the C compiler, for its preprocessor; with ccache in front of it if meson found one")
+    parser.add_argument(
+        "--cc",
+        required=True,
+        help="the C compiler, for its preprocessor; with ccache in front of it if meson found one",
+    )
     parser.add_argument("--include", nargs="+", required=True, help="where the shared headers are")
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--depfile", type=Path, required=True, help="for the build system: the headers that were read")

@@ -6,11 +6,13 @@ import csv
 import io
 from collections.abc import Iterator, Sequence
 from math import ceil
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from plctool.core import lib
-from plctool.debug.variables import ClassType, Symbol
-from plctool.sim import Simulator
+from plctool.debug.variables import ClassType, Reading, Symbol
+
+if TYPE_CHECKING:
+    from plctool.sim import Simulator
 
 _STEP_MS = 10  # between two lines if the first task is not cyclic
 
@@ -22,11 +24,9 @@ def trace_csv(plc: Simulator, names: Sequence[str], cycles: int | None, time_ms:
     has stopped with an exception."""
     table = plc.symbols()
     columns = table.scalars(names)
-    yield _line(["time_ms", *columns])
+    yield csv_line(["time_ms", *columns])
     for _ in _cycles(plc, cycles or 1) if time_ms is None else _intervals(plc, time_ms):
-        reading = plc.sample_symbols(table, columns)
-        cells = map(_cell, columns.values(), *(x.values() for x in (reading.contents, reading.values, reading.texts)))
-        yield _line([f"{plc.now_ns / 1e6:.10g}", *cells])
+        yield csv_line([f"{plc.now_ns / 1e6:.10g}", *csv_cells(plc.sample_symbols(table, columns))])
         if plc.raw_status().exception:
             return
 
@@ -49,7 +49,14 @@ def _intervals(plc: Simulator, time_ms: float) -> Iterator[None]:
         yield
 
 
-def _line(cells: Sequence[str]) -> str:
+def csv_cells(reading: Reading) -> Iterator[str]:
+    """Returns the values of a reading, a cell each."""
+    parts = (reading.symbols, reading.contents, reading.values, reading.texts)
+    return map(_cell, *(part.values() for part in parts))
+
+
+def csv_line(cells: Sequence[str]) -> str:
+    """Returns a line of a CSV file."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(cells)
     return text.getvalue()

@@ -1,4 +1,4 @@
-"""`flash`, `info`, `symbols`, `io map`, `image` and `bench` take a project, and build it first if its image is stale."""
+"""`flash`, `info`, `symbols`, `io map`, `image` and `bench` take a project and build it first if it is stale."""
 
 from __future__ import annotations
 

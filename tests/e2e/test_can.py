@@ -102,9 +102,7 @@ def test_a_scan_lists_all_devices(hub: CanHub, tool: Any, eventually: Callable[.
 
 def test_a_long_scan_asks_each_device(hub: CanHub, tool: Any, eventually: Callable[..., Any]) -> None:
     expected = {(name, "none") for name in NODES.values()}
-    eventually(
-        lambda: {(d["node_name"], d["state"]) for d in devices(tool, "--long", *options_of(hub, 0))} == expected
-    )
+    eventually(lambda: {(d["node_name"], d["state"]) for d in devices(tool, "--long", *options_of(hub, 0))} == expected)
 
 
 def test_a_device_is_chosen_by_number_or_name(hub: CanHub) -> None:

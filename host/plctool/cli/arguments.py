@@ -287,6 +287,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_names(watch)
     watch.add_argument("--interval", type=_seconds, default=DEFAULT_INTERVAL, metavar="S", help="seconds; default: 0.5")
     watch.add_argument("--count", type=_count, metavar="N", help="readings; default: until Ctrl-C")
+    watch.add_argument(
+        "--csv", type=usable_path, metavar="FILE", help="write a line a reading to this file, - for the standard output"
+    )
     _add_link(watch, symbols=True)
 
     gateway = command("gateway", "show or end the processes that share a serial line among tools")
@@ -413,7 +416,7 @@ def _add_build_options(parser: argparse.ArgumentParser) -> None:
 def _add_image(parser: argparse.ArgumentParser, built: str = "which is built first if it has changed") -> None:
     parser.add_argument(
         "image", type=usable_path, nargs="?", metavar="IMAGE|PROJECT",
-        help=f"what 'plctool build' wrote, or a project, {built}; default: the project of the current folder (plc.toml)",
+        help=f"what 'plctool build' wrote, or a project, {built}; default: the project of this folder (plc.toml)",
     )  # fmt: skip
 
 

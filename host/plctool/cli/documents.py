@@ -695,10 +695,29 @@ def _link_to(link: Link, node: Node) -> Link:
 def watch(
     plc: Plc, names: Sequence[str], interval: float, count: int | None, waiting: Callable[[str], None]
 ) -> Iterator[tuple[Document, Texts]]:
-    """Readings, one after the other; see `Plc.watch`."""
-    for seconds, reading in plc.watch(names, interval, count, waiting):
+    """Readings, one after the other; see `Plc.watch`. What is named comes before what patterns match."""
+    for seconds, reading in plc.watch(_named_first(names), interval, count, waiting):
         document = {"time_s": round(seconds, 6), "values": reading.values, "consistent": reading.consistent}
         yield document, reading.texts
+
+
+def watch_csv(
+    plc: Plc, names: Sequence[str], interval: float, count: int | None, waiting: Callable[[str], None]
+) -> Iterator[str]:
+    """The same as lines of a CSV file: the names, then time and values. Structures and arrays have a column for each
+    value, as in the file of `run --trace`."""
+    from plctool.trace_file import csv_cells, csv_line
+
+    columns = list(plc.symbols().scalars(_named_first(names)))
+    yield csv_line(["time_s", *columns])
+    for seconds, reading in plc.watch(columns, interval, count, waiting):
+        yield csv_line([f"{seconds:.6f}", *csv_cells(reading)])
+
+
+def _named_first(names: Sequence[str]) -> list[str]:
+    from plctool.debug.symbols import is_pattern
+
+    return sorted(names, key=is_pattern)
 
 
 def port_check(

@@ -1,7 +1,7 @@
 """The image that a command on a project works with: built first if the program, the options or plctool have changed.
 
-The symbol file keeps a fingerprint of all that the image was made of. Modification times are not compared: a checkout, a
-copy or a deleted file changes them without the program, or the program without them.
+The symbol file keeps a fingerprint of all that the image was made of. Modification times are not compared: a checkout
+changes them without the program, a deleted file the program without them.
 """
 
 from __future__ import annotations

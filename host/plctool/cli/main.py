@@ -9,7 +9,7 @@ import os
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import redirect_stdout, suppress
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -199,7 +199,9 @@ def _export_itf(args: argparse.Namespace) -> int:
 
 
 def _bench(args: argparse.Namespace) -> int:
-    return _show(args, documents.bench(_program_to_run(args), args.cycles), lambda d: output.table(d["tasks"], d["tasks"][0]))
+    return _show(
+        args, documents.bench(_program_to_run(args), args.cycles), lambda d: output.table(d["tasks"], d["tasks"][0])
+    )
 
 
 def _completion(args: argparse.Namespace) -> int:
@@ -510,6 +512,8 @@ def _write(args: argparse.Namespace) -> int:
 
 
 def _watch(args: argparse.Namespace) -> int:
+    if args.csv is not None:
+        return _watch_csv(args)
     if args.json:
         return _watch_json(args)
     if sys.stdout.isatty():
@@ -538,18 +542,31 @@ def _watch_json(args: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-def _watch_live(args: argparse.Namespace) -> int:
-    from rich.live import Live
-    from rich.table import Table
-    from rich.text import Text
+def _watch_csv(args: argparse.Namespace) -> int:
+    """A line a reading, each at once, until the count is reached or Ctrl-C."""
+    from plctool.cli.overwriting import check_output
 
-    with _connect(args) as plc, Live(auto_refresh=False) as live:
-        waiting = lambda reason: live.console.print(f"plctool: {reason}", markup=False)  # noqa: E731
-        for sample, texts in _samples(args, plc, waiting):
-            table = Table("variable", "value", caption=f"{sample['time_s']:.1f} s, Ctrl-C ends")
-            for name, text in texts.items():
-                table.add_row(Text(name), Text(text))
-            live.update(table, refresh=True)
+    if args.json:
+        raise UsageError("--csv and --json are two formats; choose one.", "usage")
+    check_output(args.csv, (), "--csv values.csv")
+    with _connect(args) as plc, _written(args.csv) as file, suppress(KeyboardInterrupt):
+        for line in documents.watch_csv(plc, args.names, args.interval, args.count, _say_waiting):
+            file.write(line)
+            file.flush()
+    return EXIT_OK
+
+
+def _written(path: Path) -> AbstractContextManager[TextIO]:
+    """Opens a file that grows while the command runs, or the standard output."""
+    return nullcontext(sys.stdout) if path == STDOUT else path.open("w", encoding="utf-8")
+
+
+def _watch_live(args: argparse.Namespace) -> int:
+    from plctool.cli.live_table import LiveTable
+
+    with _connect(args) as plc, LiveTable().shown() as table:
+        for sample, texts in _samples(args, plc, lambda reason: table.say(f"plctool: {reason}")):
+            table.show(sample["time_s"], texts)
     return EXIT_OK
 
 

@@ -16,6 +16,7 @@ from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.io_configuration import assign_tasks, configuration_of, io_document
 from plctool.compiler.kept import kept_parts, kept_variables
+from plctool.compiler.library import is_standard
 from plctool.compiler.nesting import room_for_nesting
 from plctool.compiler.typed import External, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
 from plctool.core import lib
@@ -212,6 +213,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         linked.debug,
         bounds=lowered.bounds,
         unkept=_unkept(lowered),
+        internal=_internal(lowered),
     )
     # Without the variables that are not in memory the types are others than those of the program.
     return SymbolTable.from_json(table.to_json()) if table.unkept else table
@@ -225,6 +227,18 @@ def _unkept(lowered: Lowered) -> dict[str, list[str]]:
         offsets = {variable.offset for variable in variables}
         if offsets:
             found[pou.instance.name] = [f.name for f in pou.instance.fields if f.offset in offsets]
+    return found
+
+
+def _internal(lowered: Lowered) -> dict[str, list[str]]:
+    """The variables of blocks of the standard library that are not parameters, by the name of the block."""
+    found = {}
+    for pou in lowered.pous.values():
+        if pou.instance is not None and is_standard(pou.pos.file):
+            parameters = {parameter.variable.name for parameter in pou.parameters}
+            names = [f.name for f in pou.instance.fields if f.name not in parameters and "%" not in f.name]
+            if names:
+                found[pou.instance.name] = names
     return found
 
 

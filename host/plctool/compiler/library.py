@@ -149,6 +149,11 @@ def _exception_codes() -> str:
     return f"TYPE\n    ExceptionCode : ({values}) UDINT;\nEND_TYPE\n"
 
 
+def is_standard(path: str) -> bool:
+    """True for a source of the standard library."""
+    return any(source.path == path for source in standard_library().sources)
+
+
 @cache
 def standard_library() -> Library:
     """The library that comes with the tool."""

@@ -12,6 +12,7 @@ import re
 import zlib
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -161,6 +162,21 @@ class SymbolTable:
             if elements or not isinstance(symbol.type, ArrayType):
                 todo += list(symbol.parts())[::-1]
 
+    def _found(self, pattern: str) -> Iterator[Symbol]:
+        """Finds what a pattern matches, without the internal variables of standard blocks, such as START of a TON,
+        unless it spells the name of one."""
+        spelled = not is_pattern(pattern.strip().rpartition(".")[2])
+        return (symbol for symbol in self.find([pattern]) if spelled or not self._is_internal(symbol.name))
+
+    def _is_internal(self, name: str) -> bool:
+        """True for a variable of a standard block that is neither its input nor its output."""
+        instance, _, member = name.rpartition(".")
+        if not any(member in names for names in self.internal.values()):
+            return False
+        with suppress(UsageError):  # a program has no value of its own
+            return member in self.internal.get(self.resolve(instance).type.name, ())
+        return False
+
     def listed(self, patterns: Sequence[str]) -> list[Symbol]:
         """The same, with what names without * and ? stand for otherwise, such as channels. Raises UsageError for what
         matches nothing."""
@@ -189,7 +205,7 @@ class SymbolTable:
         return {name: symbol for name, symbol in found.items() if not isinstance(symbol.type, OpenArrayType)}
 
     def _matching(self, pattern: str) -> dict[str, Symbol]:
-        with_parts = (s for s in self.find([pattern]) if not isinstance(s.type, StructType))
+        with_parts = (s for s in self._found(pattern) if not isinstance(s.type, StructType))
         every = (shown(symbol, self._units) for symbol in with_parts)
         found = {s.name: s for s in every if not isinstance(s.type, OpenArrayType)}
         if not found:
