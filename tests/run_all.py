@@ -7,6 +7,9 @@ ends. The C tests of a folder, which are short, are one process: a `meson test`.
 
 C tests count as one test each; pytest suites are counted by their own tests, from the JUnit files they leave. What a
 process printed is in meson-logs/, and here if it failed.
+
+At the end the tests that failed run once more, one after the other, with nothing beside them. A test that passes then
+is listed as FLAKY and does not fail the run: a race is mended, but it does not cost the work that it came with.
 """
 
 from __future__ import annotations
@@ -22,23 +25,25 @@ import time
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 C_TESTS_SECONDS = 60  # of one folder, about
 SKIPPED = 77  # exit status, as for meson: there was nothing that could be tested
 LOOK_EVERY = 0.02  # for processes that ended [s]
+MOST_REPEATED = 8  # tests that failed; if there are more, the change has broken something
 
 
 @dataclass
 class Outcome:
     """Of some tests: their number by outcome, and the first line of each failure, and of the reason of each skip, after
-    the name of the test."""
+    the name of the test. `failed`: the arguments with which the runner of the tests repeats those that failed."""
 
     counts: Counter[str]
     failures: list[str]
     skips: list[str]
+    failed: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -130,7 +135,21 @@ def pytest_outcome(report: Path) -> Outcome:
         ]
 
     counts = Counter(passed=total - failed - skipped, failed=failed, skipped=skipped)
-    return Outcome(counts, messages("failure", "error"), messages("skipped"))
+    wrong = [
+        case for case in suite.iter("testcase") if case.find("failure") is not None or case.find("error") is not None
+    ]
+    names = dict.fromkeys(_node_id(case.get("classname", ""), case.get("name", "")) for case in wrong)
+    return Outcome(counts, messages("failure", "error"), messages("skipped"), list(names))
+
+
+def _node_id(classname: str, name: str) -> str:
+    """Returns what pytest takes to run one test: `tests.cli.test_x.TestY` and `test_z` are of tests/cli/test_x.py."""
+    parts = classname.split(".")
+    for end in range(len(parts), 0, -1):
+        file = Path(*parts[:end]).with_suffix(".py")
+        if (ROOT / file).is_file():
+            return "::".join([str(file), *parts[end:], name])
+    return name
 
 
 def meson_outcome(log: Path) -> Outcome:
@@ -140,7 +159,8 @@ def meson_outcome(log: Path) -> Outcome:
     failures = [f"{t['name']}: {t['result']}" for t, o in zip(tests, outcomes, strict=True) if o == "failed"]
     skipped = [t for t, o in zip(tests, outcomes, strict=True) if o == "skipped"]
     skips = [f"{t['name']}: {_first_line(t.get('stdout', '') + t.get('stderr', ''))}" for t in skipped]
-    return Outcome(Counter(outcomes), failures, skips)
+    failed = [t["name"].rpartition(":")[2] for t, o in zip(tests, outcomes, strict=True) if o == "failed"]
+    return Outcome(Counter(outcomes), failures, skips, failed)
 
 
 def jobs_of(meson: str, build: Path) -> Iterator[Job]:
@@ -158,6 +178,26 @@ def jobs_of(meson: str, build: Path) -> Iterator[Job]:
                 f"{build.name} {name}", test["cmd"], test["priority"], test["timeout"],
                 reports / f"{name}.xml", logs / f"{name}.txt", test["workdir"], test["env"],
             )  # fmt: skip
+
+
+def repetition(done: Done) -> Job:
+    """Returns the job that repeats the tests of a job which failed; all of them if it does not say which."""
+    job, failed = done.job, done.outcome.failed
+    if not failed:
+        return job
+    if job.report.suffix != ".xml":
+        return replace(job, command=[*job.command[: job.command.index("--suite")], *failed])
+    module = job.command.index("pytest") + 1
+    report = job.report.with_stem(f"{job.report.stem}-again")
+    return replace(job, command=[*job.command[:module], *failed, f"--junit-xml={report}"], report=report)
+
+
+def repeat(failed: Iterable[Done]) -> Iterator[tuple[Done, bool]]:
+    """Runs the tests that failed once more, one job after the other; gives each job, and whether it passed now."""
+    for done in failed:
+        job = repetition(done)
+        (again,) = run([replace(job, output=job.output.with_stem(f"{job.output.stem}-again"))], 1)
+        yield done, again.is_good
 
 
 def run(jobs: Iterable[Job], at_once: int) -> Iterator[Done]:
@@ -196,7 +236,8 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # tests send it; `make test &` would have it ignored
     jobs = [job for build in args.builds for job in jobs_of(args.meson, build.resolve())]
     jobs.sort(key=lambda job: -job.seconds)
-    begin, used, counts, lines, status = time.monotonic(), 0.0, Counter[str](), list[str](), 0
+    begin, used, counts, lines, failed = time.monotonic(), 0.0, Counter[str](), list[str](), list[Done]()
+    broken: dict[str, list[str]] = {}
     for number, done in enumerate(run(jobs, args.jobs), 1):
         outcome = done.outcome
         result = "ok" if done.is_good else "failed"
@@ -206,15 +247,24 @@ def main() -> int:
         )
         if not done.is_good:
             print(done.job.output.read_text(errors="replace"), flush=True)
-        status |= not done.is_good
+            failed.append(done)
         used += done.used
         counts += outcome.counts
         lines += [f"SKIPPED {done.job.name}: {skip}" for skip in outcome.skips]
-        lines += [f"FAILED {done.job.name}: {failure}" for failure in outcome.failures]
+        if done.is_good:
+            continue
+        broken[done.job.name] = [f"{done.job.name}: {failure}" for failure in outcome.failures]
+    if sum(map(len, broken.values())) <= MOST_REPEATED:
+        for done, passed in repeat(failed):
+            if passed:
+                flaky = broken.pop(done.job.name)
+                lines += [f"FLAKY {failure}" for failure in flaky]
+                counts += Counter(passed=len(flaky), flaky=len(flaky), failed=-len(flaky))
+    lines += [f"FAILED {failure}" for failures in broken.values() for failure in failures]
     print(*sorted(lines, reverse=True), sep="\n")
     print(f"{time.monotonic() - begin:.0f} s, {used:.0f} s of processors")
-    print(f"{counts['passed']} passed, {counts['failed']} failed, {counts['skipped']} skipped")
-    return status
+    print(f"{counts['passed']} passed, {counts['failed']} failed, {counts['skipped']} skipped, {counts['flaky']} flaky")
+    return 1 if broken else 0
 
 
 if __name__ == "__main__":

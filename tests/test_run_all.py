@@ -1,0 +1,71 @@
+"""`make test` repeats what failed, alone, and does not call a test broken that passes then."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from run_all import ROOT, Done, Job, repeat, repetition, run
+
+FOLDER = ROOT / "tests" / "c"  # below tests, but in none of the suites that run beside this one
+
+
+@pytest.fixture
+def test_file() -> Iterator[Path]:
+    """A file among the tests, so that pytest names its tests as it names those of the repository."""
+    file = FOLDER / "test_made_by_test_run_all.py"
+    yield file
+    file.unlink(missing_ok=True)
+
+
+def job_of(test_file: Path, folder: Path) -> Job:
+    report = folder / "report.xml"
+    command = [sys.executable, "-m", "pytest", str(test_file), f"--junit-xml={report}"]
+    return Job("made", command, 1, 60.0, report, folder / "output.txt", str(ROOT))
+
+
+def failed_of(job: Job) -> Done:
+    (done,) = run([job], 1)
+    assert not done.is_good
+    return done
+
+
+def test_a_test_that_passes_alone_is_flaky(test_file: Path, tmp_path: Path) -> None:
+    marker = tmp_path / "marker"
+    test_file.write_text(
+        "import pathlib, pytest\n"
+        f"marker = pathlib.Path({str(marker)!r})\n"
+        "def test_good():\n    assert not marker.exists()\n"
+        "@pytest.mark.parametrize('x', ['a b', 'c[d]'])\n"
+        "def test_second_time(x):\n"
+        "    known = marker.read_text() if marker.exists() else ''\n"
+        "    marker.write_text(known + x)\n"
+        "    assert x in known\n"
+    )
+    done = failed_of(job_of(test_file, tmp_path))
+    assert len(done.outcome.failures) == 2
+    assert [passed for _, passed in repeat([done])] == [True]  # test_good would fail now: it is not repeated
+
+
+def test_a_test_that_fails_again_is_broken(test_file: Path, tmp_path: Path) -> None:
+    test_file.write_text("class TestIt:\n    def test_bad(self):\n        assert False\n")
+    done = failed_of(job_of(test_file, tmp_path))
+    assert done.outcome.failed == [f"{test_file.relative_to(ROOT)}::TestIt::test_bad"]
+    assert [passed for _, passed in repeat([done])] == [False]
+
+
+def test_a_job_that_does_not_say_what_failed_is_repeated_as_a_whole(test_file: Path, tmp_path: Path) -> None:
+    test_file.write_text("import os\nos._exit(3)\n")
+    done = failed_of(job_of(test_file, tmp_path))
+    assert repetition(done) == done.job
+
+
+def test_of_the_c_tests_those_that_failed_are_repeated_by_name(tmp_path: Path) -> None:
+    report = tmp_path / "testlog.json"
+    report.write_text(
+        '{"name": "c - plctool:app_life", "result": "OK"}\n{"name": "c - plctool:comm_srv", "result": "FAIL"}\n'
+    )
+    job = Job("build c", ["meson", "test", "-C", "build", "--suite", "c"], 1, 60.0, report, tmp_path / "c.txt")
+    assert repetition(Done(job, 1, 0.0, 0.0)).command == ["meson", "test", "-C", "build", "comm_srv"]
