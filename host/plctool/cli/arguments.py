@@ -103,6 +103,10 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     check.add_argument(
         "--missing", action="store_true", help="print one table: the names it needs of libraries of other systems"
     )
+    check.add_argument(
+        "--sarif", type=file_path, metavar="FILE", help="write a report for code scanning (SARIF) as well"
+    )
+    check.add_argument("--junit", type=file_path, metavar="FILE", help="write a report in JUnit's format as well")
     _add_warnings(check)
     _add_io_files(check)
 

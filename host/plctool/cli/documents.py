@@ -112,12 +112,41 @@ def new(folder: Path, template: str) -> Document:
     return {"folder": str(folder), "files": [str(file) for file in new_project(folder, template)]}
 
 
-def check(settings: Settings) -> tuple[Document, list[str]]:
+@dataclass(frozen=True)
+class CheckReports:
+    """The files that `check` writes for CI systems; None: not wanted."""
+
+    sarif: Path | None = None
+    junit: Path | None = None
+
+    def check_names(self, inputs: Iterator[Path]) -> None:
+        """Raises UsageError if a report would replace a file that is read, or one of another kind."""
+        read = list(inputs)
+        for file, option in ((self.sarif, "--sarif check.sarif"), (self.junit, "--junit check.xml")):
+            if file is not None and file.suffix.lower() != ".xml":
+                check_output(file, read, option)
+            elif file is not None:
+                check_not_read(file, read, option)
+
+    def write(self, diagnostics: Sequence[Diagnostic], files: Sequence[str] = ()) -> None:
+        """Writes those that are wanted; `files`: the sources that were checked."""
+        from plctool.cli.check_reports import junit, sarif
+
+        if self.sarif is not None:
+            write_atomically(self.sarif, sarif(diagnostics))
+        if self.junit is not None:
+            write_atomically(self.junit, junit(diagnostics, files))
+
+
+def check(settings: Settings, reports: CheckReports | None = None) -> tuple[Document, list[str]]:
     """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
     from plctool.compiler.diagnostics import render_all
     from plctool.compiler.missing_names import missing_names
 
-    diagnostics, _, shown = _checked(settings)
+    reports = reports or CheckReports()
+    reports.check_names(settings.every_file())
+    diagnostics, sources, shown = _checked(settings)
+    reports.write(diagnostics, [source.path for source in sources])
     document: Document = {"diagnostics": [diagnostic_document(d) for d in diagnostics]}
     if uses := _missing(diagnostics):
         document["missing"] = [_missing_document(m) for m in missing_names(uses)]

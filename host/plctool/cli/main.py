@@ -67,7 +67,7 @@ def _check(args: argparse.Namespace) -> int:
         document = documents.missing(settings)
         _show(args, document, output.missing_text)
         return EXIT_OK if all(name["stand_in"] for name in document["missing"]) else EXIT_USAGE
-    document, texts = documents.check(settings)
+    document, texts = documents.check(settings, documents.CheckReports(args.sarif, args.junit))
     _show(args, document, lambda d: output.coloured("\n".join(texts), sys.stdout))
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
 
