@@ -312,3 +312,11 @@ def test_names_that_c_cannot_have_are_reported(tool: Tool, name: str) -> None:
     done = tool("export-itf", "a.st")
     assert done.status == 2
     assert f"'{name}' cannot be the name of a function in C" in done.err
+
+
+def test_a_description_beside_a_file_of_functions_does_not_matter(tool: Tool, scratch: Path) -> None:
+    (scratch / "acmefn.st").write_text(
+        "{attribute 'external' := 'acme_fn'}\nFUNCTION AcmeFn : INT\nVAR_INPUT x : INT; END_VAR\nEND_FUNCTION\n"
+    )
+    (scratch / "main.io.toml").write_text('[sim]\nchannels = {"in" = {variable = "Main.x", type = "BOOL"}}\n')
+    assert tool("export-itf", "acmefn.st").status == 0

@@ -39,6 +39,7 @@ WITHOUT_RUNNING = (
     "make ",
     "python3 -m venv",
     "venv/bin/",
+    ". .venv/bin/activate",
     "sudo apt-get",
     "git clone",
     "cd ",

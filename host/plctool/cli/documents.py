@@ -203,7 +203,9 @@ def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
     from plctool.iec.dialect import find_dialect
 
     files, dialect = settings.files, find_dialect(settings.dialect)
-    sources, io, libraries = files.load_sources(), files.load_io(), files.load_libraries()
+    # A file of functions alone has not the programs that a description beside it names.
+    io = None if files.project is None and files.io.description is None else files.load_io()
+    sources, libraries = files.load_sources(), files.load_libraries()
     with bugs_reported():
         checked = check_sources(sources, io=io, libraries=libraries, dialect=dialect)
     if checked.program is None:
