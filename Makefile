@@ -2,6 +2,7 @@
 # make lint   style, types, words                    make bench  figures, side by side (ARGS="--programs DIR": more pairs)
 # make format gives C and Python their one style
 # make wheel  dist/*.whl for this kind of Linux and every Python from 3.11 on, tried in those that are here
+# make release  dist/ with the wheel, the sources, the firmware of all boards and their checksums
 # make size   flash and RAM of the bare-metal runtime, per component
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
@@ -20,16 +21,17 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # The bare-metal builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
 CORTEX_M := $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965 build-stm32f405))
 RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command -v qemu-system-riscv32),build-rv32imac))
-BUILDS := build build-sanitized $(CORTEX_M) $(RISC_V)
+BOARD_BUILDS := $(CORTEX_M) $(RISC_V)
+BUILDS := build build-sanitized $(BOARD_BUILDS)
 
-.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz properties habits all clean
+.PHONY: demo test test-vcan test-kernel lint format bench size wheel release run-release attack soak fuzz properties habits all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
 
 # A make of its own, so that BUILDS sees what bootstrapping has just installed.
-test all bench size: $(VENV)/dev
+test all bench size release: $(VENV)/dev
 	@$(MAKE) --no-print-directory run-$@
 
 run-test: run-all
@@ -79,6 +81,10 @@ wheel: $(VENV)/dev
 	$(BIN)/auditwheel repair --wheel-dir dist dist/local/*.whl
 	rm -r dist/local
 	$(BIN)/python tests/wheel.py dist/*.whl $(PYTHON) python3.11 python3.12 python3.13
+
+run-release: build/build.ninja $(patsubst %,%/build.ninja,$(BOARD_BUILDS)) wheel
+	ninja --quiet -C build
+	$(BIN)/python tests/release.py $(MESON) $(BOARD_BUILDS)
 
 ATTACKED := build$(if $(findstring --sanitized,$(ARGS)),-sanitized)
 

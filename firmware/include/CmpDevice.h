@@ -10,7 +10,7 @@
 
 #include "CmpItf.h"
 
-enum { RTS_VERSION = 0x00010000 }; /* of this runtime: bytes major.minor.patch.revision from the highest */
+enum { RTS_VERSION = 0x00020000 }; /* of this runtime: bytes major.minor.patch.revision from the highest */
 
 RTS_RESULT CmpDevice_Hook(CMP_HOOK hook);
 

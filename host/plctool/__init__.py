@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from plctool.device import Plc, connect, scan
     from plctool.sim import Simulator
 
+    __version__: str
+
 __all__ = [
     "DeviceError",
     "LinkError",
@@ -27,6 +29,7 @@ __all__ = [
     "ProgramStopped",
     "Simulator",
     "UsageError",
+    "__version__",
     "connect",
     "scan",
 ]
@@ -39,6 +42,14 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from plctool.version import plctool_version
+
+        return plctool_version()
     if name not in _HOMES:
         raise AttributeError(f"module 'plctool' has no attribute '{name}'")
     return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
