@@ -123,7 +123,17 @@ typedef struct {
     RTS_PFN function;
 } CMP_EXT_FUNCTION;
 
-/* Registers a static table of functions; called in CH_INIT3. ERR_NOMEMORY when CM_MAX_EXT_TABLES is reached. */
+typedef struct {
+    const CMP_EXT_FUNCTION *functions;
+    RTS_SIZE count;
+} CMP_EXT_TABLE;
+
+/* Registered tables. CmpList.h makes the room from the list of components. */
+extern CMP_EXT_TABLE cmp_ext_tables[];
+extern const RTS_SIZE cmp_ext_table_room;
+
+/* Registers a static table of functions; called in CH_INIT3. Each component of a port's list has room for one table;
+ * ERR_NOMEMORY when that and CM_OWN_EXT_TABLES are used up. */
 RTS_RESULT CMRegisterExternal(const CMP_EXT_FUNCTION *table, RTS_SIZE count);
 
 /* Finds a function by name; NULL when there is none. Signature and version are compared by the caller. */

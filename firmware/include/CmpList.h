@@ -11,9 +11,37 @@
  *   #define PORT_COMPONENTS(X) X(Board)  all others, which may use everything but the application and communication
  *
  * SysFoo has the hook SysFoo_Hook and the number CMPID_SysFoo. What is not chosen takes no flash.
+ *
+ * What components register in is sized here: a component of the runtime has the room that it needs, one of a port room
+ * for a table of external functions; CM_OWN_EXT_TABLES and SRV_OWN_GROUPS of rts_config.h are for more.
  */
 #include "CmpItf.h"
+#include "CmpSrv.h"
 #include "rts_config.h"
+
+/* A component that lacks another one, or its memory, would fail at start-up. */
+#if HAS_CmpIoMgrEmbedded
+#if IO_MAX_CONNECTORS == 0
+#error "HAS_CmpIoMgrEmbedded: set IO_MAX_CONNECTORS, the devices and buses of a program, in rts_config_port.h."
+#endif
+#elif HAS_CmpIoMgrSrv || HAS_IoDrvSim || HAS_IoDrvGpio || HAS_IoDrvModbus
+#error "HAS_CmpIoMgrSrv and each HAS_IoDrv... need HAS_CmpIoMgrEmbedded in cmp_list.c."
+#endif
+#if HAS_CmpEventMgrEmbedded && EVENT_MAX_CALLBACKS == 0
+#error "HAS_CmpEventMgrEmbedded: set EVENT_MAX_CALLBACKS, the callbacks of your components, in rts_config_port.h."
+#endif
+#if HAS_CmpUserMgr && !COMM_PASSWORD
+#error "HAS_CmpUserMgr: set COMM_PASSWORD to 1 in rts_config_port.h."
+#endif
+#if HAS_CmpFileTransfer && FILE_STORE_FILES == 0
+#error "HAS_CmpFileTransfer: set FILE_STORE_FILES and FILE_STORE_SIZE in rts_config_port.h."
+#endif
+#if HAS_CmpLogSrv && !HAS_CmpLog
+#error "HAS_CmpLogSrv needs HAS_CmpLog in cmp_list.c."
+#endif
+#if (HAS_CmpBlkDrvTcp || HAS_CmpBlkDrvUdp || HAS_CmpBlkDrvCan) && !COMM_ENDPOINTS
+#error "HAS_CmpBlkDrvTcp, ...Udp and ...Can: set COMM_ENDPOINTS to 1 in rts_config_port.h."
+#endif
 
 /* plctool has the facts of all boards here. A program of an operating system has none: they would be memory of it. */
 #if defined(BOARD_FACTS_ONLY) || (defined(BOARD_FLASH_SECTOR_SIZE) && !defined(__linux__))
@@ -36,6 +64,63 @@ const CMP_NAME cmp_names[] = {
 #include "CmpOrder.h"
 };
 #undef X
+
+/* ---- what they register in ---- */
+
+#define CMP_ONE(component) +1
+
+enum {
+    CMP_EXT_TABLE_ROOM = CM_OWN_EXT_TABLES
+#ifdef PORT_SYSTEM
+        PORT_SYSTEM(CMP_ONE)
+#endif
+#ifdef PORT_COMPONENTS
+            PORT_COMPONENTS(CMP_ONE)
+#endif
+                CMP_ONE(CmpIecTask)
+#if HAS_CmpRetain
+                    CMP_ONE(CmpRetain)
+#endif
+#if HAS_CmpMath
+                        CMP_ONE(CmpMath)
+#endif
+#if HAS_IoDrvModbus
+                            CMP_ONE(IoDrvModbus)
+#endif
+};
+
+CMP_EXT_TABLE cmp_ext_tables[CMP_EXT_TABLE_ROOM];
+const RTS_SIZE cmp_ext_table_room = CMP_EXT_TABLE_ROOM;
+
+#if HAS_COMMUNICATION
+enum {
+    SRV_GROUP_ROOM = SRV_OWN_GROUPS CMP_ONE(CmpAppSrv) CMP_ONE(CmpDevice)
+#if SRV_OTHER_CLIENTS
+        CMP_ONE(CmpDevice) /* settings */
+#endif
+#if HAS_CmpLogSrv
+    CMP_ONE(CmpLogSrv)
+#endif
+#if HAS_CmpMonitor2
+        CMP_ONE(CmpMonitor2)
+#endif
+#if HAS_CmpIoMgrSrv
+            CMP_ONE(CmpIoMgrSrv)
+#endif
+#if HAS_CmpUserMgr
+                CMP_ONE(CmpUserMgr)
+#endif
+#if HAS_CmpPlcShell
+                    CMP_ONE(CmpPlcShell)
+#endif
+#if HAS_CmpFileTransfer
+                        CMP_ONE(CmpFileTransfer)
+#endif
+};
+
+SRV_GROUP srv_groups[SRV_GROUP_ROOM];
+const RTS_SIZE srv_group_room = SRV_GROUP_ROOM;
+#endif
 
 #ifdef HAS_CmpPlcShell
 extern const struct BLK_COUNTERS BlkDrvComCounters, BlkDrvCanCounters, BlkDrvTcpCounters, BlkDrvUdpCounters;

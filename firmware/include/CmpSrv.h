@@ -42,7 +42,17 @@ typedef struct {
     SRV_HANDLER handler;
 } SRV_SERVICE;
 
-/* ERR_NOMEMORY above SRV_MAX_GROUPS. `services` must stay valid. */
+typedef struct {
+    const SRV_SERVICE *services;
+    RTS_SIZE count;
+    RTS_UI16 group;
+} SRV_GROUP;
+
+/* Registered groups. CmpList.h makes the room from the list of components. */
+extern SRV_GROUP srv_groups[];
+extern const RTS_SIZE srv_group_room;
+
+/* `services` must stay valid. ERR_NOMEMORY when the groups of a port's own components exceed SRV_OWN_GROUPS. */
 RTS_RESULT SrvRegisterGroup(RTS_UI16 group, const SRV_SERVICE *services, RTS_SIZE count);
 
 /* Handles one message of a client and returns the size of the reply in `reply`; 0 when the header is invalid, so that

@@ -35,7 +35,7 @@ typedef enum {
  * NULL. */
 typedef void (*PF_CYCLE_PHASE)(RTS_UI32 task, const IEC_CONTEXT *context);
 
-/* From main, in CH_INIT3. ERR_NOMEMORY when CYCLE_MAX_PHASES are registered. */
+/* From main, in CH_INIT3. ERR_NOMEMORY when CYCLE_MAX_PHASES are registered: raise CYCLE_OWN_PHASES. */
 RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run);
 
 /*

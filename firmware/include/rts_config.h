@@ -245,19 +245,25 @@
 #define RTS_STARTS_ONCE 0
 #endif
 
-/* Tables of external functions that components may register; two words each. */
-#ifndef CM_MAX_EXT_TABLES
-#define CM_MAX_EXT_TABLES (4 + (MODBUS_MAX_CALLS > 0))
+/* Tables of external functions beyond those that CmpList.h counts: one of each component in PORT_SYSTEM and
+ * PORT_COMPONENTS, and all of the runtime's own components. Two words each. */
+#ifndef CM_OWN_EXT_TABLES
+#define CM_OWN_EXT_TABLES 0
 #endif
 
-/* Phases of the cycle of every task that components may register (CyclePhases.h); two words each. 0: none. */
+/* Phases of the cycle of every task that components of a port may register (CyclePhases.h), and with those of the I/O
+ * manager all there may be; two words each. CYCLE_MAX_PHASES 0: none. */
+#ifndef CYCLE_OWN_PHASES
+#define CYCLE_OWN_PHASES 4
+#endif
 #ifndef CYCLE_MAX_PHASES
-#define CYCLE_MAX_PHASES 8
+#define CYCLE_MAX_PHASES (CYCLE_OWN_PHASES + (IO_MAX_CONNECTORS > 0 ? 3 : 0))
 #endif
 
-/* Event callbacks that may be registered; five words each. 0: the application sends no events. */
+/* Event callbacks that may be registered, all for components of a port; five words each. 0: the application sends no
+ * events. */
 #ifndef EVENT_MAX_CALLBACKS
-#define EVENT_MAX_CALLBACKS 4
+#define EVENT_MAX_CALLBACKS 8
 #endif
 
 /* External events that may be registered; one word each. 0: a program with a task that waits for one is refused. */
@@ -514,9 +520,10 @@
 #define FILE_STORE_SIZE 0u
 #endif
 
-/* Service groups of layer 7; three words each. */
-#ifndef SRV_MAX_GROUPS
-#define SRV_MAX_GROUPS 8
+/* Service groups of layer 7 that components of a port may register, beyond those of the runtime, which CmpList.h
+ * counts; three words each. */
+#ifndef SRV_OWN_GROUPS
+#define SRV_OWN_GROUPS 1
 #endif
 
 /* Services that only inform about the application (its name and list, its tasks), the room on the stack, and the echo

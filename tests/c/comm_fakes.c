@@ -39,6 +39,9 @@
 
 FAKES fakes;
 
+SRV_GROUP srv_groups[10];
+const RTS_SIZE srv_group_room = RTS_COUNT(srv_groups);
+
 /* ---- system ---- */
 
 RTS_UI32 SysTimeGetMs(void)

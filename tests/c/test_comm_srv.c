@@ -343,11 +343,12 @@ static void components_start_and_end_without_error(void)
 
 static void a_full_group_table_is_an_error(void)
 {
+    static const SRV_SERVICE service;
     RTS_RESULT result = ERR_OK;
 
     fakes_start();
     for (int i = 0; i < 100 && result == ERR_OK; i++)
-        result = SrvRegisterGroup(0x100, NULL, 0);
+        result = SrvRegisterGroup(0x100, &service, 1);
     CHECK_EQUAL(result, ERR_NOMEMORY);
 }
 

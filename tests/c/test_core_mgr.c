@@ -17,6 +17,8 @@
 #define cmp_hooks test_hooks
 #define cmp_names test_names
 #define cmp_component_count test_component_count
+#define cmp_ext_tables test_ext_tables
+#define cmp_ext_table_room test_ext_table_room
 #include "../../firmware/src/core/CmpMgr.c"
 
 #include "test.h"
@@ -52,6 +54,8 @@ static RTS_RESULT hook_c(CMP_HOOK hook)
 const PF_HOOK_FUNCTION test_hooks[] = {hook_a, hook_b, hook_c};
 const CMP_NAME test_names[] = {{1000, "A"}, {1001, "B"}, {1002, "C"}};
 const RTS_SIZE test_component_count = 3;
+CMP_EXT_TABLE test_ext_tables[3];
+const RTS_SIZE test_ext_table_room = RTS_COUNT(test_ext_tables);
 
 static void begin(char name, CMP_HOOK hook)
 {
@@ -134,11 +138,11 @@ static void external_functions_are_found_by_name(void)
 static void tables_are_limited_and_forgotten_at_start_up(void)
 {
     static const CMP_EXT_FUNCTION table[] = {{"one", 1, 0x10000, some_function}};
-    int i;
+    RTS_SIZE i;
 
     begin(0, 0);
     CHECK_EQUAL(CMInit(), ERR_OK);
-    for (i = 0; i < CM_MAX_EXT_TABLES; i++)
+    for (i = 0; i < cmp_ext_table_room; i++)
         CHECK_EQUAL(CMRegisterExternal(table, 1), ERR_OK);
     CHECK_EQUAL(CMRegisterExternal(table, 1), ERR_NOMEMORY);
     CHECK_EQUAL(CMInit(), ERR_OK);

@@ -31,7 +31,7 @@ def _components(path: Path) -> list[str]:
     assert compiler, "this test needs a C compiler: install gcc or clang"
     include = [FIRMWARE / folder for folder in ("include", "port/baremetal/common", "port/sim")]
     done = subprocess.run(
-        [compiler, "-E", "-P", "-std=c99", *(f"-I{folder}" for folder in include), path],
+        [compiler, "-E", "-P", "-std=c99", "-DCOMM_ENDPOINTS=1", *(f"-I{folder}" for folder in include), path],
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     return re.findall(r'"(\w+)"', done.stdout[done.stdout.index("cmp_names[] =") :])

@@ -24,7 +24,10 @@
 #define COMM_MAX_CLIENTS 4
 #define COMM_PASSWORD 1
 #define COMM_ENDPOINTS 1
-#define SRV_MAX_GROUPS 10
+#define CM_OWN_EXT_TABLES 8
+#define SRV_OWN_GROUPS 8
+#define CYCLE_OWN_PHASES 16
+#define EVENT_MAX_CALLBACKS 64
 #define SRV_OTHER_CLIENTS 1
 #define SRV_NETWORKS 8
 #define TCP_BUFFER_SIZE 16384
@@ -42,7 +45,7 @@
 #define SCHED_PROCESSOR_TIME 1
 
 /* plcrt --event */
-#define SCHED_MAX_EXTERNAL_EVENTS 8
+#define SCHED_MAX_EXTERNAL_EVENTS 16
 
 /* What images are built for. */
 #if defined(__x86_64__)

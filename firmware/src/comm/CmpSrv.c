@@ -17,17 +17,6 @@
 /* The validation bit, set in every session id we give. */
 #define SESSION_VALID 0x80000000u
 
-typedef struct {
-    const SRV_SERVICE *services;
-    RTS_SIZE count;
-    RTS_UI16 group;
-} SRV_GROUP;
-
-static struct {
-    RTS_SIZE group_count;
-    SRV_GROUP groups[SRV_MAX_GROUPS];
-} srv;
-
 /* ---- session ---- */
 
 static bool is_session(const COMM_CLIENT *client, RTS_UI32 id)
@@ -88,20 +77,24 @@ void SrvEndAppSession(COMM_CLIENT *client)
 
 RTS_RESULT SrvRegisterGroup(RTS_UI16 group, const SRV_SERVICE *services, RTS_SIZE count)
 {
-    if (srv.group_count >= SRV_MAX_GROUPS)
-        return ERR_NOMEMORY;
-    SRV_GROUP *place = &srv.groups[srv.group_count++];
-    place->group = group;
-    place->services = services;
-    place->count = count;
-    return ERR_OK;
+    SRV_GROUP *place;
+
+    for (place = srv_groups; place < srv_groups + srv_group_room; place++) {
+        if (place->services == NULL) {
+            *place = (SRV_GROUP){services, count, group};
+            return ERR_OK;
+        }
+    }
+    return ERR_NOMEMORY;
 }
 
 static const SRV_GROUP *find_group(RTS_UI16 group)
 {
-    for (RTS_SIZE i = 0; i < srv.group_count; i++)
-        if (srv.groups[i].group == group)
-            return &srv.groups[i];
+    const SRV_GROUP *place;
+
+    for (place = srv_groups; place < srv_groups + srv_group_room; place++)
+        if (place->group == group)
+            return place;
     return NULL;
 }
 
@@ -200,8 +193,8 @@ RTS_NOINLINE RTS_UI32 SrvHandleMessage(COMM_CLIENT *client, const RTS_UI8 *messa
 
 RTS_RESULT CmpSrv_Hook(CMP_HOOK hook)
 {
-    if (hook == CH_INIT)
-        CMP_CLEAR(srv);
+    if (hook == CH_INIT && !RTS_STARTS_ONCE)
+        memset(srv_groups, 0, srv_group_room * sizeof srv_groups[0]);
     else if (hook == CH_INIT3 && (COMM_ENDPOINTS || COMM_PASSWORD) && !SysTargetHasGenerator())
         LogAdd(CMPID_CmpSrv, LOG_WARNING, ERR_OK, "No random generator: ids and challenges might be guessed");
     return ERR_OK;

@@ -10,16 +10,6 @@
 #include "CmpLog.h"
 #include "rts_config.h"
 
-typedef struct {
-    const CMP_EXT_FUNCTION *functions;
-    RTS_SIZE count;
-} EXT_TABLE;
-
-static struct {
-    EXT_TABLE tables[CM_MAX_EXT_TABLES];
-    RTS_SIZE table_count;
-} manager;
-
 /*
  * Start-up is a row of calls: each hook before CH_INIT_FINISHED for each component, the components of a hook in the
  * order of the list. Shutdown is the same row backwards, with the hooks that undo.
@@ -48,7 +38,8 @@ RTS_RESULT CMInit(void)
     RTS_SIZE done;
     RTS_RESULT result = ERR_OK;
 
-    CMP_CLEAR(manager);
+    if (!RTS_STARTS_ONCE)
+        memset(cmp_ext_tables, 0, cmp_ext_table_room * sizeof cmp_ext_tables[0]);
     for (done = 0; done < row_length() && result == ERR_OK; done++)
         result = do_call(done);
     if (result != ERR_OK) {
@@ -97,23 +88,26 @@ const char *CMGetComponentName(RTS_UI32 id)
 
 RTS_RESULT CMRegisterExternal(const CMP_EXT_FUNCTION *table, RTS_SIZE count)
 {
-    if (manager.table_count == CM_MAX_EXT_TABLES)
-        return ERR_NOMEMORY;
-    manager.tables[manager.table_count].functions = table;
-    manager.tables[manager.table_count].count = count;
-    manager.table_count++;
-    return ERR_OK;
+    CMP_EXT_TABLE *place;
+
+    for (place = cmp_ext_tables; place < cmp_ext_tables + cmp_ext_table_room; place++) {
+        if (place->functions == NULL) {
+            *place = (CMP_EXT_TABLE){table, count};
+            return ERR_OK;
+        }
+    }
+    return ERR_NOMEMORY;
 }
 
 const CMP_EXT_FUNCTION *CMFindExternal(const char *name)
 {
-    RTS_SIZE t;
+    const CMP_EXT_TABLE *table;
     RTS_SIZE i;
 
-    for (t = 0; t < manager.table_count; t++) {
-        for (i = 0; i < manager.tables[t].count; i++) {
-            if (strcmp(manager.tables[t].functions[i].name, name) == 0)
-                return &manager.tables[t].functions[i];
+    for (table = cmp_ext_tables; table < cmp_ext_tables + cmp_ext_table_room; table++) {
+        for (i = 0; i < table->count; i++) {
+            if (strcmp(table->functions[i].name, name) == 0)
+                return &table->functions[i];
         }
     }
     return NULL;

@@ -195,7 +195,7 @@ static RTS_RESULT load(const IO_CONFIG *config, const CDL_TASK *tasks, RTS_UI32 
     if (result != ERR_OK)
         return result;
     result = IoCycleLoad(manager.drivers);
-    return result == ERR_OK ? ERR_OK : APP_REFUSE(refusal, result, "Raise CYCLE_MAX_PHASES of this firmware.");
+    return result == ERR_OK ? ERR_OK : APP_REFUSE(refusal, result, "Raise CYCLE_OWN_PHASES of this firmware.");
 }
 
 /* Drivers without connectors too: theirs may have been refused, optional, after they took hardware. */

@@ -27,7 +27,6 @@
 #define RTS_IEC_UNPRIVILEGED 0 /* 1: 300 bytes of flash, 24 of RAM */
 #define RTS_MAIN_STACK_SIZE 2336
 #define LOG_TEXT_SIZE 48
-#define SRV_MAX_GROUPS 4
 
 #define BOARD_UART_COUNT 2
 #define BOARD_UART_RX_SIZE 512

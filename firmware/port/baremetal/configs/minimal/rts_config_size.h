@@ -11,7 +11,6 @@
 #define APP_CRASH_TEXT_SIZE 1
 #define APP_MAX_TASKS 2
 #define APP_MAX_IMPORTS 16
-#define CM_MAX_EXT_TABLES 2
 #define EVENT_MAX_CALLBACKS 0
 #define CYCLE_MAX_PHASES 0
 #define SCHED_MAX_EXTERNAL_EVENTS 0
@@ -27,7 +26,6 @@
 #define NS_OLD_VERSIONS 0
 #define COMM_COUNTERS 0
 #define NS_REPLY_SIZE 196 /* the same in a scan */
-#define SRV_MAX_GROUPS 2
 #define RTS_IEC_UNPRIVILEGED 0
 #define RTS_MAIN_STACK_SIZE 1312 /* no task interrupts main */
 

@@ -21,8 +21,7 @@
 #define RTS_IEC_UNPRIVILEGED 0 /* 1: 300 bytes of flash, 24 of RAM */
 #define RTS_MAIN_STACK_SIZE 2336
 #define LOG_TEXT_SIZE 48
-#define SRV_MAX_GROUPS 4
-#define CYCLE_MAX_PHASES 4
+#define CYCLE_OWN_PHASES 1
 #define IO_MAX_CONNECTORS 12
 #define SYSCOM_BYTE_TIMES 1
 #define MODBUS_MAX_DEVICES 8
