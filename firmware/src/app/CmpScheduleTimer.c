@@ -16,7 +16,9 @@
 #include "rts_config.h"
 
 /* Tasks interrupt each other: without copies they would undo each other's outputs. */
-RTS_STATIC_ASSERT(APP_IMAGE_SIZE > 0 || APP_MAX_TASKS == 1, tasks_that_interrupt_each_other_have_copies_of_outputs);
+/* Tasks that interrupt each other have copies of outputs. */
+RTS_STATIC_ASSERT(APP_IMAGE_SIZE > 0 || APP_MAX_TASKS == 1,
+                  set_APP_IMAGE_SIZE_or_compile_CmpScheduleEmbedded_c_and_NoTimers_c_instead_of_this_and_SysTimer_c);
 
 static struct {
     RTS_UI32 count;

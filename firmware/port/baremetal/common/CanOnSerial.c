@@ -13,7 +13,8 @@
 #include "SysTime.h"
 #include "rts_config.h"
 
-RTS_STATIC_ASSERT(COM_MAX_LINES <= CAN_SLCAN_LINE, the_line_belongs_to_can);
+/* The line carries either frames of CAN or the protocol of plctool. */
+RTS_STATIC_ASSERT(COM_MAX_LINES <= CAN_SLCAN_LINE, leave_CanOnSerial_c_out_or_set_COM_MAX_LINES_to_1);
 
 static SLCAN slcan;
 static bool is_open;

@@ -13,7 +13,7 @@
 
 enum { SLOT_COUNT = 2 };
 
-RTS_STATIC_ASSERT(APP_MAX_CODE_SIZE > 0, the_port_says_how_much_ram_code_has);
+RTS_STATIC_ASSERT(APP_MAX_CODE_SIZE > 0, set_APP_MAX_CODE_SIZE_or_compile_CodeInPlace_c_instead);
 static RTS_UI8 code_ram[SLOT_COUNT][APP_MAX_CODE_SIZE] __attribute__((aligned(BOARD_CODE_ALIGN)));
 RTS_STATIC_ASSERT(APP_MAX_CODE_SIZE % APP_CODE_ALIGN == 0, each_slot_is_aligned);
 

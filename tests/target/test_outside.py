@@ -1,0 +1,170 @@
+"""Firmware in a folder of a vendor, built by the Makefile of porting.md, step 15: each configuration, and what
+docs/c-functions.md, docs/io-driver.md and docs/porting.md add to one runs and is read by plctool.
+
+Blocks of these pages that name a file say what belongs into it: `merge` puts it there, as a vendor would.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from environment import MACHINE, ROOT
+from programs import compile_text, program
+from qemu import Board
+
+from plctool.cli.main import main as plctool
+from plctool.compiler import compile_sources
+from plctool.core import lib
+from plctool.debug.symbols import symbol_path
+from plctool.device import Plc
+from plctool.link.connection import Connection
+from plctool.testing.waiting import eventually
+
+PORT = ROOT / "firmware/port/baremetal"
+TARGET = "cortex-m3"
+pytestmark = pytest.mark.skipif(MACHINE != "mps2-an385", reason="the pages show this board")
+
+DEVICE = """
+name = "MPS2 AN385"
+[[module]]
+name = "Analog"
+driver = "IoDrvAcmeAdc"
+in = { AI0 = { type = "INT", parameter = 1 } }
+"""
+DESCRIPTION = """
+device = "device.toml"
+[local.Analog]
+name = "Analog"
+in = { AI0 = "Main.level" }
+"""
+
+
+def blocks(page: str, file: str) -> list[str]:
+    """What a page of docs/ says belongs into a file."""
+    text = (ROOT / "docs" / page).read_text()
+    found: list[str] = re.findall(rf"^```\w+ {re.escape(file)}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert found, f"{page} has no block for {file}"
+    return found
+
+
+def merge(file: Path, lines: str) -> None:
+    """Puts lines of a page into a header or cmp_list.c: a macro that is there gets its new value, PORT_COMPONENTS the
+    component that is new; other lines come first."""
+    text = file.read_text()
+    first = text.index("*/\n") + 3
+    if "#ifndef RTS_CONFIG" in text:
+        first = text.index("\n", text.index("#define RTS_CONFIG")) + 1
+    for line in lines.splitlines():
+        macro = re.match(r"#define (\w+)", line)
+        there = macro and re.search(rf"^#define {macro[1]}\b.*\n", text, re.MULTILINE)
+        if there and line.startswith("#define PORT_COMPONENTS"):
+            text = text.replace(there[0], there[0].rstrip() + " " + line.split()[-1] + "\n")
+        elif there:
+            text = text.replace(there[0], line + "\n")
+        elif macro and file.name == "cmp_list.c":
+            text = text.replace('#include "CmpList.h"', f'{line}\n#include "CmpList.h"')
+        else:
+            text = text[:first] + line + "\n" + text[first:]
+            first += len(line) + 1
+    file.write_text(text)
+
+
+@pytest.fixture
+def product(tmp_path: Path) -> Callable[[str], Path]:
+    """Makes a folder with the board of QEMU and a configuration; the repository is a link in it, as a submodule."""
+
+    def make(config: str) -> Path:
+        folder = tmp_path / "product"
+        (folder / "subprojects").mkdir(parents=True)
+        (folder / "subprojects/plctool").symlink_to(ROOT)
+        for pattern in ("outside/*", "boards/mps2/*", "boards/mps2_an385/*.h", f"configs/{config}/*"):
+            for file in PORT.glob(pattern):
+                shutil.copy(file, folder)
+        (folder / "mps2.ld").rename(folder / "board.ld")
+        return folder
+
+    return make
+
+
+def make(folder: Path) -> Path:
+    """The firmware, as `make` builds it."""
+    done = subprocess.run(["make"], cwd=folder, capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "warning" not in done.stderr
+    return folder / "firmware.elf"
+
+
+@pytest.mark.parametrize("config", ["modbus", "can"])
+def test_configuration_is_built_as_it_is(product: Callable[[str], Path], config: str) -> None:
+    folder = product(config)
+    with Board(MACHINE, make(folder), folder) as board, Plc(Connection(board.line())) as plc:
+        assert plc.identity().device_name == "MPS2 AN385"
+
+
+@pytest.mark.parametrize("config", ["standard", "full"])
+def test_a_c_function_is_called_by_a_program(product: Callable[[str], Path], config: str) -> None:
+    folder = product(config)
+    (source,) = blocks("c-functions.md", "acme.st")
+    (folder / "acme.st").write_text(source)
+    assert plctool(["export-itf", str(folder / "acme.st"), "-o", str(folder)]) == 0
+    body = folder / "acme.c"
+    body.write_text(body.read_text().replace("result = 0;", "result = 1.5f * (RTS_REAL32)channel;"))
+    (lines,) = blocks("c-functions.md", "cmp_list.c")
+    merge(folder / "cmp_list.c", lines)
+    built = compile_text(source + program("VAR level : REAL; END_VAR", "level := AcmeAdc(5);"), TARGET, folder)
+    with Board(MACHINE, make(folder), folder) as board, Plc(Connection(board.line())) as plc:
+        plc.flash(built.path)
+        eventually(lambda: plc.read("Main.level") == 7.5)
+
+
+def test_a_driver_from_the_blank_one_has_a_device(product: Callable[[str], Path]) -> None:
+    folder = product("io")
+    for name in ("IoDrvBlank.c", "IoDrvBlank.h"):
+        shutil.copy(PORT / "blank" / name, folder)
+    for command in re.findall(r"^\$ (sed .*)$", (ROOT / "docs/io-driver.md").read_text(), re.MULTILINE):
+        subprocess.run(command, shell=True, cwd=folder, check=True, timeout=60)
+    for name in ("IoDrvBlank.c", "IoDrvBlank.h"):
+        (folder / name).unlink()
+    driver = folder / "IoDrvAcmeAdc.c"
+    driver.write_text(
+        driver.read_text().replace(
+            "connector);\n    return ERR_OK;", "connector);\n    blank.inputs[0] = 7;\n    return ERR_OK;", 1
+        )
+    )
+    for name in ("cmp_list.c", "rts_config_size.h"):
+        (lines,) = blocks("io-driver.md", name)
+        merge(folder / name, lines)
+    (folder / "main.st").write_text(program("VAR level : INT; END_VAR", ";"))
+    (folder / "main.io.toml").write_text(DESCRIPTION)
+    (folder / "device.toml").write_text(DEVICE)
+    built = compile_sources([folder / "main.st"], target=TARGET)
+    image = folder / "main.cdl"
+    image.write_bytes(built.image)
+    built.symbols.save(symbol_path(image))
+    with Board(MACHINE, make(folder), folder) as board, Plc(Connection(board.line())) as plc:
+        plc.flash(image)
+        eventually(lambda: plc.read("Main.level") == 7)
+        assert plc.read("Analog.ok") is True
+        assert plc.io_devices()[0].state == "ok"
+
+
+def test_a_component_takes_part_in_the_cycle_of_the_minimal_configuration(product: Callable[[str], Path]) -> None:
+    folder = product("minimal")
+    (source,) = blocks("porting.md", "AcmeInputs.c")
+    (folder / "AcmeInputs.c").write_text(source)
+    for name in ("cmp_list.c", "rts_config_size.h"):
+        (lines,) = blocks("porting.md", name)
+        merge(folder / name, lines)
+    text = program("VAR seen : DINT; lines AT %IB0 : BYTE; END_VAR", "seen := 1000 + BYTE_TO_DINT(lines);")
+    built = compile_text(text, TARGET, folder)
+    seen = built.symbols.resolve("Main.seen")
+    assert seen.area == lib.APP_AREA_DATA
+    with Board(MACHINE, make(folder), folder) as board, Plc(Connection(board.line())) as plc:
+        plc.flash(built.path)
+        place = board.address_of("areas") + seen.offset
+        eventually(lambda: int.from_bytes(board.read_memory(place, 4), "little") == 1255)  # no button is pressed
