@@ -44,6 +44,7 @@ typedef struct {
     RTS_UI32 job_count;
     MODBUS_JOB_STATE *jobs;
     bool asked;       /* it was tried at all */
+    bool forgot;      /* it may have lost its outputs: they are written again after its next good reply */
     RTS_UI8 failures; /* tries in a row that it was silent for; from MODBUS_TRIES on it is lost */
     RTS_I64 retry_ns; /* when a lost device is asked again */
     RTS_I64 good_ns;  /* when it replied last; 0: never */
@@ -84,6 +85,8 @@ typedef struct MODBUS_CLIENT {
     bool sent;  /* else it waits for the link */
     bool waits; /* the last byte has left */
     bool verifies;
+    bool resent;      /* it was sent on a connection that the device had closed before it came */
+    RTS_UI16 breaks;  /* of the link, that are known */
     RTS_I64 since_ns; /* from when it waits for the link, or for the reply: the time-out runs */
     RTS_I64 late_ns;  /* until then the reply to a request that was given up may come, and nothing is sent */
     RTS_UI16 transaction;

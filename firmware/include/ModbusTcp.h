@@ -5,16 +5,21 @@
  *
  * Frames are found by their length, however they arrive. A connection on which something else comes is closed: then its
  * handle is RTS_INVALID_HANDLE. All from main.
+ *
+ * A connection that breaks is a sign that the device has restarted (MODBUS_LINK.breaks). Many devices close each
+ * connection by themselves, after a reply or when it is idle: after MODBUS_CLOSINGS short ones in a row that is expected.
  */
 #ifndef MODBUSTCP_H
 #define MODBUSTCP_H
 
 #include "ModbusLink.h"
 
+enum { MODBUS_CLOSINGS = 3, MODBUS_SHORT_CONNECTION_MS = 10000 };
+
 /* A link on an accepted connection. */
 void ModbusTcpBeginServer(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns);
-/* A link that connects to a server when it is asked whether it is ready, and again when it has lost the connection,
- * MODBUS_RECONNECT_MS after it began to connect last, or at once if it was given up. */
+/* A link that connects to a server when it is asked whether it is ready. It connects again at once if the last connection
+ * had a reply or was given up, and MODBUS_RECONNECT_MS after the last one failed otherwise. */
 void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer);
 /* Of a client nothing that is on its way arrives any more: it would do so minutes later, after newer values. Nor of a
  * server whose peer does not read: the system would keep it for ever. */

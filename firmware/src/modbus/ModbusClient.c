@@ -38,6 +38,7 @@ void ModbusClientBegin(MODBUS_CLIENT *client, MODBUS_DEVICE *devices, RTS_UI32 c
     client->call_count = 0;
     client->late_ns = 0;
     client->transaction = 0;
+    client->breaks = client->link.breaks;
 }
 
 void ModbusClientSetCalls(MODBUS_CLIENT *client, MODBUS_CALL *calls, RTS_UI32 count)
@@ -308,7 +309,7 @@ static bool others_reply(const MODBUS_CLIENT *client)
     return false;
 }
 
-/* What a device may have forgotten while it was away is written again. */
+/* Has what a device may have forgotten written again. */
 static void write_all_again(const MODBUS_DEVICE *device, const MODBUS_JOB_STATE *but)
 {
     for (RTS_UI32 i = 0; i < device->job_count; i++) {
@@ -336,13 +337,28 @@ static void note_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     MODBUS_DEVICE *device = client->device;
 
-    if (ModbusDeviceIsLost(device)) {
-        write_all_again(device, client->job);
-        if (!others_reply(client))
-            ask_all(client, now_ns);
-    }
+    if (ModbusDeviceIsLost(device) && !others_reply(client))
+        ask_all(client, now_ns);
     device->failures = 0;
     device->good_ns = now_ns;
+}
+
+/* After a missed reply, or an exception that is new, the device may have restarted, however short that was. */
+static void write_forgotten(MODBUS_CLIENT *client)
+{
+    if (client->device->forgot)
+        write_all_again(client->device, client->job);
+    client->device->forgot = false;
+}
+
+/* A new connection may lead to a device that has restarted, or to a gateway: each device of the line may have. */
+static void note_breaks(MODBUS_CLIENT *client)
+{
+    if (client->breaks == client->link.breaks)
+        return;
+    client->breaks = client->link.breaks;
+    for (RTS_UI32 i = 0; i < client->device_count; i++)
+        write_all_again(&client->devices[i], NULL);
 }
 
 static RTS_I64 usual_pause_of(const MODBUS_CLIENT *client)
@@ -396,6 +412,7 @@ static void fail(MODBUS_CLIENT *client, RTS_I64 now_ns)
     MODBUS_DEVICE *device = client->device;
 
     device->counters.timeouts++;
+    device->forgot = true;
     if (device->failures < UINT8_MAX)
         device->failures++;
     if (ModbusDeviceIsLost(device))
@@ -475,6 +492,7 @@ static void take_good(MODBUS_CLIENT *client, RTS_UI8 *pdu, RTS_UI32 size, RTS_I6
     bool good;
 
     note_reply(client, now_ns);
+    write_forgotten(client);
     if (client->job == NULL) {
         take_call(client, pdu, size);
         end(client, true, now_ns);
@@ -503,6 +521,8 @@ static void take_exception(MODBUS_CLIENT *client, RTS_UI8 code, RTS_I64 now_ns)
     note_reply(client, now_ns);
     if (client->job == NULL)
         client->call->exception = code;
+    else if (client->job->good && code != MODBUS_ILLEGAL_VALUE)
+        client->device->forgot = true; /* it has done this before: it may have restarted */
     end(client, false, now_ns);
 }
 
@@ -545,9 +565,28 @@ static void end_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
         end(client, true, now_ns);
         return;
     }
+    if (!ModbusDeviceIsLost(client->device) && !ModbusLinkType(&client->link)->broadcasts)
+        client->link.breaks++;
     ModbusLinkType(&client->link)->give_up(&client->link);
     await_late_reply(client, now_ns);
     fail(client, now_ns);
+}
+
+/* Many devices close a connection after a reply: what was sent at that moment has not arrived. */
+static bool may_resend(const MODBUS_CLIENT *client)
+{
+    return client->link.replied && !client->resent && (client->job != NULL || client->request.write_count == 0);
+}
+
+static void lose_connection(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    if (!may_resend(client)) {
+        fail(client, now_ns);
+        return;
+    }
+    client->resent = true;
+    client->sent = false;
+    client->since_ns = now_ns;
 }
 
 static void wait_for_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
@@ -556,7 +595,7 @@ static void wait_for_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
     RTS_UI32 size = ModbusLinkType(link)->receive(link, now_ns);
 
     if (link->handle == RTS_INVALID_HANDLE) {
-        fail(client, now_ns);
+        lose_connection(client, now_ns);
         return;
     }
     if (!client->waits && !link->sending)
@@ -573,6 +612,7 @@ static void begin(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     choose(client, now_ns);
     client->sent = false;
+    client->resent = false;
     client->since_ns = now_ns;
 }
 
@@ -612,6 +652,7 @@ void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns)
         return;
     }
     drop_frames(client, now_ns);
+    note_breaks(client);
     if (may_be_late(client, now_ns))
         return;
     if (client->device == NULL)

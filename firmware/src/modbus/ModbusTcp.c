@@ -30,6 +30,7 @@ static void begin(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns)
     link->sending = false;
     link->connecting = false;
     link->fill = 0;
+    link->replied = false;
     link->began_ns = link->moved_ns = now_ns;
 }
 
@@ -43,6 +44,9 @@ void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer)
 {
     link->type = &of_client;
     begin(link, RTS_INVALID_HANDLE, LONG_AGO_NS);
+    link->failed_ns = LONG_AGO_NS;
+    link->breaks = 0;
+    link->closings = 0;
     link->peer = *peer;
 }
 
@@ -62,15 +66,32 @@ void ModbusTcpClose(MODBUS_LINK *link)
 void ModbusTcpGiveUp(MODBUS_LINK *link)
 {
     ModbusTcpClose(link);
-    link->began_ns = LONG_AGO_NS;
+}
+
+/* The connection, or the attempt, has ended, and not because the client gave it up. */
+static void fail(MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    bool is_short = now_ns - link->began_ns < (RTS_I64)MODBUS_SHORT_CONNECTION_MS * NS_PER_MS;
+
+    ModbusTcpClose(link);
+    if (!link->replied)
+        link->failed_ns = link->began_ns;
+    else if (!is_short)
+        link->closings = 0;
+    else if (link->closings <= MODBUS_CLOSINGS)
+        link->closings++;
+    if (!link->replied || link->closings <= MODBUS_CLOSINGS)
+        link->breaks++;
 }
 
 static void connect_again(MODBUS_LINK *link, RTS_I64 now_ns)
 {
-    if (now_ns - link->began_ns < (RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS)
+    if (now_ns - link->failed_ns < (RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS)
         return;
     begin(link, SysSockConnect(&link->peer), now_ns);
     link->connecting = is_open(link);
+    if (!is_open(link))
+        fail(link, now_ns);
 }
 
 static void look_at_connecting(MODBUS_LINK *link, RTS_I64 now_ns)
@@ -80,7 +101,7 @@ static void look_at_connecting(MODBUS_LINK *link, RTS_I64 now_ns)
     if (result == ERR_OK)
         link->connecting = false;
     else if (result != ERR_PENDING || now_ns - link->began_ns >= (RTS_I64)MODBUS_CONNECT_MS * NS_PER_MS)
-        ModbusTcpClose(link);
+        fail(link, now_ns);
 }
 
 bool ModbusTcpReady(MODBUS_LINK *link, RTS_I64 now_ns)
@@ -99,7 +120,7 @@ static void transmit(MODBUS_LINK *link, RTS_I64 now_ns)
     RTS_UI32 taken;
 
     if (SysSockSend(link->handle, link->frame + link->sent, (RTS_UI32)link->fill - link->sent, &taken) != ERR_OK) {
-        ModbusTcpClose(link);
+        fail(link, now_ns);
         return;
     }
     if (taken != 0)
@@ -136,7 +157,7 @@ static bool has_read(MODBUS_LINK *link, RTS_UI32 end, RTS_I64 now_ns)
     if (link->fill >= end)
         return true;
     if (SysSockRecv(link->handle, link->frame + link->fill, end - link->fill, &size) != ERR_OK) {
-        ModbusTcpClose(link);
+        fail(link, now_ns);
         return false;
     }
     if (size != 0)
@@ -145,13 +166,13 @@ static bool has_read(MODBUS_LINK *link, RTS_UI32 end, RTS_I64 now_ns)
     return link->fill == end;
 }
 
-static bool is_header_good(MODBUS_LINK *link)
+static bool is_header_good(MODBUS_LINK *link, RTS_I64 now_ns)
 {
     if (ModbusGet16(link->frame + MODBUS_AT_PROTOCOL) == 0 && length_of(link) >= LENGTH_MIN &&
         length_of(link) <= LENGTH_MAX)
         return true;
     link->bad_frames++;
-    ModbusTcpClose(link);
+    fail(link, now_ns);
     return false;
 }
 
@@ -165,8 +186,9 @@ RTS_UI32 ModbusTcpReceive(MODBUS_LINK *link, RTS_I64 now_ns)
         transmit(link, now_ns);
         return 0;
     }
-    if (!has_read(link, MODBUS_AT_PDU, now_ns) || !is_header_good(link) ||
+    if (!has_read(link, MODBUS_AT_PDU, now_ns) || !is_header_good(link, now_ns) ||
         !has_read(link, MODBUS_AT_UNIT + length_of(link), now_ns))
         return 0;
+    link->replied = true;
     return length_of(link) - 1;
 }
