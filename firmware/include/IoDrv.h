@@ -115,6 +115,10 @@ typedef struct {
     (const IoConfigConnector *connector, RTS_UI32 id, void *data, RTS_UI32 bits, RTS_UI32 bit_offset);
     RTS_RESULT(*IoDrvWriteParameter)
     (const IoConfigConnector *connector, RTS_UI32 id, const void *data, RTS_UI32 bits, RTS_UI32 bit_offset);
+
+    /* From main, for the log, when a connector has CF_CONNECTOR_BUS_ERROR: why, such as "it closes the connection". Without
+     * it: "it does not answer". Below 100 us. */
+    void (*IoDrvExplainLoss)(const IoConfigConnector *connector, char *text, RTS_SIZE size);
 } ICmpIoDrv;
 
 /* A registered driver. It sets `functions`, all else is the manager's. */

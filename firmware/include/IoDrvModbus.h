@@ -30,7 +30,11 @@ enum {
         7,                 /* TCP: IPv4, 127.0.0.1 is 0x7F000001; of a client its server, of a server its own, 0: all */
     MODBUS_PARAM_PORT = 8, /* TCP: MODBUS_PORT if missing */
     MODBUS_PARAM_UNIT = 9, /* of a device, or a server; 1 if missing, of a TCP server 0: every unit */
-    MODBUS_PARAM_TIMEOUT = 10,   /* of a device [ms], from the last byte of the request; 1000 if missing */
+    MODBUS_PARAM_TIMEOUT = 10, /* of a device [ms], from the last byte of the request; 1000 if missing */
+    MODBUS_PARAM_PAUSE = 11,   /* of a device [ms]: of its line after each request to it; 0 if missing */
+    MODBUS_PARAM_RETRIES = 12, /* of a device, before it is lost; 1 if missing */
+    MODBUS_PARAM_ASK_AGAIN =
+        13, /* of a device [ms]: how often it is asked while it is lost; MODBUS_RETRY_MS if missing */
     MODBUS_PARAM_OBJECT = 0x100, /* + n: object n of the identification of a server, a text */
     MODBUS_PARAM_JOB = 0x1000,   /* + n: a MODBUS_JOB */
     MODBUS_PARAM_RANGE = 0x2000, /* + n: a MODBUS_RANGE */
@@ -45,6 +49,7 @@ enum {
     MODBUS_PARAM_BAD_FRAMES = 0x8007, /* of a line: of a wrong CRC or length */
     MODBUS_PARAM_ACCEPTED = 0x8008,   /* of all TCP servers: connections, */
     MODBUS_PARAM_DISPLACED = 0x8009,  /* and those closed for a newer one */
+    MODBUS_PARAM_BUSY = 0x800A,       /* of a device: exceptions 5 and 6, after which it was asked again */
 };
 
 #ifndef RTS_CFFI

@@ -53,6 +53,9 @@ enum {
     MODBUS_PORT = 502, /* TCP */
 };
 
+/* What a client does for a device if the configuration does not say otherwise. */
+enum { MODBUS_TIMEOUT_MS = 1000, MODBUS_RETRIES = 1 };
+
 /* The four tables of a server. */
 enum {
     MODBUS_COILS = 0x01,

@@ -24,6 +24,7 @@ typedef struct {
     bool has_out;     /* `out` was filled, nothing is written before */
     bool is_written;  /* `written` is valid */
     bool good;        /* its last try was */
+    RTS_UI8 put_off;  /* times in a row that the device was busy (MODBUS_ACKNOWLEDGE, MODBUS_DEVICE_BUSY) */
     RTS_I64 due_ns;   /* when it is to be done next */
     RTS_I64 done_ns;  /* when it was tried last */
 } MODBUS_JOB_STATE;
@@ -38,20 +39,40 @@ typedef struct {
     RTS_UI32 last_exception;
 } MODBUS_DEVICE_COUNTERS;
 
+/* Why a request has got no reply. */
+typedef enum {
+    MODBUS_MISS_SILENT,
+    MODBUS_MISS_LATE,        /* the reply came after the time-out */
+    MODBUS_MISS_UNIT,        /* another unit replied */
+    MODBUS_MISS_OTHER,       /* a reply of another function, length, address or transaction */
+    MODBUS_MISS_CUT,         /* only the first part of a frame came */
+    MODBUS_MISS_DAMAGED,     /* what came is not a frame */
+    MODBUS_MISS_CLOSED,      /* TCP: the device closed or reset the connection */
+    MODBUS_MISS_NO_ENTRANCE, /* TCP: no connection; a serial line: it was never quiet, or takes no bytes */
+    MODBUS_MISS_GATEWAY,     /* a gateway says that the device does not reply */
+} MODBUS_MISS;
+
 typedef struct {
-    RTS_UI8 unit; /* 0: all devices of the line, writes only */
+    RTS_UI8 unit;        /* 0: all devices of the line, writes only */
+    RTS_UI8 retries;     /* after a request without reply, before the device is lost */
+    RTS_UI8 miss;        /* MODBUS_MISS_* of the last request without reply */
+    RTS_UI8 missed_unit; /* that has replied, of MODBUS_MISS_UNIT */
+    RTS_UI16 pause_ms;   /* of the line after each request to it */
     RTS_UI32 timeout_ms;
+    RTS_UI32 ask_again_ms; /* a lost device, while others on the line reply */
     RTS_UI32 job_count;
     MODBUS_JOB_STATE *jobs;
     bool asked;       /* it was tried at all */
     bool forgot;      /* it may have lost its outputs: they are written again after its next good reply */
-    RTS_UI8 failures; /* tries in a row that it was silent for; from MODBUS_TRIES on it is lost */
+    RTS_UI8 failures; /* tries in a row that it was silent for; with more than `retries` it is lost */
     RTS_I64 retry_ns; /* when a lost device is asked again */
     RTS_I64 good_ns;  /* when it replied last; 0: never */
+    RTS_UI32 busy;    /* replies MODBUS_ACKNOWLEDGE or MODBUS_DEVICE_BUSY, after which it was asked again */
     MODBUS_DEVICE_COUNTERS counters;
 } MODBUS_DEVICE;
 
-enum { MODBUS_TRIES = 2 };
+/* A device that is busy is asked again after MODBUS_BUSY_MS, so often; then that is a refusal. */
+enum { MODBUS_BUSY_TRIES = 5, MODBUS_BUSY_MS = 100 };
 
 /* A request of once, besides the jobs. Main sends one that waits, and ends it; it belongs to who has taken it before and
  * after that. */
@@ -85,10 +106,15 @@ typedef struct MODBUS_CLIENT {
     bool sent;  /* else it waits for the link */
     bool waits; /* the last byte has left */
     bool verifies;
-    bool resent;      /* it was sent on a connection that the device had closed before it came */
-    RTS_UI16 breaks;  /* of the link, that are known */
-    RTS_I64 since_ns; /* from when it waits for the link, or for the reply: the time-out runs */
-    RTS_I64 late_ns;  /* until then the reply to a request that was given up may come, and nothing is sent */
+    bool resent;          /* it was sent on a connection that the device had closed before it came */
+    RTS_UI16 breaks;      /* of the link, that are known */
+    RTS_I64 since_ns;     /* from when it waits for the link, or for the reply: the time-out runs */
+    RTS_I64 late_ns;      /* until then the reply to a request that was given up may come, and nothing is sent */
+    RTS_I64 free_ns;      /* until then the pause after a request lasts, and nothing is sent */
+    MODBUS_DEVICE *asked; /* last; NULL: none */
+    RTS_UI8 miss;         /* MODBUS_MISS_* of this request, so far */
+    RTS_UI8 missed_unit;
+    RTS_UI32 bad_frames; /* of the link, when it was sent */
     RTS_UI16 transaction;
     RTS_UI8 head[MODBUS_HEAD_SIZE];
 } MODBUS_CLIENT;

@@ -59,6 +59,7 @@ struct MODBUS_LINK {
     RTS_I64 failed_ns;   /* TCP: when a connection without any reply ended last */
     RTS_UI16 breaks;     /* TCP: how often the device may have restarted, as its connections show */
     RTS_UI8 closings;    /* TCP: connections in a row that the device closed after a reply, soon */
+    bool accepted;       /* TCP: the peer took this connection, which may have ended */
     bool replied;        /* TCP: a frame has come on this connection */
     RTS_I64 moved_ns;    /* RTU: when the last byte that is sent leaves; TCP: when a byte moved last, or it began */
     RTS_UI32 silence_ns; /* RTU: the shortest pause between frames */

@@ -482,11 +482,11 @@
 #define SYSSOCK_MAX_FIELD_BUS (MODBUS_MAX_CONNECTIONS + 1 + MODBUS_MAX_SERVERS + MODBUS_MAX_CLIENTS)
 #endif
 
-/* A Modbus device that does not reply is asked once more. Then it is lost, and asked again after this time, so that
- * others on its line wait for it less than once in a minute; the first time after a short one, because most losses are
- * short. If there are no others, after MODBUS_RETRY_ALONE_MS each time [ms]. */
+/* A Modbus device that is lost is asked again after this time, unless its configuration says otherwise: so often others on
+ * its line wait for its time-out. The first time it is asked after a short one, because most losses are short. If there
+ * are no others, after MODBUS_RETRY_ALONE_MS each time [ms]. */
 #ifndef MODBUS_RETRY_MS
-#define MODBUS_RETRY_MS 61000
+#define MODBUS_RETRY_MS 10000
 #endif
 #ifndef MODBUS_RETRY_SOON_MS
 #define MODBUS_RETRY_SOON_MS 4000

@@ -31,6 +31,7 @@ static RTS_I64 request_ns; /* of its last byte */
 static RTS_UI8 reply[300];
 RTS_UI32 reply_size;
 static RTS_I64 reply_ns;
+static RTS_I64 deaf_ns; /* until then none hears */
 
 /* replies that wait until that one was sent */
 enum { QUEUE = 8 };
@@ -54,6 +55,7 @@ void begin(RTS_UI32 count)
     memset(in, 0, sizeof(in));
     memset(out, 0, sizeof(out));
     request_size = reply_size = queued = 0;
+    deaf_ns = 0;
     for (RTS_UI32 i = 0; i < DEVICES; i++) {
         remotes[i].server.unit = (RTS_UI8)(i + 1);
         remotes[i].server.memory = &remotes[i].memory;
@@ -62,6 +64,8 @@ void begin(RTS_UI32 count)
         remotes[i].delay_ms = 2;
         devices[i].unit = (RTS_UI8)(i + 1);
         devices[i].timeout_ms = TIMEOUT_MS;
+        devices[i].retries = MODBUS_RETRIES;
+        devices[i].ask_again_ms = MODBUS_RETRY_MS;
         devices[i].jobs = states[i];
     }
     ModbusRtuBegin(&client.link, 0, &settings);
@@ -143,6 +147,8 @@ static void serve(REMOTE *remote)
     RTS_UI32 first_size = reply_size;
     RTS_I64 first_ns = reply_ns;
 
+    if (fakes.now_ns < deaf_ns)
+        return;
     remote->asked++;
     remote->asked_ns = fakes.now_ns;
     remote->function = request[1];
@@ -151,12 +157,13 @@ static void serve(REMOTE *remote)
     memcpy(first, reply, sizeof(first));
     memcpy(reply, request, request_size);
     reply_size = 1 + ModbusServerReply(&remote->server, reply + 1, request_size - 3);
-    if (remote->fault == EXCEPTION) {
+    if (remote->fault == EXCEPTION || remote->fault == BUSY) {
         reply[1] = request[1] | MODBUS_EXCEPTION;
-        reply[2] = MODBUS_DEVICE_BUSY;
+        reply[2] = remote->fault == BUSY ? MODBUS_DEVICE_BUSY : MODBUS_DEVICE_FAILURE;
         reply_size = 3;
     }
     spoil(remote->fault);
+    deaf_ns = remote->deaf_ms == 0 ? 0 : fakes.now_ns + (RTS_I64)(remote->delay_ms + remote->deaf_ms) * MS;
     reply_ns = fakes.now_ns + (RTS_I64)(remote->fault == LATE ? TIMEOUT_MS + 50 : remote->delay_ms) * MS;
     if (first_size != 0 && request[0] != MODBUS_BROADCAST)
         queue_reply(first, first_size, first_ns);

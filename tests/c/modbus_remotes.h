@@ -16,7 +16,19 @@
 
 enum { STEP_NS = 250000, MS = 1000000, DEVICES = 3, JOBS = 3, REGISTERS = 8, TIMEOUT_MS = 100 };
 
-typedef enum { WELL, SILENT, LATE, WRONG_UNIT, TOO_SHORT, TOO_LONG, HALF, BAD_CRC, WRONG_FUNCTION, EXCEPTION } FAULT;
+typedef enum {
+    WELL,
+    SILENT,
+    LATE,
+    WRONG_UNIT,
+    TOO_SHORT,
+    TOO_LONG,
+    HALF,
+    BAD_CRC,
+    WRONG_FUNCTION,
+    EXCEPTION,
+    BUSY
+} FAULT;
 
 typedef struct {
     MODBUS_SERVER server;
@@ -24,6 +36,7 @@ typedef struct {
     RTS_UI8 data[2 * REGISTERS];
     FAULT fault;
     RTS_UI32 delay_ms; /* before it replies; 2 */
+    RTS_UI32 deaf_ms;  /* after it has replied: it loses what comes */
     bool loses;        /* requests that come before it has replied; else it replies to all, one after the other */
     RTS_UI32 asked;
     RTS_I64 asked_ns;

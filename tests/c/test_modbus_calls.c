@@ -64,7 +64,7 @@ static void a_refused_call_has_the_exception(void)
     call(0, 0, MODBUS_READ_HOLDING_REGISTERS, 2, 0);
     run_ms(100);
     CHECK_EQUAL(calls[0].result, ERR_FAILED);
-    CHECK_EQUAL(calls[0].exception, MODBUS_DEVICE_BUSY);
+    CHECK_EQUAL(calls[0].exception, MODBUS_DEVICE_FAILURE);
 }
 
 /* Half a frame, another unit, a late reply: none of them is the reply to a call. */
@@ -91,7 +91,7 @@ static void calls_of_a_lost_device_cost_its_line_nothing(void)
     begin(2);
     add(1, read_job(20));
     remotes[0].fault = SILENT;
-    for (RTS_UI32 i = 0; i < MODBUS_TRIES; i++) {
+    for (RTS_UI32 i = 0; i < 1 + MODBUS_RETRIES; i++) {
         call(0, 0, MODBUS_READ_HOLDING_REGISTERS, 2, 0);
         run_ms(2 * TIMEOUT_MS);
     }
@@ -102,7 +102,7 @@ static void calls_of_a_lost_device_cost_its_line_nothing(void)
         run_ms(40);
         CHECK_EQUAL(calls[0].result, ERR_TIMEOUT);
     }
-    CHECK_EQUAL(remotes[0].asked, MODBUS_TRIES);
+    CHECK_EQUAL(remotes[0].asked, 1 + MODBUS_RETRIES);
     CHECK(remotes[1].asked - before >= 18);
 }
 

@@ -265,7 +265,7 @@ static void the_search_for_devices_does_not_wait_for_units_that_are_not_there(vo
 
     begin(1);
     memset(&call, 0, sizeof(call));
-    guest = (MODBUS_DEVICE){.unit = 9, .timeout_ms = TIMEOUT_MS};
+    guest = (MODBUS_DEVICE){.unit = 9, .timeout_ms = TIMEOUT_MS, .retries = MODBUS_RETRIES};
     ModbusClientSetCalls(&client, &call, 1);
     call.client = &client;
     call.device = &guest;

@@ -64,7 +64,7 @@ static void an_exception_is_taken(void)
         add(0, read_job(100));
         remotes[0].fault = EXCEPTION;
         run_ms(500);
-        CHECK_EQUAL(devices[0].counters.last_exception, MODBUS_DEVICE_BUSY);
+        CHECK_EQUAL(devices[0].counters.last_exception, MODBUS_DEVICE_FAILURE);
         CHECK_EQUAL(devices[0].counters.timeouts, 0);
     }
 }

@@ -143,7 +143,7 @@ typedef enum {
 
 static HABIT habit;
 static bool is_down;
-static bool is_dark; /* while it is down nobody says that it is */
+static bool is_dark; /* while it is down, nothing refuses connections */
 
 static void begin_tcp(HABIT of_device)
 {

@@ -66,6 +66,8 @@ static void begin(const MODBUS_JOB *job)
     memset(written, GUARD, sizeof(written));
     device.unit = UNIT;
     device.timeout_ms = TIMEOUT_MS;
+    device.retries = MODBUS_RETRIES;
+    device.ask_again_ms = MODBUS_RETRY_MS;
     device.jobs = &state;
     device.job_count = 1;
     state = (MODBUS_JOB_STATE){.job = job, .in = in, .out = out, .written = written, .has_out = true};

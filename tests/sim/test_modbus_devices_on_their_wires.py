@@ -140,7 +140,7 @@ def test_a_lost_device_costs_the_others_little_and_comes_back_by_itself(plc: Sim
     assert requests(plc, "Drive") - before == pytest.approx(120, abs=4)
     plc.fault("Tank", "absent", 0)
     plc.set_input("Main.level", 7)
-    plc.run_for(seconds=62)  # docs/modbus.md: asked every 61 s
+    plc.run_for(seconds=11)  # docs/modbus.md: ask_again
     assert (good(plc), plc.read("Main.level")) == (DEVICES, 7)
 
 

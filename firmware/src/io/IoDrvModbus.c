@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "AppState.h"
+#include "CMUtils.h"
 #include "CmpLog.h"
 #include "CmpIoMgrEmbedded.h"
 #include "ModbusCalls.h"
@@ -386,6 +387,10 @@ static RTS_RESULT device_counter(const MODBUS_DEVICE *device, RTS_UI32 id, RTS_U
 {
     RTS_UI32 index = id - MODBUS_PARAM_REQUESTS;
 
+    if (id == MODBUS_PARAM_BUSY) {
+        *value = device->busy;
+        return ERR_OK;
+    }
     if (index >= sizeof(device->counters) / sizeof(*value))
         return ERR_NO_OBJECT;
     memcpy(value, (const RTS_UI8 *)&device->counters + index * sizeof(*value), sizeof(*value));
@@ -462,6 +467,46 @@ static RTS_RESULT scan_modules(const IoConfigConnector *connector, RTS_UI32 inde
     return client != NULL ? ModbusScan(client, index, module, SysTimeGetNs()) : (RTS_RESULT)ERR_NOT_SUPPORTED;
 }
 
+/* ---- why a device is lost ---- */
+
+static bool is_on_tcp(const MODBUS_DEVICE *device)
+{
+    for (RTS_UI32 i = 0; i < setup.client_count; i++) {
+        const MODBUS_CLIENT *client = &setup.clients[i].client;
+        if (device >= client->devices && device < client->devices + client->device_count)
+            return ModbusLinkType(&client->link) != &ModbusRtuType;
+    }
+    return false;
+}
+
+static const char *miss_of(const MODBUS_DEVICE *device)
+{
+    static const char *const misses[] = {
+        [MODBUS_MISS_SILENT] = "it does not reply",
+        [MODBUS_MISS_LATE] = "it replies after its timeout",
+        [MODBUS_MISS_UNIT] = "another unit replies",
+        [MODBUS_MISS_OTHER] = "its replies are not to what was asked",
+        [MODBUS_MISS_CUT] = "its replies are incomplete",
+        [MODBUS_MISS_DAMAGED] = "its replies are damaged",
+        [MODBUS_MISS_CLOSED] = "it closes the connection",
+        [MODBUS_MISS_NO_ENTRANCE] = "its line is never free",
+        [MODBUS_MISS_GATEWAY] = "its gateway gets no reply from it",
+    };
+
+    return device->miss == MODBUS_MISS_NO_ENTRANCE && is_on_tcp(device) ? "no connection to it" : misses[device->miss];
+}
+
+/* A line is lost when all its devices are. */
+static void explain_loss(const IoConfigConnector *connector, char *text, RTS_SIZE size)
+{
+    const MODBUS_DEVICE *device = ModbusFindPlace(&setup, connector).device;
+
+    if (device != NULL && device->miss == MODBUS_MISS_UNIT)
+        CMUtlsnprintf(text, size, "it replies as unit %u", (unsigned)device->missed_unit);
+    else
+        CMUtlsnprintf(text, size, "%s", device != NULL ? miss_of(device) : "none of its devices replies");
+}
+
 /* ---- life ---- */
 
 static const ICmpIoDrv functions = {
@@ -472,6 +517,7 @@ static const ICmpIoDrv functions = {
     .IoDrvWriteOutputs = write_outputs,
     .IoDrvScanModules = scan_modules,
     .IoDrvReadParameter = read_parameter,
+    .IoDrvExplainLoss = explain_loss,
 };
 
 static void begin_tools(void)

@@ -26,6 +26,8 @@ enum {
 
 enum { HEALTH_STARTING, HEALTH_GOOD, HEALTH_LOST, HEALTH_MASK };
 
+enum { LOSS_SIZE = 40 }; /* of the explanation in the log, with NUL */
+
 enum { CF_ERRORS = CF_CONNECTOR_BUS_ERROR | CF_CONNECTOR_ERROR };
 
 typedef struct {
@@ -249,6 +251,17 @@ void IoDevicesUpdate(RTS_UI32 task)
     }
 }
 
+static void log_loss(RTS_UI32 index)
+{
+    const IoConfigConnector *connector = IoMgrConfigGetConnector(index);
+    const ICmpIoDrv *functions = devices[index].driver->functions;
+    char why[LOSS_SIZE] = "it does not answer";
+
+    if (functions->IoDrvExplainLoss != NULL)
+        functions->IoDrvExplainLoss(connector, why, sizeof why);
+    LogAdd(CMPID_CmpIoMgrEmbedded, LOG_WARNING, ERR_OK, "%s is lost: %s", IoMgrConfigGetName(connector), why);
+}
+
 void IoDevicesLog(void)
 {
     static const char *const words[] = {"stopped", "is back", "has an error"}; /* by HEALTH_* */
@@ -263,8 +276,10 @@ void IoDevicesLog(void)
         change(&devices[i].flags, (RTS_UI32)HEALTH_MASK << TOLD_SHIFT, health << TOLD_SHIFT);
         if (told == HEALTH_STARTING && health == HEALTH_GOOD)
             continue;
-        LogAdd(CMPID_CmpIoMgrEmbedded, health == HEALTH_LOST ? LOG_WARNING : LOG_INFO, ERR_OK, "%s %s",
-               IoMgrConfigGetName(IoMgrConfigGetConnector(i)),
-               (flags & CF_CONNECTOR_BUS_ERROR) != 0 ? "is lost: it does not answer" : words[health]);
+        if ((flags & CF_CONNECTOR_BUS_ERROR) != 0)
+            log_loss(i);
+        else
+            LogAdd(CMPID_CmpIoMgrEmbedded, health == HEALTH_LOST ? LOG_WARNING : LOG_INFO, ERR_OK, "%s %s",
+                   IoMgrConfigGetName(IoMgrConfigGetConnector(i)), words[health]);
     }
 }

@@ -62,6 +62,7 @@ static void ask_unit(RTS_UI32 unit, RTS_I64 now_ns)
 {
     scan.guest.unit = (RTS_UI8)unit;
     scan.guest.failures = 0;
+    scan.guest.pause_ms = scan.client->device_count != 0 ? scan.client->devices[0].pause_ms : 0;
     scan.guest.timeout_ms = is_tcp() ? GATEWAY_TIMEOUT_MS : TIMEOUT_MS;
     ask(MODBUS_ENCAPSULATED, now_ns);
 }

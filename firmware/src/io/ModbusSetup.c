@@ -16,7 +16,7 @@
 #include "SysCom.h"
 #include "SysTarget.h"
 
-enum { DEFAULT_BAUD = 19200, DEFAULT_TIMEOUT_MS = 1000, LEAST_BAUD = 300 };
+enum { DEFAULT_BAUD = 19200, LEAST_BAUD = 300 };
 
 static const bool HAS_TCP = MODBUS_MAX_CONNECTIONS > 0;
 
@@ -249,7 +249,10 @@ static RTS_RESULT add_device(MODBUS_SETUP *setup, const IoConfigConnector *conne
     if (unit > UINT8_MAX)
         return MODBUS_REFUSE(connector, ERR_PARAMETER, "there is no unit %u.", (unsigned)unit);
     device->unit = (RTS_UI8)unit;
-    device->timeout_ms = number(connector, MODBUS_PARAM_TIMEOUT, DEFAULT_TIMEOUT_MS);
+    device->timeout_ms = number(connector, MODBUS_PARAM_TIMEOUT, MODBUS_TIMEOUT_MS);
+    device->pause_ms = (RTS_UI16)number(connector, MODBUS_PARAM_PAUSE, 0);
+    device->retries = (RTS_UI8)number(connector, MODBUS_PARAM_RETRIES, MODBUS_RETRIES);
+    device->ask_again_ms = number(connector, MODBUS_PARAM_ASK_AGAIN, MODBUS_RETRY_MS);
     setup->noted[setup->device_count - 1].connector = connector;
     return add_jobs(setup, device, connector);
 }

@@ -18,7 +18,7 @@ enum { REFUSED_MS = 1000 /* what a device refuses is not tried more often */ };
 
 bool ModbusDeviceIsLost(const MODBUS_DEVICE *device)
 {
-    return device->failures >= MODBUS_TRIES;
+    return device->failures > device->retries;
 }
 
 RTS_NOINLINE bool ModbusDeviceIsGood(const MODBUS_DEVICE *device)
@@ -37,6 +37,8 @@ void ModbusClientBegin(MODBUS_CLIENT *client, MODBUS_DEVICE *devices, RTS_UI32 c
     client->device = NULL;
     client->call_count = 0;
     client->late_ns = 0;
+    client->free_ns = 0;
+    client->asked = NULL;
     client->transaction = 0;
     client->breaks = client->link.breaks;
 }
@@ -67,6 +69,8 @@ static RTS_I64 due_ns(const MODBUS_JOB_STATE *state)
 
     if (job->write_count != 0 && !state->has_out)
         return NEVER;
+    if (state->put_off != 0)
+        return state->due_ns;
     if ((job->flags & MODBUS_JOB_ON_CHANGE) == 0 || (!state->good && state->done_ns != 0))
         return state->due_ns;
     if (has_changed(state))
@@ -278,6 +282,9 @@ static void send(MODBUS_CLIENT *client, RTS_I64 now_ns)
     ModbusPut16(link->frame + MODBUS_AT_TRANSACTION, ++client->transaction);
     client->device->counters.requests++;
     client->device->asked = true;
+    client->asked = client->device;
+    client->bad_frames = link->bad_frames;
+    client->miss = MODBUS_MISS_SILENT;
     client->sent = true;
     ModbusLinkType(link)->send(link, size, now_ns);
     begin_to_wait(client, now_ns);
@@ -363,9 +370,14 @@ static void note_breaks(MODBUS_CLIENT *client)
 
 static RTS_I64 usual_pause_of(const MODBUS_CLIENT *client)
 {
-    if (!others_reply(client))
-        return MODBUS_RETRY_ALONE_MS * NS_PER_MS;
-    return (client->device->failures == MODBUS_TRIES ? MODBUS_RETRY_SOON_MS : MODBUS_RETRY_MS) * NS_PER_MS;
+    const MODBUS_DEVICE *device = client->device;
+    RTS_UI32 usual_ms = device->ask_again_ms;
+
+    if (usual_ms > MODBUS_RETRY_SOON_MS && device->failures == device->retries + 1)
+        usual_ms = MODBUS_RETRY_SOON_MS;
+    if (usual_ms > MODBUS_RETRY_ALONE_MS && !others_reply(client))
+        usual_ms = MODBUS_RETRY_ALONE_MS;
+    return usual_ms * NS_PER_MS;
 }
 
 /* Before a lost device is asked again: for so long its late reply may come. */
@@ -392,15 +404,22 @@ static bool has_other_name(const MODBUS_CLIENT *client)
 static void await_late_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     if (!client->waits || !ModbusLinkType(&client->link)->broadcasts || client->request.function->table == 0 ||
-        (client->device->failures + 1 >= MODBUS_TRIES && !has_other_name(client)))
+        (client->device->failures >= client->device->retries && !has_other_name(client)))
         return;
     client->late_ns = now_ns + timeout_ns(client->device);
+}
+
+/* Many devices need a moment after a reply, before they hear again. */
+static void begin_pause(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    client->free_ns = now_ns + client->device->pause_ms * NS_PER_MS;
 }
 
 static void fail_job(MODBUS_JOB_STATE *job, bool lost, RTS_I64 now_ns)
 {
     job->good = false;
     job->is_written = false;
+    job->put_off = 0;
     job->done_ns = now_ns;
     if (!lost)
         job->due_ns = now_ns;
@@ -413,6 +432,8 @@ static void fail(MODBUS_CLIENT *client, RTS_I64 now_ns)
 
     device->counters.timeouts++;
     device->forgot = true;
+    device->miss = client->miss;
+    device->missed_unit = client->missed_unit;
     if (device->failures < UINT8_MAX)
         device->failures++;
     if (ModbusDeviceIsLost(device))
@@ -422,6 +443,7 @@ static void fail(MODBUS_CLIENT *client, RTS_I64 now_ns)
     else
         end_call(client->call, ERR_TIMEOUT);
     client->verifies = false;
+    begin_pause(client, now_ns);
     client->device = NULL;
 }
 
@@ -433,6 +455,7 @@ static void end_job(MODBUS_JOB_STATE *job, bool good, RTS_I64 now_ns)
         job->due_ns = now_ns + REFUSED_MS * NS_PER_MS;
     else
         next_due(job, interval_ns, now_ns);
+    job->put_off = 0;
     job->done_ns = now_ns;
     job->good = good;
     job->is_written = good && job->job->write_count != 0;
@@ -445,6 +468,7 @@ static void end(MODBUS_CLIENT *client, bool good, RTS_I64 now_ns)
     else
         end_call(client->call, good ? ERR_OK : ERR_FAILED);
     client->verifies = false;
+    begin_pause(client, now_ns);
     client->device = NULL;
 }
 
@@ -503,10 +527,35 @@ static void take_good(MODBUS_CLIENT *client, RTS_UI8 *pdu, RTS_UI32 size, RTS_I6
     if (!client->verifies && (client->job->job->flags & MODBUS_JOB_VERIFY) != 0) {
         client->verifies = true;
         client->sent = false;
-        client->since_ns = now_ns;
+        begin_pause(client, now_ns);
+        client->since_ns = client->free_ns;
         return;
     }
     end(client, good, now_ns);
+}
+
+/* A job that is not good is asked for at its own pace. */
+static bool may_put_off(const MODBUS_CLIENT *client, RTS_UI8 code)
+{
+    const MODBUS_JOB_STATE *job = client->job;
+
+    return (code == MODBUS_ACKNOWLEDGE || code == MODBUS_DEVICE_BUSY) && job != NULL &&
+           (job->good || job->done_ns == 0) && job->put_off < MODBUS_BUSY_TRIES;
+}
+
+/* Its data stay as good as they were, and as old. */
+static void put_off(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    RTS_I64 good_ns = client->device->good_ns;
+
+    note_reply(client, now_ns);
+    client->device->good_ns = good_ns;
+    client->device->busy++;
+    client->job->put_off++;
+    client->job->due_ns = now_ns + MODBUS_BUSY_MS * NS_PER_MS;
+    client->verifies = false;
+    begin_pause(client, now_ns);
+    client->device = NULL;
 }
 
 /* A gateway replies for a device that is silent. */
@@ -514,7 +563,12 @@ static void take_exception(MODBUS_CLIENT *client, RTS_UI8 code, RTS_I64 now_ns)
 {
     client->device->counters.last_exception = code;
     if (code == MODBUS_NO_PATH || code == MODBUS_NO_TARGET) {
+        client->miss = MODBUS_MISS_GATEWAY;
         fail(client, now_ns);
+        return;
+    }
+    if (may_put_off(client, code)) {
+        put_off(client, now_ns);
         return;
     }
     client->device->counters.exceptions++;
@@ -539,6 +593,13 @@ static MODBUS_REPLY check(const MODBUS_CLIENT *client, RTS_UI32 size)
     return ModbusCheckReply(&client->request, client->head, frame + MODBUS_AT_PDU, size);
 }
 
+static void take_other(MODBUS_CLIENT *client)
+{
+    client->device->counters.others++;
+    client->missed_unit = client->link.frame[MODBUS_AT_UNIT];
+    client->miss = client->missed_unit != client->device->unit ? MODBUS_MISS_UNIT : MODBUS_MISS_OTHER;
+}
+
 static void take_frame(MODBUS_CLIENT *client, RTS_UI32 size, RTS_I64 now_ns)
 {
     RTS_UI8 *pdu = client->link.frame + MODBUS_AT_PDU;
@@ -549,13 +610,28 @@ static void take_frame(MODBUS_CLIENT *client, RTS_UI32 size, RTS_I64 now_ns)
     else if (reply == MODBUS_REPLY_EXCEPTION)
         take_exception(client, pdu[1], now_ns);
     else
-        client->device->counters.others++;
+        take_other(client);
     ModbusLinkDrop(&client->link);
 }
 
 static bool is_too_late(const MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     return now_ns - client->since_ns >= timeout_ns(client->device);
+}
+
+/* Nothing that is a frame has come: what else has. */
+static void note_remains(MODBUS_CLIENT *client)
+{
+    if (client->miss != MODBUS_MISS_SILENT)
+        return;
+    if (client->link.bad_frames != client->bad_frames)
+        client->miss = MODBUS_MISS_DAMAGED;
+    else if (!client->waits)
+        client->miss = MODBUS_MISS_NO_ENTRANCE;
+    else if (client->link.handle == RTS_INVALID_HANDLE)
+        client->miss = MODBUS_MISS_CLOSED;
+    else if (client->link.fill != 0)
+        client->miss = MODBUS_MISS_CUT;
 }
 
 static void end_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
@@ -565,6 +641,7 @@ static void end_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
         end(client, true, now_ns);
         return;
     }
+    note_remains(client);
     if (!ModbusDeviceIsLost(client->device) && !ModbusLinkType(&client->link)->broadcasts)
         client->link.breaks++;
     ModbusLinkType(&client->link)->give_up(&client->link);
@@ -581,6 +658,7 @@ static bool may_resend(const MODBUS_CLIENT *client)
 static void lose_connection(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     if (!may_resend(client)) {
+        note_remains(client);
         fail(client, now_ns);
         return;
     }
@@ -621,6 +699,20 @@ static bool may_be_late(const MODBUS_CLIENT *client, RTS_I64 now_ns)
     return now_ns < client->late_ns;
 }
 
+static bool is_paused(const MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    return may_be_late(client, now_ns) || now_ns < client->free_ns;
+}
+
+/* The device is there, and slower than its time-out. */
+static void note_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    if (client->asked == NULL || client->asked->unit != client->link.unit || client->asked->failures == 0)
+        return;
+    client->asked->miss = MODBUS_MISS_LATE;
+    client->free_ns = now_ns + client->asked->pause_ms * NS_PER_MS;
+}
+
 /* Frames that come while nothing was asked belong to nothing: at most one of them is the reply that is late. */
 static void drop_frames(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
@@ -628,8 +720,10 @@ static void drop_frames(MODBUS_CLIENT *client, RTS_I64 now_ns)
 
     if (link->handle == RTS_INVALID_HANDLE || ModbusLinkType(link)->receive(link, now_ns) == 0)
         return;
-    if (ModbusLinkIsReply(link))
+    if (ModbusLinkIsReply(link)) {
+        note_late(client, now_ns);
         client->late_ns = now_ns;
+    }
     ModbusLinkDrop(link);
 }
 
@@ -637,8 +731,10 @@ static void try_to_send(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     if (ModbusLinkType(&client->link)->ready(&client->link, now_ns))
         send(client, now_ns);
-    else if (is_too_late(client, now_ns))
+    else if (is_too_late(client, now_ns)) {
+        client->miss = client->link.accepted ? MODBUS_MISS_CLOSED : MODBUS_MISS_NO_ENTRANCE;
         fail(client, now_ns);
+    }
 }
 
 void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns)
@@ -653,7 +749,7 @@ void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns)
     }
     drop_frames(client, now_ns);
     note_breaks(client);
-    if (may_be_late(client, now_ns))
+    if (is_paused(client, now_ns))
         return;
     if (client->device == NULL)
         begin(client, now_ns);
@@ -675,10 +771,12 @@ RTS_I64 ModbusClientGetDueNs(const MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     RTS_I64 due = NEVER;
 
+    if (client->device != NULL && client->sent)
+        return client->since_ns + timeout_ns(client->device);
+    if (is_paused(client, now_ns))
+        return client->late_ns > client->free_ns ? client->late_ns : client->free_ns;
     if (client->device != NULL)
-        return client->sent ? client->since_ns + timeout_ns(client->device) : now_ns;
-    if (may_be_late(client, now_ns))
-        return client->late_ns;
+        return now_ns;
     for (const MODBUS_CALL *call = client->calls; call < client->calls + client->call_count; call++) {
         if (SysAtomicLoad(&call->state) == MODBUS_CALL_WAITS && call->client == client)
             return now_ns;

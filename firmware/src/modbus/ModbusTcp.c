@@ -30,6 +30,7 @@ static void begin(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns)
     link->sending = false;
     link->connecting = false;
     link->fill = 0;
+    link->accepted = false;
     link->replied = false;
     link->began_ns = link->moved_ns = now_ns;
 }
@@ -98,6 +99,7 @@ static void look_at_connecting(MODBUS_LINK *link, RTS_I64 now_ns)
 {
     RTS_RESULT result = SysSockGetConnected(link->handle);
 
+    link->accepted = result == ERR_OK;
     if (result == ERR_OK)
         link->connecting = false;
     else if (result != ERR_PENDING || now_ns - link->began_ns >= (RTS_I64)MODBUS_CONNECT_MS * NS_PER_MS)

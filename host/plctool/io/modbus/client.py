@@ -40,14 +40,16 @@ from plctool.io.modbus.settings import (
     serial_settings,
     structure_parameter,
 )
-from plctool.io.model import HOLD, ZERO, Channel, Connector, Substitute, bits_of
+from plctool.io.model import HOLD, ZERO, Channel, Connector, Parameter, Substitute, bits_of
 from plctool.io.tables import Table, each
 
 _MAX_TIMEOUT_US = 60_000_000
+_MAX_RETRIES = 10
+_ASK_AGAIN_US = (100_000, 3_600_000_000)
 _MAX_INTERVAL_US = 3_600_000_000
 _READ_WRITE = int(lib.MODBUS_READ_WRITE_REGISTERS)
 _TURNAROUND_US = 5000  # what a device takes to reply, for the load of a line
-_TIMEOUT_US = 1_000_000
+_TIMEOUT_US = int(lib.MODBUS_TIMEOUT_MS) * 1000
 _AROUND = 3  # bytes around a PDU: unit and CRC
 _BROADCAST_US = 100_000  # for all devices of a line to do what is asked of them (Modbus over Serial Line 2.4.1)
 _REVERSE_FLAGS = {
@@ -145,6 +147,28 @@ class Job:
         return [(part, most) for part, most in both if most]
 
 
+@dataclass(frozen=True)
+class Patience:
+    """How long a line waits for a device. None: not stated, so the driver's default holds. A device has those of its
+    line that it does not state itself."""
+
+    timeout_us: int | None = None
+    pause_us: int = 0
+    retries: int | None = None
+    ask_again_us: int | None = None
+
+    def parameters(self) -> list[Parameter]:
+        """Those of a device that are not the driver's defaults; the time-out is always there."""
+        made = []
+        if self.pause_us:
+            made.append(number_parameter(int(lib.MODBUS_PARAM_PAUSE), self.pause_us // 1000, "pause"))
+        if self.retries is not None:
+            made.append(number_parameter(int(lib.MODBUS_PARAM_RETRIES), self.retries, "retries"))
+        if self.ask_again_us is not None:
+            made.append(number_parameter(int(lib.MODBUS_PARAM_ASK_AGAIN), self.ask_again_us // 1000, "ask_again"))
+        return made
+
+
 @dataclass(eq=False)
 class ModbusLine(Connector):
     """A line of a client. `char_us`: of a serial line, how long a character takes; `load`: share of the time that its
@@ -155,6 +179,7 @@ class ModbusLine(Connector):
 
     char_us: float | None = None
     silence_us: float = 0.0
+    patience: Patience = Patience()
     devices: list[ModbusDevice] = field(default_factory=list)
 
     def note_ages(self) -> None:
@@ -194,11 +219,13 @@ class ModbusLine(Connector):
 
 @dataclass(eq=False)
 class ModbusDevice(Connector):
-    """A device of a client. `pause_us`: of all devices at once, how long the line is left to them after a request."""
+    """A device of a client. `broadcast_us`: of all devices at once, how long the line is left to them after a request;
+    `pause_us`: of its line after each request to it."""
 
-    counters = counters("requests", "timeouts", "exceptions", "others", "unverified", "last_exception")
+    counters = counters("requests", "timeouts", "exceptions", "others", "unverified", "last_exception", "busy")
 
-    pause_us: int | None = None
+    broadcast_us: int | None = None
+    pause_us: int = 0
     unit: int = 0
     order: Order = ORDERS["ABCD"]
     jobs: list[Job] = field(default_factory=list)
@@ -213,10 +240,17 @@ class ModbusDevice(Connector):
                 continue
             self._add(number, job, flags)
             self._note_time(job, mistakes)
+        self._check_restarts(mistakes)
         line = self.parent
         if isinstance(line, ModbusLine) and self in line.devices[-1:]:
             line.note_ages()
             line.check_writes(mistakes)
+
+    def _check_restarts(self, mistakes: Mistakes) -> None:
+        """Warns of a device that is asked on change only: while nothing changes its restart is not seen."""
+        if self.enabled and self.jobs and all(job.interval_us == 0 for job in self.jobs):
+            message = f"nothing is asked of {self.name} at intervals, so a restart of it is not seen"
+            mistakes.warning(self.jobs[0].pos, f'{message}, and its outputs stay off: add every = "T#10s"')
 
     def _bits(self, job: Job, mistakes: Mistakes) -> int | None:
         for part, _ in job.parts:
@@ -305,14 +339,15 @@ class ModbusDevice(Connector):
         assert isinstance(line, ModbusLine)
         function = job.function
         written = _data_size(function, job.write.count) if function.most_written > 1 else 0
-        if self.pause_us is not None:
-            job.took_us = line.broadcast_us(function.request + written, self.pause_us)
+        if self.broadcast_us is not None:
+            job.took_us = line.broadcast_us(function.request + written, self.broadcast_us)
         else:
             job.took_us = line.transaction_us(
                 function.request + written, function.reply + _data_size(function, job.read.count)
             )
         if job.verify:
-            job.took_us += line.transaction_us(5, 2 + _data_size(function, job.write.count))
+            job.took_us += line.transaction_us(5, 2 + _data_size(function, job.write.count)) + self.pause_us
+        job.took_us += self.pause_us
         if not self.enabled or line.char_us is None or job.interval_us == 0:
             return
         before = line.load or 0.0
@@ -366,6 +401,7 @@ def read_serial_client(table: Table) -> list[Connector]:
     baud, bits = serial_settings(table, line)
     line.char_us = bits * 1e6 / baud
     line.silence_us = 1750.0 if baud > 19200 else 3.5 * line.char_us
+    line.patience = _read_patience(table, Patience())
     return [line, *_read_devices(table, line)]
 
 
@@ -374,7 +410,18 @@ def read_tcp_client(table: Table) -> list[Connector]:
     line = read_connector(ModbusLine, table, DRIVER, default_name=default_name(table, "host"))
     line.parameters.append(number_parameter(int(lib.MODBUS_PARAM_ROLE), int(lib.MODBUS_ROLE_TCP_CLIENT)))
     line.parameters += address_parameters(table, "host", "")
+    line.patience = _read_patience(table, Patience())
     return [line, *_read_devices(table, line)]
+
+
+def _read_patience(table: Table, of_line: Patience) -> Patience:
+    """Of a line or a device, which has that of its line unless it says otherwise."""
+    return Patience(
+        table.duration_us("timeout", 1000, _MAX_TIMEOUT_US, of_line.timeout_us),
+        table.duration_us("pause", 0, _MAX_TIMEOUT_US, of_line.pause_us) or 0,
+        table.number("retries", 0, _MAX_RETRIES, of_line.retries),
+        table.duration_us("ask_again", *_ASK_AGAIN_US, of_line.ask_again_us),
+    )
 
 
 def _read_devices(table: Table, line: ModbusLine) -> list[Connector]:
@@ -400,13 +447,16 @@ def _read_device(table: Table, line: ModbusLine) -> Connector:
     unit = table.number("unit", 0, MAX_UNIT if serial else 255, None if serial else 255, required=1 if serial else None)
     device.unit = unit or 0
     to_all = serial and unit == 0
-    default_us = _BROADCAST_US if to_all else _TIMEOUT_US
-    timeout_us = table.duration_us("timeout", 1000, _MAX_TIMEOUT_US, default_us) or default_us
-    device.pause_us = timeout_us if to_all else None
+    of_line = replace(line.patience, timeout_us=None) if to_all else line.patience
+    patience = _read_patience(table, of_line)
+    timeout_us = patience.timeout_us or (_BROADCAST_US if to_all else _TIMEOUT_US)
+    device.broadcast_us = timeout_us if to_all else None
+    device.pause_us = patience.pause_us
     device.order = table.choice("order", ORDERS, ORDERS["ABCD"]) or ORDERS["ABCD"]
     device.parameters += [
         number_parameter(int(lib.MODBUS_PARAM_UNIT), unit or 0, "unit"),
         number_parameter(int(lib.MODBUS_PARAM_TIMEOUT), timeout_us // 1000, "timeout"),
+        *patience.parameters(),
     ]
     for kind in ("read", "write", "read_write"):
         device.jobs += each(table.tables(kind), lambda t, kind=kind: _read_job(t, kind))  # type: ignore[misc]
@@ -419,7 +469,7 @@ def _read_device(table: Table, line: ModbusLine) -> Connector:
 def _read_job(table: Table, kind: str) -> Job | None:
     function = _read_function(table, kind)
     on_change = kind == "write" and table.flag("on_change")
-    table.belongs("it is a key of the device", "order", "unit", "timeout")
+    table.belongs("it is a key of the device", "order", "unit", "timeout", "pause", "retries", "ask_again")
     if kind == "read":
         table.belongs("only what is written has it", "verify", "on_change", "on_stop")
     if kind == "write" and not on_change and "on_change" not in table and "every" not in table:
