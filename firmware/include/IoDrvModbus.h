@@ -17,6 +17,7 @@ enum {
     MODBUS_ROLE_TCP_CLIENT = 2,
     MODBUS_ROLE_SERIAL_SERVER = 3,
     MODBUS_ROLE_TCP_SERVER = 4,
+    MODBUS_ROLE_RTU_TCP_CLIENT = 5, /* frames of a serial line on a TCP connection */
 };
 
 enum {
@@ -34,7 +35,8 @@ enum {
     MODBUS_PARAM_PAUSE = 11,   /* of a device [ms]: of its line after each request to it; 0 if missing */
     MODBUS_PARAM_RETRIES = 12, /* of a device, before it is lost; 1 if missing */
     MODBUS_PARAM_ASK_AGAIN =
-        13, /* of a device [ms]: how often it is asked while it is lost; MODBUS_RETRY_MS if missing */
+        13,                 /* of a device [ms]: how often it is asked while it is lost; MODBUS_RETRY_MS if missing */
+    MODBUS_PARAM_GAPS = 14, /* of a server: the value of registers that are in no range; if missing they are refused */
     MODBUS_PARAM_OBJECT = 0x100, /* + n: object n of the identification of a server, a text */
     MODBUS_PARAM_JOB = 0x1000,   /* + n: a MODBUS_JOB */
     MODBUS_PARAM_RANGE = 0x2000, /* + n: a MODBUS_RANGE */

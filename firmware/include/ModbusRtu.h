@@ -26,4 +26,9 @@ void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns);
 void ModbusRtuGiveUp(MODBUS_LINK *link);
 void ModbusRtuClose(MODBUS_LINK *link);
 
+/* The same frames on a TCP connection (ModbusTcp.h). Begin: makes one of the unit and PDU in the buffer, to be sent. Find:
+ * the size of the PDU of a frame in what has been received, 0: none; the reply that is looked for, or a whole other one. */
+void ModbusRtuBeginFrame(MODBUS_LINK *link, RTS_UI32 pdu_size);
+RTS_UI32 ModbusRtuFindFrame(MODBUS_LINK *link);
+
 #endif

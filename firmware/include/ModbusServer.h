@@ -27,6 +27,8 @@ typedef struct {
     bool tcp;
     bool tunnel;       /* tools reach this device through it (ModbusTunnel.h); MODBUS_TUNNEL 1 */
     bool running;      /* the application, for MODBUS_REPORT_SERVER_ID */
+    bool has_gaps;     /* registers and bits that are in no range can be read: as `gap` */
+    RTS_UI8 gap[2];    /* its low byte first; bits have its lowest one */
     RTS_UI32 requests; /* that were for this unit */
     RTS_UI32 errors;   /* replied to with an exception */
     RTS_UI32 written;  /* requests that wrote, after the first one never 0; counted with the lock of the memory */

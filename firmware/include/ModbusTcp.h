@@ -21,6 +21,8 @@ void ModbusTcpBeginServer(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns);
 /* A link that connects to a server when it is asked whether it is ready. It connects again at once if the last connection
  * had a reply or was given up, and MODBUS_RECONNECT_MS after the last one failed otherwise. */
 void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer);
+/* The same for a gateway that passes on the frames of its serial line (ModbusRtu.h), as on a line of this device. */
+void ModbusTcpBeginRtuClient(MODBUS_LINK *link, const SOCKADDRESS *peer);
 /* Of a client nothing that is on its way arrives any more: it would do so minutes later, after newer values. Nor of a
  * server whose peer does not read: the system would keep it for ever. */
 void ModbusTcpClose(MODBUS_LINK *link);

@@ -330,8 +330,55 @@ static void other_functions_are_refused(void)
         CHECK_EQUAL(was_refused, !known);
         refused += was_refused;
     }
-    CHECK_EQUAL(refused, 128 - 12);
+    CHECK_EQUAL(refused, 128 - 13);
     CHECK_EQUAL(server.errors > refused, true); /* some are too short or too long */
+}
+
+static void the_loopback_returns_what_came(void)
+{
+    begin();
+    CHECK_EQUAL(ASK(8, 0, 0, 0xA5, 0x37), 5);
+    CHECK(memcmp(pdu, "\x08\x00\x00\xA5\x37", 5) == 0);
+    CHECK_EQUAL(ASK(8, 0, 1, 0, 0), 2); /* another diagnostic */
+    CHECK(pdu[0] == 0x88 && pdu[1] == MODBUS_ILLEGAL_FUNCTION);
+    CHECK_EQUAL(ASK(8, 0, 0, 1), 2);
+    CHECK(pdu[0] == 0x88 && pdu[1] == MODBUS_ILLEGAL_VALUE);
+}
+
+/* Registers 0 to 11 and 500 to 503 are there. */
+static void gaps_have_a_value_if_they_may_be_read(void)
+{
+    begin();
+    CHECK_EQUAL(ASK(3, 0, 10, 0, 4), 2);
+    CHECK_EQUAL(pdu[1], MODBUS_ILLEGAL_ADDRESS);
+    server.has_gaps = true;
+    server.gap[0] = 0x34;
+    server.gap[1] = 0x12;
+    CHECK_EQUAL(ASK(3, 0, 10, 0, 4), 10);
+    CHECK(memcmp(pdu + 2, "\xC0\xC1\xC2\xC3\x12\x34\x12\x34", 8) == 0);
+    swapped[0] = 0x77;
+    CHECK_EQUAL(ASK(3, 0x01, 0xF3, 0, 2), 6); /* 499 and 500 */
+    CHECK(memcmp(pdu + 2, "\x12\x34\x00\x77", 4) == 0);
+    CHECK_EQUAL(ASK(3, 0x20, 0, 0, 125), 252); /* none is there */
+    CHECK(memcmp(pdu + 250, "\x12\x34", 2) == 0);
+    CHECK_EQUAL(ASK(3, 0xFF, 0xFF, 0, 2), 2); /* past the last address */
+    CHECK_EQUAL(pdu[1], MODBUS_ILLEGAL_ADDRESS);
+    server.gap[0] = 1;
+    CHECK_EQUAL(ASK(2, 0, 0, 0, 16), 4);
+    CHECK(pdu[2] == 0xFF && pdu[3] == 0xFF);
+}
+
+static void gaps_are_not_written(void)
+{
+    begin();
+    server.has_gaps = true;
+    CHECK_EQUAL(ASK(6, 0, 100, 0, 1), 2);
+    CHECK_EQUAL(pdu[1], MODBUS_ILLEGAL_ADDRESS);
+    CHECK_EQUAL(ASK(22, 0, 100, 0, 0, 0, 1), 2);
+    CHECK_EQUAL(pdu[1], MODBUS_ILLEGAL_ADDRESS);
+    CHECK_EQUAL(ASK(23, 0, 0, 0, 1, 0, 9, 0, 2, 4, 1, 1, 1, 1), 2); /* 10 may be read only */
+    CHECK_EQUAL(pdu[1], MODBUS_ILLEGAL_ADDRESS);
+    CHECK_EQUAL(writable[18], 0);
 }
 
 static void server_id_says_whether_the_program_runs(void)
@@ -418,6 +465,9 @@ int main(void)
     RUN(addresses_end_at_65535);
     RUN(a_coil_is_on_or_off);
     RUN(other_functions_are_refused);
+    RUN(the_loopback_returns_what_came);
+    RUN(gaps_have_a_value_if_they_may_be_read);
+    RUN(gaps_are_not_written);
     RUN(server_id_says_whether_the_program_runs);
     RUN(identification_is_a_stream_or_one_object);
     RUN(a_long_identification_comes_in_parts);

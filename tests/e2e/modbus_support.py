@@ -10,6 +10,7 @@ import tty
 from collections.abc import Coroutine
 from typing import Any
 
+from pymodbus.framer import FramerType
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
@@ -63,8 +64,11 @@ class Devices:
     """Devices of pymodbus on one line: `memory[unit]` are the registers of each, which are its coils, too (bit n is bit
     n % 16 of register n // 16). Context manager; may be entered again."""
 
-    def __init__(self, units: list[int], *, tcp: int = 0, serial: str = "", baud: int = 19200) -> None:
+    def __init__(
+        self, units: list[int], *, tcp: int = 0, serial: str = "", baud: int = 19200, rtu: bool = False
+    ) -> None:
         self._units, self._tcp, self._serial, self._baud = units, tcp, serial, baud
+        self._framer = FramerType.RTU if rtu else FramerType.SOCKET  # on TCP
         self.memory: dict[int, list[int]] = {}
         self.requests: list[tuple[int, int]] = []  # unit and function of each
 
@@ -91,7 +95,8 @@ class Devices:
             # One that is alone has to leave requests to others unanswered.
             server = ModbusSerialServer(devices, port=self._serial, baudrate=self._baud, ignore_missing_devices=True)
         else:
-            server = ModbusTcpServer(devices, address=("127.0.0.1", self._tcp), ignore_missing_devices=True)
+            address = ("127.0.0.1", self._tcp)
+            server = ModbusTcpServer(devices, framer=self._framer, address=address, ignore_missing_devices=True)
         await server.serve_forever(background=True)
         return server
 

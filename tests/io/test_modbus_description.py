@@ -424,3 +424,65 @@ def test_writes_of_other_registers_are_no_warning(tmp_path: Path, text: str) -> 
 def test_device_that_need_not_be_there_may_name_what_another_one_has(tmp_path: Path, key: str) -> None:
     tables = '[[modbus.rs485]]\nname = "A"\nport = "COM2"\n[[modbus.rs485]]\nname = "B"\nport = "COM2"\n'
     assert not any("cannot have" in message for message in messages(tmp_path, PROGRAM, f"{tables}{key}\n"))
+
+
+NETWORK = """\
+[[modbus.tcp]]
+host = "192.168.0.5"
+{line}
+[[modbus.tcp.device]]
+name = "Meter"
+{device}
+read = [ {{ function = 3, address = 40001, every = "T#100ms", var = "Main.word_1" }} ]
+"""
+
+
+def test_a_serial_line_in_the_network_has_a_role_of_its_own(tmp_path: Path) -> None:
+    for framing, role in (("tcp", lib.MODBUS_ROLE_TCP_CLIENT), ("rtu", lib.MODBUS_ROLE_RTU_TCP_CLIENT)):
+        text = NETWORK.format(line=f'framing = "{framing}"', device="unit = 3")
+        line = configuration(build(tmp_path, PROGRAM, text)).connectors[0]
+        assert [p.value[0] for p in line.parameters if p.id == lib.MODBUS_PARAM_ROLE] == [role]
+
+
+@pytest.mark.parametrize(
+    ("line", "device", "message"),
+    [
+        ('framing = "ascii"', "unit = 3", "framing cannot be 'ascii'; it can be tcp or rtu"),
+        ('framing = "rtu"', "", "[modbus.tcp.device] needs unit: write for example unit = 1"),
+        ('framing = "rtu"', "unit = 255", "unit is 255; it can be 0 to 247"),
+        ('framing = "rtu"', "unit = 0", "unit 0 is all devices of the line"),
+    ],
+)
+def test_framing_and_units_that_cannot_be(tmp_path: Path, line: str, device: str, message: str) -> None:
+    found = messages(tmp_path, PROGRAM, NETWORK.format(line=line, device=device))
+    assert any(message in m for m in found), found
+
+
+@pytest.mark.parametrize(
+    ("port", "hint"),
+    [
+        ("socket://192.168.0.5:8899", 'with host = "192.168.0.5", port = 8899 and framing = "rtu"'),
+        ("tcp://gateway/", 'with host = "gateway" and framing = "rtu"'),
+        ("rfc2217://[::1]:4000", 'with host = "192.168.0.7" and framing = "rtu"'),
+    ],
+)
+def test_url_in_place_of_a_serial_line_is_refused_with_what_to_write(tmp_path: Path, port: str, hint: str) -> None:
+    text = device("word_1").replace("/dev/ttyS1", port)
+    found = messages(tmp_path, PROGRAM, text)
+    assert any(
+        f"'{port}' is not a serial line of the controller: write it as [[modbus.tcp]] {hint}" in m for m in found
+    )
+    server = f'[modbus.server.rs485]\nport = "{port}"\nholding = {{ 40001 = "Main.word_1" }}\n'
+    found = messages(tmp_path, PROGRAM, server)
+    assert any(m.endswith(f"'{port}' is not a serial line of the controller") for m in found)
+
+
+def test_gaps_of_a_server_are_a_number_of_a_register(tmp_path: Path) -> None:
+    text = "[modbus.server.tcp]\n{line}\nholding = {{ 40001 = 'Main.word_1' }}\n"
+    for line, expected in (("gaps = 0", [0]), ("gaps = 65535", [0xFFFF]), ("", [])):
+        server = configuration(build(tmp_path, PROGRAM, text.format(line=line))).connectors[0]
+        found = [int.from_bytes(p.value, "little") for p in server.parameters if p.id == lib.MODBUS_PARAM_GAPS]
+        assert found == expected
+    for line, message in (("gaps = -1", "gaps is -1; it can be 0 to 65535"), ("gaps = true", "it has to be a number")):
+        found_messages = messages(tmp_path, PROGRAM, text.format(line=line))
+        assert any(message in m for m in found_messages), found_messages

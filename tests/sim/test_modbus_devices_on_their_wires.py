@@ -251,3 +251,25 @@ def test_an_hour_of_bus_is_complete(plc: Simulator) -> None:
     }
     assert good(plc) == DEVICES
     assert [plc.read(f"{name}.errors") for name in DEVICES] == [0, 0, 0]
+
+
+def test_a_serial_line_in_the_network_has_the_same_devices_and_faults(tmp_path: Path) -> None:
+    text = DESCRIPTION.replace('[[modbus.rs485]]\nname = "Bus"\nport = "/dev/ttyS1"\nbaud = 19200\n', "", 1)
+    text = text.replace("modbus.rs485", "modbus.tcp")
+    (tmp_path / "main.st").write_text(SOURCE)
+    line = '[[modbus.tcp]]\nname = "Bus"\nhost = "10.0.0.1"\nport = 8899\nframing = "rtu"\n'
+    (tmp_path / "main.io.toml").write_text(line + text)
+    with Simulator.from_sources(tmp_path / "main.st") as plc:
+        plc.run_for(1000)
+        assert good(plc) == DEVICES
+        plc.set_input("Main.level", 7)
+        plc.write({"Main.speed": 1.5})
+        plc.run_for(300)
+        assert (plc.read("Main.level"), plc.output("Main.speed")) == (7, 1.5)
+        for fault in ("absent", "answers", "cut"):
+            plc.fault("Tank", fault, 3)
+            plc.run_for(1500)
+            assert requests(plc, "Tank") > 0 and plc.read("Tank.errors") >= 2
+            plc.fault("Tank", fault, 0)
+            plc.run_for(11_000)
+            assert good(plc) == DEVICES

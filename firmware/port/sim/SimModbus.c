@@ -261,6 +261,13 @@ bool SimModbusIsPlugged(RTS_HANDLE handle)
     return line != NULL && *fault_of(line->noted.connector, IO_SIM_ABSENT) == 0;
 }
 
+bool SimModbusIsRtu(RTS_HANDLE handle)
+{
+    const MODBUS_CLIENT_LINE *line = line_of(handle);
+
+    return line != NULL && line->client.link.type->broadcasts;
+}
+
 RTS_I64 SimModbusGetDelayNs(RTS_HANDLE handle, RTS_UI8 unit)
 {
     const MODBUS_CLIENT_LINE *line = line_of(handle);

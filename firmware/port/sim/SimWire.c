@@ -27,12 +27,13 @@ enum {
 #define NS_PER_S ((RTS_I64)1000000000)
 #define LEAST_SILENCE_NS ((RTS_I64)1750000)
 
-/* One frame at a time is on it: a request, and then its reply, both with the header of TCP, of which a serial line shows
- * the unit only. */
+/* One frame at a time is on it: a request, and then its reply, both with the header of TCP, of which the frames of a serial
+ * line show the unit only. */
 typedef struct {
     bool is_open;
     char name[32];    /* of a serial line; "" of a connection */
     RTS_I64 char_ns;  /* 0: a connection */
+    bool is_rtu;      /* frames of a serial line, on a connection too */
     RTS_I64 quiet_ns; /* from when on the line is silent */
     RTS_I64 byte_ns;  /* when the last byte came that was read */
     RTS_I64 due_ns;   /* when the reply begins */
@@ -81,7 +82,7 @@ static RTS_I64 silence_of(const WIRE *wire)
 /* Where the frame begins on this wire. */
 static RTS_UI32 start_of(const WIRE *wire)
 {
-    return wire->char_ns != 0 ? MODBUS_AT_UNIT : 0;
+    return wire->is_rtu ? MODBUS_AT_UNIT : 0;
 }
 
 /* ---- frames ---- */
@@ -95,10 +96,12 @@ static void forget(WIRE *wire)
 /* A client sends a frame as a whole. */
 static RTS_UI32 put(WIRE *wire, const RTS_UI8 *data, RTS_UI32 size)
 {
-    RTS_UI32 start = start_of(wire);
+    RTS_UI32 start;
     RTS_I64 delay_ns;
 
     forget(wire);
+    wire->is_rtu = wire->char_ns != 0 || SimModbusIsRtu(handle_of(wire));
+    start = start_of(wire);
     if (start + size < LEAST_FRAME || size > sizeof(wire->frame) - start || !SimModbusIsPlugged(handle_of(wire)))
         return size;
     memcpy(wire->frame + start, data, size);
@@ -131,7 +134,7 @@ static void end_tcp(WIRE *wire, RTS_UI32 size, SIM_ARRIVAL arrival)
 /* The device has heard the request, and begins to reply. */
 static void begin_reply(WIRE *wire)
 {
-    RTS_UI32 size = wire->fill + start_of(wire) - MODBUS_AT_PDU - (wire->char_ns != 0 ? MODBUS_CRC_SIZE : 0);
+    RTS_UI32 size = wire->fill + start_of(wire) - MODBUS_AT_PDU - (wire->is_rtu ? MODBUS_CRC_SIZE : 0);
     SIM_ARRIVAL arrival = SIM_WHOLE;
 
     size = SimModbusReply(handle_of(wire), wire->frame[MODBUS_AT_UNIT], wire->frame + MODBUS_AT_PDU, size, &arrival);
@@ -139,7 +142,7 @@ static void begin_reply(WIRE *wire)
     if (size == 0 || !SimModbusIsPlugged(handle_of(wire)))
         return;
     wire->replies = true;
-    if (wire->char_ns != 0)
+    if (wire->is_rtu)
         end_serial(wire, size, arrival);
     else
         end_tcp(wire, size, arrival);

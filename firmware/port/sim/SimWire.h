@@ -28,6 +28,9 @@ RTS_I64 SimWireGetDueNs(RTS_I64 now_ns);
 /* Whether the wire is in one piece. */
 bool SimModbusIsPlugged(RTS_HANDLE handle);
 
+/* Whether it has the frames of a serial line. */
+bool SimModbusIsRtu(RTS_HANDLE handle);
+
 /* How long the device needs before it replies [ns]; negative: it does not. */
 RTS_I64 SimModbusGetDelayNs(RTS_HANDLE handle, RTS_UI8 unit);
 

@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "CMUtils.h"
 #include "CmpIoMgrEmbedded.h"
 #include "IoDrvModbus.h"
 #include "ModbusRtu.h"
@@ -157,7 +158,10 @@ static void begin_client(MODBUS_LINK *link, const IoConfigConnector *connector)
 {
     const SOCKADDRESS peer = address_of(connector);
 
-    ModbusTcpBeginClient(link, &peer);
+    if (number(connector, MODBUS_PARAM_ROLE, 0) == MODBUS_ROLE_RTU_TCP_CLIENT)
+        ModbusTcpBeginRtuClient(link, &peer);
+    else
+        ModbusTcpBeginClient(link, &peer);
 }
 
 static void begin_server(MODBUS_SERVER *server, const IoConfigConnector *connector)
@@ -332,17 +336,37 @@ static RTS_RESULT add_ranges(MODBUS_SETUP *setup, MODBUS_SERVER *server, const I
     return result;
 }
 
+/* Major, minor and patch. */
+static const char *firmware_version(RTS_UI32 version)
+{
+    static char text[sizeof("255.255.255")];
+
+    CMUtlsnprintf(text, sizeof(text), "%u.%u.%u", (unsigned)(version >> 24), (unsigned)(version >> 16 & 0xFF),
+                  (unsigned)(version >> 8 & 0xFF));
+    return text;
+}
+
 static void describe(MODBUS_SERVER *server, const IoConfigConnector *connector)
 {
     const SYS_TARGET *target = SysTargetGet();
-    const char *const otherwise[MODBUS_OBJECTS] = {target->vendor_name, target->device_name, "", NULL,
-                                                   target->device_name};
+    const char *const otherwise[MODBUS_OBJECTS] = {target->vendor_name, target->device_name,
+                                                   firmware_version(target->version), NULL, target->device_name};
 
     for (RTS_UI32 i = 0; i < MODBUS_OBJECTS; i++) {
         const char *text =
             IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(connector, MODBUS_PARAM_OBJECT + i));
         server->object[i] = text != NULL ? text : otherwise[i];
     }
+}
+
+static void note_gaps(MODBUS_SERVER *server, const IoConfigParameter *parameter)
+{
+    RTS_RESULT result;
+    RTS_UI32 value = IoMgrConfigGetParameterValueDword(parameter, &result);
+
+    server->has_gaps = result == ERR_OK;
+    server->gap[0] = (RTS_UI8)value;
+    server->gap[1] = (RTS_UI8)(value >> 8);
 }
 
 static RTS_RESULT add_server(MODBUS_SETUP *setup, const IoConfigConnector *connector, bool is_tcp)
@@ -356,6 +380,7 @@ static RTS_RESULT add_server(MODBUS_SETUP *setup, const IoConfigConnector *conne
     line->server.tcp = is_tcp;
     line->server.unit = (RTS_UI8)number(connector, MODBUS_PARAM_UNIT, is_tcp ? 0 : 1);
     describe(&line->server, connector);
+    note_gaps(&line->server, IoMgrConfigGetParameter(connector, MODBUS_PARAM_GAPS));
     if (!is_tcp)
         result = open_line(&line->link, &line->server, connector);
     if (result == ERR_OK)
@@ -370,13 +395,15 @@ static RTS_RESULT add_server(MODBUS_SETUP *setup, const IoConfigConnector *conne
 static RTS_RESULT add_line(MODBUS_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connector)
 {
     RTS_UI32 role = number(connector, MODBUS_PARAM_ROLE, 0);
-    bool is_tcp = role == MODBUS_ROLE_TCP_CLIENT || role == MODBUS_ROLE_TCP_SERVER;
+    bool is_tcp =
+        role == MODBUS_ROLE_TCP_CLIENT || role == MODBUS_ROLE_TCP_SERVER || role == MODBUS_ROLE_RTU_TCP_CLIENT;
 
     if (is_tcp && !HAS_TCP)
         return refuse_tcp(connector);
     switch (role) {
     case MODBUS_ROLE_SERIAL_CLIENT:
     case MODBUS_ROLE_TCP_CLIENT:
+    case MODBUS_ROLE_RTU_TCP_CLIENT:
         return add_client(setup, driver, connector, is_tcp);
     case MODBUS_ROLE_SERIAL_SERVER:
     case MODBUS_ROLE_TCP_SERVER:

@@ -16,6 +16,7 @@ static const MODBUS_FUNCTION functions[] = {
     {MODBUS_READ_INPUT_REGISTERS, MODBUS_INPUT_REGISTERS, 5, REG, MODBUS_MAX_READ_REGISTERS, 0},
     {MODBUS_WRITE_COIL, MODBUS_COILS, 5, ONE, 0, 1},
     {MODBUS_WRITE_REGISTER, MODBUS_HOLDING_REGISTERS, 5, REG, 0, 1},
+    {MODBUS_DIAGNOSTICS, 0, 5, REG, 0, 0},
     {MODBUS_WRITE_COILS, MODBUS_COILS, 6, ONE, 0, MODBUS_MAX_WRITE_BITS},
     {MODBUS_WRITE_REGISTERS, MODBUS_HOLDING_REGISTERS, 6, REG, 0, MODBUS_MAX_WRITE_REGISTERS},
     {MODBUS_REPORT_SERVER_ID, 0, 1, REG, 0, 0},
@@ -78,7 +79,7 @@ RTS_UI32 ModbusGetReplySize(const RTS_UI8 *pdu, RTS_UI32 size)
         return 2;
     if (function == NULL || pdu[0] == MODBUS_ENCAPSULATED)
         return 0;
-    if (function->most_written != 0 && function->most_read == 0)
+    if ((function->most_written != 0 && function->most_read == 0) || pdu[0] == MODBUS_DIAGNOSTICS)
         return size_of_repeated(function);
     return size < 2 ? 2 : 2u + pdu[1];
 }

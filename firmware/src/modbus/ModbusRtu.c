@@ -94,7 +94,7 @@ static void forget_received(MODBUS_LINK *link)
     (void)SysComRead(link->handle, chunk, sizeof(chunk));
 }
 
-void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns)
+void ModbusRtuBeginFrame(MODBUS_LINK *link, RTS_UI32 pdu_size)
 {
     RTS_UI8 *unit = link->frame + MODBUS_AT_UNIT;
     RTS_UI16 crc = ModbusCrc(unit, 1 + pdu_size);
@@ -106,6 +106,11 @@ void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns)
     link->function = unit[1];
     link->sent = 0;
     link->sending = true;
+}
+
+void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns)
+{
+    ModbusRtuBeginFrame(link, pdu_size);
     link->moved_ns = now_ns + (RTS_I64)link->fill * link->char_ns;
     forget_received(link);
     transmit(link, now_ns);
@@ -237,6 +242,15 @@ static bool has_other(const MODBUS_LINK *link, bool over)
 
     return (over || !may_go_on) && is_right(first_byte(link), link->fill);
 }
+
+#if MODBUS_MAX_CONNECTIONS > 0
+RTS_UI32 ModbusRtuFindFrame(MODBUS_LINK *link)
+{
+    if (link->fill != 0 && (find_reply(link) || has_other(link, false)))
+        return (RTS_UI32)link->fill - AROUND_PDU;
+    return 0;
+}
+#endif
 
 /* ---- receiving ---- */
 

@@ -110,6 +110,13 @@ static RTS_UI32 find(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 addres
     return 0;
 }
 
+/* One register or bit that is in no range. */
+static RTS_UI32 find_gap(const MODBUS_SERVER *server, BITS *found)
+{
+    *found = (BITS){(RTS_UI8 *)server->gap, 0, 0};
+    return 1;
+}
+
 /* Moves what a request reads or writes between memory and a PDU, locked; `data` NULL: nothing yet. False: it is not all
  * there. */
 static bool exchange(const MODBUS_SERVER *server, const MODBUS_REQUEST *request, bool to_write, RTS_UI8 *data)
@@ -122,6 +129,8 @@ static bool exchange(const MODBUS_SERVER *server, const MODBUS_REQUEST *request,
 
     while (count != 0) {
         RTS_UI32 there = find(server, table, address, count, to_write, &found);
+        if (there == 0 && server->has_gaps && !to_write)
+            there = find_gap(server, &found);
         if (there == 0)
             return false;
         if (data != NULL)
@@ -273,6 +282,9 @@ static RTS_UI32 reply_identification(const MODBUS_SERVER *server, RTS_UI8 *pdu, 
 static RTS_UI32 reply(MODBUS_SERVER *server, MODBUS_REQUEST *request, RTS_UI8 *pdu, RTS_UI8 *exception)
 {
     switch (request->function->function) {
+    case MODBUS_DIAGNOSTICS:
+        *exception = ModbusGet16(pdu + 1) == MODBUS_LOOPBACK ? 0 : MODBUS_ILLEGAL_FUNCTION;
+        return request->function->size; /* what came */
     case MODBUS_REPORT_SERVER_ID:
         return reply_server_id(server, pdu);
     case MODBUS_ENCAPSULATED:

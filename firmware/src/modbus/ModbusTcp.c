@@ -6,9 +6,15 @@
 #include "ModbusTcp.h"
 
 #include "ModbusPdu.h"
+#include "ModbusRtu.h"
 #include "rts_config.h"
 
-enum { NS_PER_MS = 1000000, LENGTH_MIN = 2, LENGTH_MAX = 1 + MODBUS_MAX_PDU };
+enum {
+    NS_PER_MS = 1000000,
+    LENGTH_MIN = 2,
+    LENGTH_MAX = 1 + MODBUS_MAX_PDU,
+    RTU_ROOM = MODBUS_FRAME_SIZE - MODBUS_AT_UNIT,
+};
 
 static const RTS_I64 LONG_AGO_NS = -(RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS;
 
@@ -17,9 +23,21 @@ static const MODBUS_LINK_TYPE of_client = {ModbusTcpReady,  ModbusTcpReceive, Mo
 static const MODBUS_LINK_TYPE of_server = {ModbusTcpReady, ModbusTcpReceive, ModbusTcpSend,
                                            ModbusTcpClose, ModbusTcpClose,   false};
 
+static RTS_UI32 receive_rtu(MODBUS_LINK *link, RTS_I64 now_ns);
+static void send_rtu(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns);
+
+static const MODBUS_LINK_TYPE of_rtu_client = {ModbusTcpReady,  receive_rtu,    send_rtu,
+                                               ModbusTcpGiveUp, ModbusTcpClose, true};
+
 static bool is_open(const MODBUS_LINK *link)
 {
     return link->handle != RTS_INVALID_HANDLE;
+}
+
+/* Where what is on the wire begins in the buffer. */
+static RTS_UI8 *frame_of(MODBUS_LINK *link)
+{
+    return link->frame + (link->type == &of_rtu_client ? MODBUS_AT_UNIT : 0);
 }
 
 /* ---- connections ---- */
@@ -51,9 +69,15 @@ void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer)
     link->peer = *peer;
 }
 
+void ModbusTcpBeginRtuClient(MODBUS_LINK *link, const SOCKADDRESS *peer)
+{
+    ModbusTcpBeginClient(link, peer);
+    link->type = &of_rtu_client;
+}
+
 void ModbusTcpClose(MODBUS_LINK *link)
 {
-    if (is_open(link) && (link->type == &of_client || link->sending))
+    if (is_open(link) && (link->type != &of_server || link->sending))
         SysSockReset(link->handle);
     else if (is_open(link))
         SysSockClose(link->handle);
@@ -121,7 +145,7 @@ static void transmit(MODBUS_LINK *link, RTS_I64 now_ns)
 {
     RTS_UI32 taken;
 
-    if (SysSockSend(link->handle, link->frame + link->sent, (RTS_UI32)link->fill - link->sent, &taken) != ERR_OK) {
+    if (SysSockSend(link->handle, frame_of(link) + link->sent, (RTS_UI32)link->fill - link->sent, &taken) != ERR_OK) {
         fail(link, now_ns);
         return;
     }
@@ -158,7 +182,7 @@ static bool has_read(MODBUS_LINK *link, RTS_UI32 end, RTS_I64 now_ns)
 
     if (link->fill >= end)
         return true;
-    if (SysSockRecv(link->handle, link->frame + link->fill, end - link->fill, &size) != ERR_OK) {
+    if (SysSockRecv(link->handle, frame_of(link) + link->fill, end - link->fill, &size) != ERR_OK) {
         fail(link, now_ns);
         return false;
     }
@@ -178,19 +202,59 @@ static bool is_header_good(MODBUS_LINK *link, RTS_I64 now_ns)
     return false;
 }
 
-RTS_UI32 ModbusTcpReceive(MODBUS_LINK *link, RTS_I64 now_ns)
+/* Goes on with what is on its way. True: the connection is there, and nothing is sent on it. */
+static bool may_receive(MODBUS_LINK *link, RTS_I64 now_ns)
 {
     if (link->connecting)
         look_at_connecting(link, now_ns);
     if (!is_open(link) || link->connecting)
+        return false;
+    if (!link->sending)
+        return true;
+    transmit(link, now_ns);
+    return false;
+}
+
+RTS_UI32 ModbusTcpReceive(MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    if (!may_receive(link, now_ns))
         return 0;
-    if (link->sending) {
-        transmit(link, now_ns);
-        return 0;
-    }
     if (!has_read(link, MODBUS_AT_PDU, now_ns) || !is_header_good(link, now_ns) ||
         !has_read(link, MODBUS_AT_UNIT + length_of(link), now_ns))
         return 0;
     link->replied = true;
     return length_of(link) - 1;
+}
+
+/* ---- frames of a serial line ---- */
+
+static void send_rtu(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns)
+{
+    ModbusRtuBeginFrame(link, pdu_size);
+    transmit(link, now_ns);
+}
+
+static bool has_room(MODBUS_LINK *link)
+{
+    if (link->looks_for == MODBUS_LOOKS_FOR_REPLY && link->fill < RTU_ROOM)
+        return true;
+    link->bad_frames += link->fill == RTU_ROOM;
+    ModbusLinkDrop(link);
+    return link->looks_for == MODBUS_LOOKS_FOR_REPLY;
+}
+
+/* What comes while nothing is looked for is dropped. */
+static RTS_UI32 receive_rtu(MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    RTS_UI32 size;
+
+    if (!may_receive(link, now_ns))
+        return 0;
+    (void)has_read(link, RTU_ROOM, now_ns);
+    size = is_open(link) ? ModbusRtuFindFrame(link) : 0;
+    if (size != 0)
+        link->replied = true;
+    else
+        (void)has_room(link);
+    return size;
 }

@@ -177,6 +177,7 @@ class ModbusLine(Connector):
     faults = ("absent",)  # it is pulled
     counters = counters("bad_frames")
 
+    is_rtu: bool = False  # frames of a serial line, also on the network
     char_us: float | None = None
     silence_us: float = 0.0
     patience: Patience = Patience()
@@ -399,6 +400,7 @@ def read_serial_client(table: Table) -> list[Connector]:
     line = read_connector(ModbusLine, table, DRIVER, default_name=default_name(table, "port"))
     line.parameters.append(number_parameter(int(lib.MODBUS_PARAM_ROLE), int(lib.MODBUS_ROLE_SERIAL_CLIENT)))
     baud, bits = serial_settings(table, line)
+    line.is_rtu = True
     line.char_us = bits * 1e6 / baud
     line.silence_us = 1750.0 if baud > 19200 else 3.5 * line.char_us
     line.patience = _read_patience(table, Patience())
@@ -408,7 +410,9 @@ def read_serial_client(table: Table) -> list[Connector]:
 def read_tcp_client(table: Table) -> list[Connector]:
     """A device on the network, or a gateway and the devices at it."""
     line = read_connector(ModbusLine, table, DRIVER, default_name=default_name(table, "host"))
-    line.parameters.append(number_parameter(int(lib.MODBUS_PARAM_ROLE), int(lib.MODBUS_ROLE_TCP_CLIENT)))
+    line.is_rtu = bool(table.choice("framing", {"tcp": False, "rtu": True}, False))
+    role = lib.MODBUS_ROLE_RTU_TCP_CLIENT if line.is_rtu else lib.MODBUS_ROLE_TCP_CLIENT
+    line.parameters.append(number_parameter(int(lib.MODBUS_PARAM_ROLE), int(role)))
     line.parameters += address_parameters(table, "host", "")
     line.patience = _read_patience(table, Patience())
     return [line, *_read_devices(table, line)]
@@ -441,7 +445,7 @@ def _warn_of_equal_units(line: ModbusLine, mistakes: Mistakes) -> None:
 
 
 def _read_device(table: Table, line: ModbusLine) -> Connector:
-    serial = line.char_us is not None
+    serial = line.is_rtu
     device = read_connector(ModbusDevice, table, DRIVER, parent=line)
     line.devices.append(device)
     unit = table.number("unit", 0, MAX_UNIT if serial else 255, None if serial else 255, required=1 if serial else None)

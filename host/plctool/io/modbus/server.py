@@ -207,6 +207,9 @@ def _read_server(table: Table, name: str, role: int) -> ModbusServer:
     server.parameters.append(number_parameter(int(lib.MODBUS_PARAM_ROLE), role))
     server.order = table.choice("order", ORDERS, ORDERS["ABCD"]) or ORDERS["ABCD"]
     server.as_bits = table.flag("as_bits")
+    gaps = table.number("gaps", 0, 0xFFFF)
+    if gaps is not None:
+        server.parameters.append(number_parameter(int(lib.MODBUS_PARAM_GAPS), gaps, "gaps"))
     for key, kind in (("holding", HOLDING), ("input", INPUT), ("coils", COILS), ("discrete", DISCRETE)):
         names = table.table(key)
         for entry in names.items() if names is not None else ():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import re
 from typing import Any
 
 from plctool.core import ffi, lib
@@ -48,7 +49,10 @@ def serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
     """Adds the parameters of a serial line; its baud, and the bits of a character."""
     bauds = {str(b): b for b in _BAUDS}
     port = table.text("port", required="/dev/ttyS1") or "?"
-    if not is_line(port):
+    if "://" in port:
+        hint = "" if "server" in table.name else _network_hint(port)
+        table.error(f"'{port}' is not a serial line of the controller{hint}", "port")
+    elif not is_line(port):
         table.error(f"port has 1 to {MAX_LINE} ASCII characters", "port")
     connector.takes = f"the line {port}"
     baud = table.number("baud", _BAUDS[0], _BAUDS[-1], 19200, unit="baud") or 19200
@@ -64,6 +68,14 @@ def serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
         number_parameter(int(lib.MODBUS_PARAM_RS485), int(table.flag("drive")), "drive"),
     ]
     return baud, 9 + (parity != 0) + stop_bits
+
+
+def _network_hint(url: str) -> str:
+    """What to write in place of a URL, with which other software names a serial server in the network."""
+    found = re.fullmatch(r"[a-z0-9+.]+://(?P<host>[^:/]+)(:(?P<port>\d+))?/?", url, re.ASCII | re.IGNORECASE)
+    host, port = (found["host"], found["port"]) if found else ("192.168.0.7", None)
+    keys = f'host = "{host}"' + (f", port = {port}" if port else "")
+    return f': write it as [[modbus.tcp]] with {keys} and framing = "rtu"'
 
 
 def address_parameters(table: Table, key: str, default: str) -> list[Parameter]:
