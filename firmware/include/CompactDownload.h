@@ -217,6 +217,7 @@ enum {
     DLF_USEBOOTAPPFROMDOWNLOAD = 2,
     DLF_WRITEBOOTAPPLICATION = 4,
     DLF_REPLYMAYWAIT = 0x100, /* own, of the service: the next block follows at once, and its reply will do for both */
+    DLF_START = 0x200,        /* own, of the service: the application starts when its last block has installed it */
 };
 
 /* Device identities that plctool compiles for. Vendor 0 is the open default; a vendor's own id comes from SysTarget. */

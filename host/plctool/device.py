@@ -242,9 +242,6 @@ class Plc(Controller):
     def start(self) -> None:
         services.start(self._session)
 
-    def _loaded_crc(self) -> int:
-        return services.loaded_crc(self._session)  # by a request that the start needs too
-
     def _start_checked(self) -> Status:
         return services.start_checked(self._session)
 
@@ -271,9 +268,9 @@ class Plc(Controller):
     def _alone(self, purpose: str) -> AbstractContextManager[None]:
         return self._session.exclusive(purpose)
 
-    def _download(self, data: bytes, restart: bool, progress: Callable[[int], None]) -> None:
+    def _download(self, data: bytes, start: bool, restart: bool, progress: Callable[[int], None]) -> None:
         prepared, self._prepared = self._prepared, None
-        services.download(self._session, data, restart, progress, prepared)
+        services.download(self._session, data, restart, progress, prepared, start=start)
 
     def _status_before(self, data: bytes) -> Status:
         status, self._prepared = services.prepare_download(self._session, data)

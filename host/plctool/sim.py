@@ -76,7 +76,7 @@ class Simulator(Controller):
         self._closed = False
         try:
             self._power_on(cycle_limit_ms)
-            self._download(image, restart=True, progress=lambda done: None)
+            self._download(image, start=False, restart=True, progress=lambda done: None)
             if start:
                 self.check_running()  # initialisation may have failed
                 self.start()
@@ -151,7 +151,7 @@ class Simulator(Controller):
 
     # ---- the program ----
 
-    def _download(self, data: bytes, restart: bool, progress: Callable[[int], None]) -> None:
+    def _download(self, data: bytes, start: bool, restart: bool, progress: Callable[[int], None]) -> None:
         self._add_events(data)
         _check(self._lib.AppDownloadBegin(len(data), image_crc(data)), "The image is refused")
         _check(self._lib.AppDownloadWrite(0, data, len(data)), "The image cannot be stored")

@@ -88,6 +88,42 @@ static void image_arrives_block_by_block(void)
     CHECK(memcmp(fakes.image, image, TOTAL) == 0);
 }
 
+static void image_is_started_with_its_last_block_if_that_says_so(void)
+{
+    RTS_UI32 next;
+
+    setup_image();
+    CHECK_EQUAL(download(DLF_START, 0, TOTAL, CRC, 600, &next), ERR_OK);
+    CHECK_EQUAL(fakes.starts, 0);
+    CHECK_EQUAL(download(DLF_CONTINUEDOWNLOAD | DLF_START, 600, TOTAL, CRC, 400, &next), ERR_OK);
+    CHECK(fakes.download_ends == 1 && fakes.starts == 1);
+    setup_image();
+    CHECK_EQUAL(download(DLF_START, 0, TOTAL, CRC, 600, &next), ERR_OK);
+    CHECK_EQUAL(put(600, 400, &next), ERR_OK);
+    CHECK(fakes.download_ends == 1 && fakes.starts == 0);
+}
+
+static void last_block_that_is_repeated_starts_nothing_again(void)
+{
+    RTS_UI32 next;
+
+    setup_image();
+    CHECK_EQUAL(download(DLF_START, 0, TOTAL, CRC, TOTAL, &next), ERR_OK);
+    fakes.status.image_crc = CRC;
+    CHECK_EQUAL(download(DLF_CONTINUEDOWNLOAD | DLF_START, 0, TOTAL, CRC, TOTAL, &next), ERR_OK);
+    CHECK_EQUAL(fakes.starts, 1);
+}
+
+static void refused_image_is_not_started(void)
+{
+    RTS_UI32 next;
+
+    setup_image();
+    fakes.end_result = ERR_APP_UNRESOLVED_REFERENCE;
+    CHECK_EQUAL(download(DLF_START, 0, TOTAL, CRC, TOTAL, &next), ERR_APP_UNRESOLVED_REFERENCE);
+    CHECK(fakes.download_ends == 1 && fakes.starts == 0);
+}
+
 static void image_in_one_block_is_complete_at_once(void)
 {
     RTS_UI32 next;
@@ -433,6 +469,9 @@ int main(void)
 {
     RUN(image_arrives_block_by_block);
     RUN(image_in_one_block_is_complete_at_once);
+    RUN(image_is_started_with_its_last_block_if_that_says_so);
+    RUN(last_block_that_is_repeated_starts_nothing_again);
+    RUN(refused_image_is_not_started);
     RUN(repeated_block_is_acknowledged_and_not_written);
     RUN(overlapping_block_is_written_from_where_it_is_new);
     RUN(block_beyond_the_next_is_out_of_sequence);

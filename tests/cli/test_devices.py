@@ -60,6 +60,7 @@ def test_ctrl_c_during_flash_says_what_is_on_the_device_now(
     if at:
         monkeypatch.setattr("plctool.link.services.download", interrupt)
     else:
+        monkeypatch.setattr(plc, "starts_downloads", False)
         monkeypatch.setattr("plctool.link.services.start_checked", interrupt)
     done = tool("flash", *PORT, str(image))
     assert (done.status, done.out) == (130, "")

@@ -51,7 +51,6 @@ READERS: tuple[Callable[[Session], object], ...] = (
     services.read_tasks,
     services.read_application_info,
     services.read_log,
-    services.loaded_crc,
     file_services.list_files,
     io_services.list_devices,
     lambda session: services.run_shell(session, "?"),

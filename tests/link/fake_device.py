@@ -336,6 +336,7 @@ class FakePlc:
         self.disturbed = 0  # how many readings from now on a task runs in
         self.transfer: tuple[int, int] | None = None
         self.received = bytearray()
+        self.starts_downloads = True  # by DLF_START; False: as older firmware
         self.refuse = ""  # reason to refuse the next complete image for
         self.log: list[tuple[int, int, int, str, str]] = []  # handle, time, class, component, text
         self.shell_refusals: dict[str, tuple[str, int]] = {}  # words and error, by command
@@ -483,15 +484,16 @@ class FakePlc:
             self.received += data[len(self.received) - offset :]
         done = len(self.received)
         if not result and done == total:
-            result, reason = self._finish_download()
+            result, reason = self._finish_download(bool(flags & lib.DLF_START))
         reply = [bintag.u16(lib.TAG_SERVICE_RESULT, result), bintag.u32(lib.TAG_CDL_NEXT, done)]
         return [*reply, bintag.text(lib.TAG_CDL_REASON, reason)] if reason else reply
 
-    def _finish_download(self) -> tuple[int, str]:
+    def _finish_download(self, start: bool) -> tuple[int, str]:
         self.transfer = None
         if self.refuse:
             return lib.ERR_APP_UNRESOLVED_REFERENCE, self.refuse
-        self.image, self.state, self.operating = bytes(self.received), lib.AS_STOP, 0
+        self.image, self.operating = bytes(self.received), 0
+        self.state = lib.AS_RUN if start and self.starts_downloads else lib.AS_STOP
         self.exception = (lib.RTSEXCPT_NOEXCEPTION, 0xFFFFFFFF, -1)
         return lib.ERR_OK, ""
 

@@ -23,6 +23,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.core import lib
+from plctool.device import Plc
 from plctool.errors import DeviceError, LinkError
 from plctool.link import bintag, file_services, l7, monitoring, services
 from plctool.link.connection import Connection
@@ -561,6 +562,56 @@ def test_a_broken_transfer_continues_where_it_was() -> None:
     services.download(Session(Connection(bench.line)), image)
     assert bench.plc.image == image
     assert bench.line.sent_bytes - sent < 25_000
+
+
+def starts(bench: Bench) -> int:
+    """How often a start has been asked for."""
+    return bench.plc.requests.count((lib.SG_APPLICATION, lib.SRV_APP_START))
+
+
+def test_a_flashed_program_is_started_with_its_last_block() -> None:
+    bench, image = Bench(), make_image(20_000, 5)
+    assert Plc(Connection(bench.line)).flash(image, unchecked=True).state is AppState.RUN
+    assert (bench.plc.image, starts(bench)) == (image, 0)
+
+
+def test_older_firmware_is_asked_to_start_the_program() -> None:
+    bench = Bench()
+    bench.plc.starts_downloads = False
+    assert Plc(Connection(bench.line)).flash(make_image(20_000, 5), unchecked=True).state is AppState.RUN
+    assert starts(bench) == 1
+
+
+def test_a_program_that_shall_not_start_does_not() -> None:
+    bench = Bench()
+    plc = Plc(Connection(bench.line))
+    assert plc.flash(make_image(20_000, 5), unchecked=True, start=False).state is AppState.STOP
+    assert starts(bench) == 0
+
+
+def test_a_program_that_takes_the_controller_down_is_not_sent_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controller has gone back to the previous one, and would do so again."""
+    bench = Bench(buffer_size=2048)
+    began, before = [], bench.plc.image
+    finish, download = bench.plc._finish_download, bench.plc._download
+
+    def go_down(start: bool) -> tuple[int, str]:
+        finish(start)
+        bench.plc.image = before
+        bench.device.restart()
+        return lib.ERR_OK, ""
+
+    def count(tags: bintag.Tags) -> list[bintag.Tag]:
+        position = tags.bytes(lib.TAG_CDL_POSITION, 16)
+        began.extend([1] if position[:8] == bytes([0, 2, *bytes(6)]) else [])
+        return download(tags)
+
+    monkeypatch.setattr(bench.plc, "_finish_download", go_down)
+    monkeypatch.setattr(bench.plc, "_download", count)
+    with pytest.raises(DeviceError, match="The controller went down when it had the new program") as caught:
+        Plc(Connection(bench.line)).flash(make_image(20_000, 5), unchecked=True)
+    assert caught.value.code == "died"
+    assert (bench.plc.image, len(began)) == (before, 1)
 
 
 def test_a_channel_lost_on_the_way_is_no_reason_to_begin_again() -> None:

@@ -397,9 +397,9 @@ static bool is_under_way(const DOWNLOAD_BLOCK *block)
     return AppDownloadIsOf(block->total, block->crc);
 }
 
-static RTS_UI32 bytes_received(const DOWNLOAD_BLOCK *block)
+static RTS_UI32 bytes_received(const DOWNLOAD_BLOCK *block, bool under_way)
 {
-    if (is_under_way(block))
+    if (under_way)
         return AppDownloadOffset();
     return is_installed(block) ? block->total : 0;
 }
@@ -447,6 +447,17 @@ static RTS_RESULT take_block(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *bl
     return write_new_part(block);
 }
 
+/* The start is part of the download, so a client that ends after its last block leaves a running plant. It shows in the
+ * status, also why there was none. */
+static RTS_RESULT install(const DOWNLOAD_BLOCK *block, APP_REFUSAL *refusal)
+{
+    RTS_RESULT result = AppDownloadEnd(refusal);
+
+    if (result == ERR_OK && (block->flags & DLF_START) != 0)
+        (void)AppStartApplication();
+    return result;
+}
+
 /* On a bus replies take the time of what is sent to the device. A question has its reply in any case. */
 static void let_reply_wait(const SRV_REQUEST *request, const DOWNLOAD_BLOCK *block, RTS_RESULT result)
 {
@@ -470,9 +481,10 @@ static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
     refusal.text[0] = '\0';
     if (block.size != 0)
         result = take_block(request->client, &block, &refusal);
-    RTS_UI32 next = bytes_received(&block);
-    if (result == ERR_OK && is_under_way(&block) && next == block.total)
-        result = AppDownloadEnd(&refusal);
+    bool under_way = is_under_way(&block);
+    RTS_UI32 next = bytes_received(&block, under_way);
+    if (result == ERR_OK && under_way && next == block.total)
+        result = install(&block, &refusal);
     let_reply_wait(request, &block, result);
     BTagWrite16(reply, TAG_SERVICE_RESULT, result);
     BTagWrite32(reply, TAG_CDL_NEXT, next);

@@ -219,16 +219,6 @@ def _status_of(tags: bintag.Tags) -> Status:
     return Status(app_state(state.state, state.op_state), image.crc, image.size, exception, state.op_state)
 
 
-def loaded_crc(session: Session) -> int:
-    """CRC of the application's image, 0 without one; logs in to it."""
-    try:
-        return session.recover(session.application).image_crc
-    except DeviceError as error:
-        if error.result != lib.ERR_APP_NOT_EXIST:
-            raise
-        return 0
-
-
 def app_state(state: int, operating: int) -> AppState:
     """From AS_* and the OS_* flags."""
     if operating & lib.OS_EXCEPTION:
@@ -386,21 +376,26 @@ def download(
     restart: bool = False,
     progress: Callable[[int], None] = lambda done: None,
     prepared: Prepared | None = None,
+    *,
+    start: bool = False,
 ) -> None:
-    """Sends an image; the device checks it and makes it its application, stopped.
+    """Sends an image; the device checks it and makes it its application, stopped. With `start` the device also starts
+    it, unless its firmware is older than `DLF_START`: the status shows that.
 
     Continues an aborted transfer of the same image, also automatically after the channel was lost; `restart`
     begins at the first byte in any case. `progress` is called with the bytes that have arrived. Raises DeviceError with
     the device's reason when it refuses the image; its old application is untouched then. `prepared`: what
     `prepare_download` has just found.
     """
-    transfer = _Transfer(session, image, progress)
+    transfer = _Transfer(session, image, start, progress)
     tries = 0
     while True:
         arrived = transfer.arrived
         try:
             start_at = transfer.begin(prepared)
             prepared = None
+            if transfer.sent_all and arrived and not start_at:
+                raise went_down()  # and would do so again
             if restart:
                 start_at, restart = 0, False
             if start_at < len(image):
@@ -413,11 +408,21 @@ def download(
                 raise
 
 
-class _Transfer:
-    """One image on its way. `arrived` is the number of bytes the device has confirmed."""
+def went_down() -> DeviceError:
+    """The error of a new program that is not on the device any more."""
+    return DeviceError(
+        "The controller went down when it had the new program, and has the previous one; see the log.", "died"
+    )
 
-    def __init__(self, session: Session, image: bytes, progress: Callable[[int], None]) -> None:
+
+class _Transfer:
+    """One image on its way. `arrived` is the number of bytes the device has confirmed; `sent_all`: since the channel
+    was opened, all blocks have been sent."""
+
+    def __init__(self, session: Session, image: bytes, start: bool, progress: Callable[[int], None]) -> None:
         self.arrived = 0
+        self.sent_all = False
+        self._flags = lib.DLF_START if start else 0
         self._session = session
         self._image = image
         self._progress = progress
@@ -434,6 +439,7 @@ class _Transfer:
 
     def run(self, start_at: int) -> None:
         """Sends everything from `start_at` on and waits for the verdict."""
+        self.sent_all = False
         self._session.ensure()
         request = self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, b"")
         connection = self._session.connection
@@ -446,11 +452,12 @@ class _Transfer:
     def _messages(self, start_at: int) -> Iterator[bytes]:
         offset = start_at
         for number, (data, size) in enumerate(self._blocks(start_at), 1):
-            flags = lib.DLF_CONTINUEDOWNLOAD if offset else 0
+            flags = self._flags | (lib.DLF_CONTINUEDOWNLOAD if offset else 0)
             if self._session.connection.is_bus and number % _SHARING and offset + size < len(self._image):
                 flags |= lib.DLF_REPLYMAYWAIT
             position = _position(self._image, flags, offset)
             content = bintag.encode([position, data])
+            self.sent_all = offset + size == len(self._image)
             yield l7.encode(self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, content))
             offset += size
 
