@@ -31,7 +31,7 @@ RTS_STATIC_ASSERT(sizeof(FLASH_LOG_HEAD) == FLASH_LOG_HEAD_SIZE, record_head_siz
 
 typedef struct {
     RTS_UI32 file;     /* not 0 */
-    RTS_RESULT opened; /* nothing is appended to a log that cannot be read */
+    RTS_RESULT opened; /* nothing is appended to a log of which a part cannot be read */
     RTS_UI32 start;    /* of the half in use */
     RTS_UI32 used;     /* bytes of that half that may have been programmed */
     RTS_UI32 newest;   /* position of the newest record */
@@ -41,7 +41,8 @@ typedef struct {
 
 #define FLASH_LOG_NONE 0xFFFFFFFFu
 
-/* Finds the newest record and the place for the next. ERR_DEVICE flash fault. */
+/* Finds the newest record and the place for the next. ERR_DEVICE: a part cannot be read; the log has what the remaining
+ * part says, and takes no records, because a later start may find a newer one. */
 RTS_RESULT FlashLogOpen(FLASH_LOG *log, RTS_UI32 file);
 
 /* Reads the newest record into `data`; ERR_NO_OBJECT when there is none or it has another tag or size. */
@@ -53,8 +54,8 @@ typedef struct {
     RTS_UI32 until;
 } FLASH_LOG_RANGE;
 
-/* Reads the newest record of the range with this tag and size into `data`; ERR_NO_OBJECT when there is none, `data` is
- * as it was then. */
+/* Reads the newest record of the range with this tag and size into `data`. ERR_NO_OBJECT when there is none, ERR_DEVICE
+ * when it may be in a part that cannot be read; `data` is as it was then. */
 RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 tag, void *data, RTS_UI32 size);
 
 /* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault,
@@ -74,6 +75,13 @@ bool FlashLogIsMarked(const FLASH_LOG *log, RTS_UI32 size);
  */
 RTS_RESULT FlashLogKeep(FLASH_LOG *log, RTS_UI32 until);
 void FlashLogKeepNone(FLASH_LOG *log);
+
+/* The next record goes to the other half, whatever room there is in this one: two records in a row, with this in between,
+ * are one in each half, of which a lost sector leaves one. */
+void FlashLogTurn(FLASH_LOG *log);
+
+/* Gives up what cannot be read: the log takes records again, with numbers above those that may be there. */
+void FlashLogRenew(FLASH_LOG *log);
 
 /* The largest record, in bytes of data. */
 RTS_UI32 FlashLogCapacity(const FLASH_LOG *log);

@@ -74,6 +74,13 @@
 #define FLASH_SECTOR_AT(offset) (RTS_UNUSED(offset), SysFlashGet()->sector_size)
 #endif
 
+/* 1: a read of the flash may fail, and what can be read decides what runs. 0: the flash is memory (SysFlash.h, `mapped` is
+ * not NULL), so no read fails; some 110 bytes
+ * of flash less. */
+#ifndef FLASH_READS_FAIL
+#define FLASH_READS_FAIL 1
+#endif
+
 /* 1: the port gives the memory of the areas (SysMem.h), to keep programs from writing beyond them. 0: a variable. */
 #ifndef APP_AREAS_FROM_PORT
 #define APP_AREAS_FROM_PORT 0

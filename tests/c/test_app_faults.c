@@ -77,7 +77,9 @@ static RTS_UI32 calls_of_start(RTS_UI32 kind)
     return SimFlashCalls(kind);
 }
 
-static void fail_one_call_at_a_start(RTS_UI32 newest, RTS_UI32 kind, RTS_UI32 call, MEANWHILE meanwhile)
+/* `fail`: SimFlashFail or SimFlashFailFrom. A single read that fails is repeated. */
+static void fail_at_a_start(void (*fail)(RTS_UI32, RTS_UI32), RTS_UI32 newest, RTS_UI32 kind, RTS_UI32 call,
+                            MEANWHILE meanwhile)
 {
     int failures = test_failures;
 
@@ -85,9 +87,10 @@ static void fail_one_call_at_a_start(RTS_UI32 newest, RTS_UI32 kind, RTS_UI32 ca
     CHECK_EQUAL(SimFlashRestore(), ERR_OK);
     CHECK_EQUAL(SimStart(), ERR_OK); /* forgets plans */
     CHECK_EQUAL(SimFlashRestore(), ERR_OK);
-    SimFlashFail(kind, call);
+    fail(kind, call);
     SimFlashAtStart();
     CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK(running_step() == newest || kind != SIM_READ || fail != SimFlashFail);
     CHECK(running_step() == newest || app_state() == AS_STOP || app_state() == AS_NONE);
     CHECK(running_step() == newest || log_has("Boot project refused: ") || log_has("cannot be read"));
     CHECK_EQUAL(SimCall(try_meanwhile, &meanwhile), ERR_OK);
@@ -113,11 +116,148 @@ static void a_call_that_fails_at_a_start_costs_nothing(void)
             CHECK(calls > 0 || kind == SIM_ERASE);
             for (call = 1; call <= calls; call++) {
                 for (meanwhile = NOTHING; meanwhile < MEANWHILES; meanwhile++)
-                    fail_one_call_at_a_start(newest, kind, call, meanwhile);
+                    fail_at_a_start(SimFlashFail, newest, kind, call, meanwhile);
+                if (kind == SIM_READ)
+                    fail_at_a_start(SimFlashFailFrom, newest, kind, call, NOTHING);
             }
         }
     }
     printf("     %u starts with a fault\n", (unsigned)tried);
+}
+
+/* ---- a place that cannot be read, for good ---- */
+
+static bool is_of_image(RTS_UI32 offset, RTS_UI32 size, RTS_UI32 slot, const APP_BYTES *image)
+{
+    RTS_UI32 start = SysFileGetArea(slot)->offset;
+
+    return offset < start + image->size && start < offset + size;
+}
+
+/* With a fault in the newest application the older one runs at each start; each other place costs no application. When
+ * the fault is gone, all is as before. */
+static void fail_at_a_place(RTS_UI32 newest, RTS_UI32 offset, RTS_UI32 size)
+{
+    RTS_UI32 slot = newest == 2 ? FILE_SLOT_B : FILE_SLOT_A;
+    RTS_UI32 wanted = is_of_image(offset, size, slot, &images[newest]) ? newest - 1 : newest;
+    int failures = test_failures;
+    RTS_UI32 i;
+
+    tried++;
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    SimFlashUnreadable(offset, size);
+    for (i = 0; i < 2; i++) {
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(running_step(), wanted);
+        CHECK(wanted == newest || log_has("Boot project refused: The flash cannot be read."));
+        CHECK_EQUAL(SimAdvance(ms(1500)), ERR_OK);
+    }
+    SimFlashUnreadable(0, 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), newest);
+    CHECK_EQUAL(SimFlashViolations(), 0);
+    if (test_failures != failures)
+        fprintf(stderr, "^ newest %u, %u bytes at 0x%X\n", (unsigned)newest, (unsigned)size, (unsigned)offset);
+}
+
+static void a_place_that_cannot_be_read_leaves_the_best_whole_application(void)
+{
+    RTS_UI32 newest;
+    RTS_UI32 offset;
+
+    tried = 0;
+    for (newest = 1; newest <= 3; newest++) {
+        prepare(newest, 0);
+        for (offset = 0; offset < SimFlashSize(); offset += 512)
+            fail_at_a_place(newest, offset, 512);
+        for (offset = 0; offset < SimFlashSize(); offset += FILE_ALIGN) {
+            if (SimFlashData()[offset] != 0xFF)
+                fail_at_a_place(newest, offset, FILE_ALIGN);
+        }
+    }
+    printf("     %u places\n", (unsigned)tried);
+}
+
+/* Both halves of the commit log, too: the seals say which program is the newest. */
+static void a_whole_log_that_cannot_be_read_costs_no_application(void)
+{
+    RTS_UI32 newest;
+
+    for (newest = 1; newest <= 3; newest++) {
+        prepare(newest, 0);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        const FILE_AREA *commit = SysFileGetArea(FILE_COMMIT);
+        const FILE_AREA *values = SysFileGetArea(FILE_RETAIN);
+        fail_at_a_place(newest, commit->offset, commit->size);
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+        fail_at_a_place(newest, values->offset, values->size);
+    }
+}
+
+static void with_a_commit_log_that_cannot_be_read_a_program_can_be_flashed(void)
+{
+    const FILE_AREA *area;
+
+    prepare(2, 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    area = SysFileGetArea(FILE_COMMIT);
+    SimFlashUnreadable(area->offset, area->size);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK(log_has("Commit record cannot be read"));
+    install(3);
+    CHECK(!log_has("Commit record cannot be written"));
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 3);
+    SimFlashUnreadable(0, 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 3);
+}
+
+static void make_newest_unreadable(RTS_UI32 newest)
+{
+    RTS_UI32 slot = newest == 2 ? FILE_SLOT_B : FILE_SLOT_A;
+
+    SimFlashUnreadable(SysFileGetArea(slot)->offset, 16);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), newest - 1);
+}
+
+static void the_stand_in_goes_on_with_its_values_and_may_be_stopped_and_reset(void)
+{
+    RTS_UI32 value;
+
+    prepare(2, 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    make_newest_unreadable(2);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    value = read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET);
+    CHECK(value > 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) >= value);
+    CHECK_EQUAL(AppReset(RESET_OPTION_COLD), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
+    SimFlashUnreadable(0, 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 2);
+    CHECK(AppCommitIsProven(FILE_SLOT_A) && AppCommitIsProven(FILE_SLOT_B));
+}
+
+static void a_program_that_is_flashed_takes_the_place_of_the_one_that_cannot_be_read(void)
+{
+    prepare(2, 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    make_newest_unreadable(2);
+    CHECK_EQUAL(AppDownloadBegin(images[3].size, image_crc(&images[3])), ERR_OK);
+    SimFlashUnreadable(0, 0); /* to be programmed again often repairs it */
+    install(3);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 3);
+    SimFlashData()[SysFileGetArea(FILE_SLOT_B)->offset + 400] ^= 1;
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 /* Firmware of another build, for one start. */
@@ -597,6 +737,11 @@ int main(void)
     for (step = 1; step <= 3; step++)
         build_counter(&images[step], step);
     RUN(a_call_that_fails_at_a_start_costs_nothing);
+    RUN(a_place_that_cannot_be_read_leaves_the_best_whole_application);
+    RUN(a_whole_log_that_cannot_be_read_costs_no_application);
+    RUN(with_a_commit_log_that_cannot_be_read_a_program_can_be_flashed);
+    RUN(the_stand_in_goes_on_with_its_values_and_may_be_stopped_and_reset);
+    RUN(a_program_that_is_flashed_takes_the_place_of_the_one_that_cannot_be_read);
     RUN(firmware_that_refuses_it_for_some_starts_costs_nothing);
     RUN(a_program_for_another_device_waits_for_its_firmware);
     RUN(a_call_that_fails_in_a_download_leaves_the_old_or_the_new_application);

@@ -7,8 +7,10 @@
 #include "CmpBytes.h"
 #include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
+#include "CmpLog.h"
 #include "CmpSrv.h"
 #include "SimLink.h"
+#include "SysFileFlash.h"
 #include "app_image.h"
 #include "comm_client.h"
 #include "password_client.h"
@@ -19,6 +21,16 @@ static const char second[33] = "the key of the second password..";
 
 static CLIENT client;
 static REPLY reply;
+
+static bool log_has(const char *text)
+{
+    LOG_ENTRY entry = {0};
+
+    while (LogGetEntry(entry.handle + 1, &entry) == ERR_OK)
+        if (strstr(entry.text, text) != NULL)
+            return true;
+    return false;
+}
 
 static bool reconnect(void)
 {
@@ -270,6 +282,128 @@ static void every_cut_leaves_the_old_or_the_new_one(void)
     printf("     %u cuts\n", (unsigned)cuts);
 }
 
+/* ---- lost and unreadable sectors of the commit log ---- */
+
+static const FILE_AREA *log_half(RTS_UI32 half)
+{
+    static FILE_AREA area;
+
+    area = *SysFileGetArea(FILE_COMMIT);
+    area.size /= 2;
+    area.offset += half * area.size;
+    return &area;
+}
+
+static void lose(RTS_UI32 half, int how)
+{
+    const FILE_AREA *area = log_half(half);
+
+    for (RTS_UI32 i = 0; i < area->size; i++)
+        SimFlashData()[area->offset + i] = (RTS_UI8)(how == 0 ? 0xFF : how == 1 ? 0 : (i * 2654435761u) >> 13);
+}
+
+/* Whether the device, with the flash as it was saved, knows `key` when either half is lost. */
+static void check_every_loss(const char *key)
+{
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
+    for (RTS_UI32 half = 0; half < 2; half++) {
+        for (int how = 0; how < 3; how++) {
+            CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            lose(half, how);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            CHECK(key == NULL ? gets_in_without() : keeps(key) && !gets_in_without() && gets_in(key));
+        }
+    }
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+}
+
+/* In logs that are full to different degrees, also by what programs do. */
+static void a_lost_sector_leaves_the_password_that_was_set_last(void)
+{
+    APP_BYTES image;
+
+    build_counter(&image, 1);
+    for (RTS_UI32 before = 0; before < 12; before++) {
+        start_with(first);
+        check_every_loss(first);
+        CHECK(gets_in(first));
+        CHECK_EQUAL(download(&image), ERR_OK);
+        for (RTS_UI32 i = 0; i < before; i++)
+            CHECK(AppStartApplication() == ERR_OK && AppStopApplication() == ERR_OK);
+        check_every_loss(first);
+        CHECK(gets_in(first));
+        CHECK_EQUAL(password_set(&client, second), ERR_OK);
+        check_every_loss(second);
+        CHECK_EQUAL(AppPasswordSet(&(USER_VERIFIER){0}), ERR_OK);
+        check_every_loss(NULL);
+    }
+}
+
+static void make_unreadable(const FILE_AREA *area)
+{
+    SimFlashUnreadable(area->offset, area->size);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+}
+
+static void a_half_that_cannot_be_read_leaves_it(void)
+{
+    SimFlashSetMapped(0);
+    start_with(first);
+    for (RTS_UI32 half = 0; half < 2; half++) {
+        make_unreadable(log_half(half));
+        CHECK(keeps(first) && !gets_in_without() && gets_in(first));
+    }
+    SimFlashSetMapped(1);
+}
+
+static void nothing_logs_in_while_it_is_unknown_whether_there_is_one(void)
+{
+    SimFlashSetMapped(0);
+    start_with(first);
+    make_unreadable(SysFileGetArea(FILE_COMMIT));
+    CHECK(log_has("Password cannot be read: no login without a reset of it"));
+    CHECK(!gets_in_without() && !gets_in(first) && !gets_in(""));
+    SimFlashUnreadable(0, 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK(keeps(first) && gets_in(first));
+    SimFlashSetMapped(1);
+}
+
+/* The sector can be programmed again, or only the other one can. */
+static void a_reset_of_the_password_gives_up_what_cannot_be_read(void)
+{
+    for (RTS_UI32 half = 0; half < 3; half++) {
+        SimFlashSetMapped(0);
+        start_with(first);
+        make_unreadable(half < 2 ? log_half(half) : SysFileGetArea(FILE_COMMIT));
+        SimStop();
+        CHECK_EQUAL(AppPasswordReset(), half < 2 ? ERR_OK : ERR_DEVICE);
+        if (half == 2) {
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            CHECK(!gets_in_without());
+            SimFlashUnreadable(0, 0);
+        }
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK(gets_in_without());
+        SimFlashSetMapped(1);
+    }
+}
+
+static void a_device_that_knows_programs_only_says_that_it_has_no_password(void)
+{
+    APP_BYTES image;
+
+    build_counter(&image, 1);
+    start_with(first);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    lose(0, 0);
+    lose(1, 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK(log_has("No commit record: newest program taken, no password known"));
+}
+
 int main(void)
 {
     NEEDS_X86_64;
@@ -282,5 +416,10 @@ int main(void)
     RUN(setting_it_leaves_the_program_as_it_is);
     RUN(what_nobody_can_know_is_refused);
     RUN(every_cut_leaves_the_old_or_the_new_one);
+    RUN(a_lost_sector_leaves_the_password_that_was_set_last);
+    RUN(a_half_that_cannot_be_read_leaves_it);
+    RUN(nothing_logs_in_while_it_is_unknown_whether_there_is_one);
+    RUN(a_reset_of_the_password_gives_up_what_cannot_be_read);
+    RUN(a_device_that_knows_programs_only_says_that_it_has_no_password);
     return test_result();
 }

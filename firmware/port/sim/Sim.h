@@ -149,6 +149,10 @@ void SimFlashFail(RTS_UI32 kind, RTS_UI32 call);
 /* The same, and all calls of that kind after it. */
 void SimFlashFailFrom(RTS_UI32 kind, RTS_UI32 call);
 
+/* From now on a read of one of these bytes fails, over starts, until other bytes are named or SimFlashConfigure; of
+ * size 0: none. */
+void SimFlashUnreadable(RTS_UI32 offset, RTS_UI32 size);
+
 /* Power is off: what was not synced when a sync failed is lost. SimStart does it, too; for a process that ends. */
 void SimFlashPowerOff(void);
 

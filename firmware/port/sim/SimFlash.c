@@ -54,6 +54,8 @@ static struct {
     CELLS synced; /* by the last sync, when one is planned to fail */
     bool sync_failed;
     bool unmapped;
+    RTS_UI32 unreadable; /* bytes from here on */
+    RTS_UI32 unreadable_size;
     RTS_UI32 operations;
     RTS_UI32 calls[SIM_CALLS];
     PLAN plan;
@@ -146,9 +148,14 @@ static RTS_RESULT end_operation(int after)
 
 /* ---- what the runtime calls ---- */
 
+static bool is_unreadable(RTS_UI32 offset, RTS_UI32 size)
+{
+    return offset < chip.unreadable + chip.unreadable_size && chip.unreadable < offset + size;
+}
+
 static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
 {
-    if (fails(SIM_READ))
+    if (fails(SIM_READ) || is_unreadable(offset, size))
         return ERR_DEVICE;
     if (!is_inside(offset, size))
         return violate("read outside", offset);
@@ -367,6 +374,7 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
     chip.flash.erased = erased;
     chip.violations = 0;
     chip.violation[0] = '\0';
+    SimFlashUnreadable(0, 0);
     set_functions();
     return ERR_OK;
 }
@@ -479,6 +487,12 @@ void SimFlashFail(RTS_UI32 kind, RTS_UI32 call)
 void SimFlashFailFrom(RTS_UI32 kind, RTS_UI32 call)
 {
     plan_failure(kind, call, true);
+}
+
+void SimFlashUnreadable(RTS_UI32 offset, RTS_UI32 size)
+{
+    chip.unreadable = offset;
+    chip.unreadable_size = size;
 }
 
 static RTS_UI32 count_from_zero(RTS_UI32 at, RTS_UI32 now)

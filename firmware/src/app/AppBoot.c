@@ -4,8 +4,9 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Only its own failure counts against an application, and is noted in flash before anything else is done. When it cannot
- * be loaded for another reason (a fault of the flash, a firmware for another device, a function that this one lacks),
- * nothing is written and nothing runs: the next start finds all as it was.
+ * be loaded for another reason, nothing is written and the next start finds all as it was. Until then the previous one
+ * stands in for an application that cannot be read; nothing runs when the reason is firmware for another device, or a
+ * function that this one lacks.
  */
 #include "AppBoot.h"
 
@@ -33,8 +34,11 @@ static RTS_RESULT load_from_slot(RTS_UI32 slot, RTS_UI32 retain_until)
         if (code == NULL)
             result = APP_REFUSE(&refusal, ERR_NOMEMORY, "There is no executable memory for the code.");
     }
-    if (result == ERR_OK)
+    if (result == ERR_OK) {
         result = AppLoad(&image, code, retain_until, &refusal);
+        if (FLASH_READS_FAIL && result == ERR_DEVICE)
+            result = ERR_FAILED; /* of a driver: the image can be read */
+    }
     if (result != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Boot project refused: %s", refusal.text);
     return result;
@@ -84,6 +88,13 @@ static bool has_died(RTS_UI32 cause)
            (cause == SYS_START_CRASH && commit->state[commit->active] == SLOT_STARTED);
 }
 
+/* The previous application stands in for one that cannot be read: for this start only, since the fault may pass. It goes
+ * on with its own newest values. */
+static bool load_stand_in(RTS_UI32 active)
+{
+    return AppCanRollBack(active) && load_from_slot(AppCommitOtherSlot(active), RetainGetSequence()) == ERR_OK;
+}
+
 /* Loads what shall run. */
 static RTS_RESULT load_boot_project(bool may_go_back)
 {
@@ -94,6 +105,8 @@ static RTS_RESULT load_boot_project(bool may_go_back)
         return ERR_OK;
     result = load_from_slot(active, RetainGetSequence());
     if (result == ERR_CRC_FAILED && may_go_back && AppRollBack(active))
+        return ERR_OK;
+    if (FLASH_READS_FAIL && result == ERR_DEVICE && may_go_back && load_stand_in(active))
         return ERR_OK;
     return result;
 }
@@ -133,7 +146,7 @@ void AppBoot(void)
     AppCommitOpen();
     if (AppCommitResult() != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, AppCommitResult(), "Commit record cannot be read");
-    else if (AppCommitGet()->active == SLOT_NONE)
+    if (AppCommitGet()->active == SLOT_NONE)
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "No boot project");
     else
         run_boot_project();

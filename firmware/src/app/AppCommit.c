@@ -187,7 +187,9 @@ static void report_loss(void)
     if (state.log.sequence != 0)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, ERR_VERSION_MISMATCH, "Flash laid out by another firmware");
     if (state.commit.active != SLOT_NONE)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_NO_OBJECT, "No commit record: newest program taken");
+        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_NO_OBJECT,
+               COMM_PASSWORD ? "No commit record: newest program taken, no password known"
+                             : "No commit record: newest program taken");
 }
 
 static void forget_record(void)
@@ -203,18 +205,27 @@ static void forget_password(void)
 #endif
 }
 
+/* Whether there is a password is not known: nothing logs in, since no key is the hash of anything known. */
+static void lock(void)
+{
+#if COMM_PASSWORD
+    BytesPut32(state.password.iterations, PASSWORD_MIN_ITERATIONS);
+    LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, ERR_DEVICE, "Password cannot be read: no login without a reset of it");
+#endif
+}
+
 void AppCommitOpen(void)
 {
-    RTS_RESULT result = FlashLogOpen(&state.log, FILE_COMMIT);
+    RTS_RESULT result;
 
+    (void)FlashLogOpen(&state.log, FILE_COMMIT);
     forget_record();
     forget_password();
-    if (result == ERR_OK)
-        result = read_record();
-    if (result != ERR_OK && result != ERR_NO_OBJECT) {
+    result = read_record();
+    if (result != ERR_OK && result != ERR_NO_OBJECT)
         state.log.opened = result;
-        return;
-    }
+    if (result != ERR_OK && state.log.opened != ERR_OK)
+        lock();
     if (result == ERR_OK && FlashLogIsMarked(&state.log, COMMIT_RECORD_SIZE))
         state.commit.begun = 0;
     if (!take_seals() || (state.commit.active >= SLOT_COUNT && state.commit.active != SLOT_NONE)) {
@@ -248,7 +259,7 @@ static RTS_RESULT write_record(const char *text)
             memcpy(record.text, text, CMUtlStrNLen(text, sizeof record.text - 1));
     }
     result = FlashLogAppend(&state.log, record_tag(), data, COMMIT_RECORD_SIZE);
-    if (result != ERR_OK)
+    if (result != ERR_OK && state.log.opened == ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Commit record cannot be written");
     return result;
 }
@@ -306,10 +317,12 @@ void AppCommitSetDead(const char *text)
     (void)write_record(text);
 }
 
-void AppCommitBegin(void)
+void AppCommitBegin(RTS_UI32 slot)
 {
     RTS_UI8 *begun = &state.commit.state[state.commit.active];
 
+    if (FLASH_READS_FAIL && slot != state.commit.active)
+        return;
     if (*begun == SLOT_HALTED)
         *begun = SLOT_PROVEN;
     if (state.commit.begun < BEGUN_MAX)
@@ -317,8 +330,10 @@ void AppCommitBegin(void)
     (void)write_record("");
 }
 
-void AppCommitDone(void)
+void AppCommitDone(RTS_UI32 slot)
 {
+    if (FLASH_READS_FAIL && slot != state.commit.active)
+        return;
     state.commit.begun = 0;
     if (FlashLogMark(&state.log) != ERR_OK)
         (void)write_record(""); /* says so as well */
@@ -349,6 +364,18 @@ static void read_text(char *text)
     text[APP_CRASH_TEXT_SIZE - 1] = '\0';
 }
 
+/* A lost sector costs one of two records. */
+static RTS_RESULT write_twice(const char *text)
+{
+    RTS_RESULT result = write_record(text);
+
+    if (result == ERR_OK) {
+        FlashLogTurn(&state.log);
+        (void)write_record(text);
+    }
+    return result;
+}
+
 RTS_RESULT AppPasswordSet(const USER_VERIFIER *verifier)
 {
     const USER_VERIFIER before = state.password;
@@ -359,7 +386,7 @@ RTS_RESULT AppPasswordSet(const USER_VERIFIER *verifier)
         return ERR_PARAMETER;
     read_text(text);
     state.password = *verifier;
-    result = write_record(text);
+    result = write_twice(text);
     if (result != ERR_OK) {
         state.password = before;
         (void)write_record(text); /* the record may be there in spite of the error */
@@ -370,11 +397,19 @@ RTS_RESULT AppPasswordSet(const USER_VERIFIER *verifier)
 RTS_RESULT AppPasswordReset(void)
 {
     static const USER_VERIFIER none;
+    RTS_RESULT result;
 
     AppCommitOpen();
+    if (!AppHasPassword())
+        return ERR_NO_OBJECT;
     if (AppCommitResult() != ERR_OK)
-        return AppCommitResult();
-    return AppHasPassword() ? AppPasswordSet(&none) : ERR_NO_OBJECT;
+        FlashLogRenew(&state.log);
+    result = AppPasswordSet(&none);
+    if (result != ERR_OK) {
+        FlashLogTurn(&state.log); /* the other half may be sound */
+        result = AppPasswordSet(&none);
+    }
+    return result;
 }
 
 #endif

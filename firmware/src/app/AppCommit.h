@@ -18,7 +18,8 @@
 /* Finds out what is in flash. If the application failed, it is in that exception again. */
 void AppCommitOpen(void);
 
-/* ERR_OK, or ERR_DEVICE: the flash could not be read, nothing is known, and nothing is written. */
+/* ERR_OK, or ERR_DEVICE: a part of the log cannot be read. What is known comes from the remaining records and the seals;
+ * no record is written, because a later start may find a newer one. */
 RTS_RESULT AppCommitResult(void);
 
 /* The record in force. */
@@ -58,9 +59,10 @@ RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 state);
 /* The active one failed by the exception it is in: SLOT_FAILED, or SLOT_HALTED when it has proven itself. */
 void AppCommitSetDead(const char *text);
 
-/* The initialisation of the active one begins, and has ended. */
-void AppCommitBegin(void);
-void AppCommitDone(void);
+/* The initialisation of the application in `slot` begins, and has ended. Of one that only stands in for the active one
+ * (AppBoot.c) nothing is noted. */
+void AppCommitBegin(RTS_UI32 slot);
+void AppCommitDone(RTS_UI32 slot);
 
 /* Makes what is in a slot unusable, so that no lost record brings it back. */
 void AppCommitWipe(RTS_UI32 slot);

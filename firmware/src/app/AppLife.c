@@ -204,13 +204,13 @@ static RTS_RESULT initialise(bool init_retains)
         unload();
         return result;
     }
-    AppCommitBegin();
+    AppCommitBegin(app.image.file);
     if (run_function(CDL_FUNCTION_CODE_INIT, false))
         RetainPutBack();
     if (AppHasException() || !run_function(CDL_FUNCTION_GLOBAL_INIT, init_retains))
         enter_exception_state();
     RetainSettle(AppHasException());
-    AppCommitDone();
+    AppCommitDone(app.image.file);
     return ERR_OK;
 }
 

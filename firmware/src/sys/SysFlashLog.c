@@ -9,6 +9,7 @@
 
 #include "CmpChecksum.h"
 #include "SysFlash.h"
+#include "rts_config.h"
 
 /* The records a scan looks for. */
 typedef struct {
@@ -24,6 +25,7 @@ typedef struct {
     RTS_UI32 sequence;
     RTS_UI32 position; /* in the file */
     RTS_UI32 end;      /* of all records in its half, half written ones included */
+    RTS_RESULT result; /* ERR_DEVICE: a part cannot be read, the newest may be there */
 } FOUND;
 
 static RTS_UI32 half_size(const FLASH_LOG *log)
@@ -75,9 +77,10 @@ static void note(FOUND *found, const FLASH_LOG_HEAD *head, RTS_UI32 position)
 }
 
 /* Looks at the records of the half at `start`. One that was cut off may reach as far as its head says, though the bytes
- * look erased. */
-static RTS_RESULT scan_half(const FLASH_LOG *log, RTS_UI32 start, const WANTED *wanted, FOUND *found)
+ * look erased. Of a sector that cannot be read the remaining part is skipped. */
+static void scan_half(const FLASH_LOG *log, RTS_UI32 start, const WANTED *wanted, FOUND *found)
 {
+    RTS_UI32 sector = SysFlashGet()->sector_size; /* the smallest, all are multiples of it */
     RTS_UI32 size = half_size(log);
     RTS_UI32 offset = 0;
     RTS_UI32 end = 0;
@@ -86,9 +89,10 @@ static RTS_RESULT scan_half(const FLASH_LOG *log, RTS_UI32 start, const WANTED *
     while (size - offset >= FLASH_LOG_HEAD_SIZE) {
         RTS_RESULT result = SysFileRead(log->file, start + offset, &head, sizeof head);
         RTS_UI32 step = FILE_ALIGN;
-        if (result != ERR_OK)
-            return result;
-        if (head.magic == FLASH_LOG_MAGIC && head.size <= size - offset - FLASH_LOG_HEAD_SIZE) {
+        if (FLASH_READS_FAIL && result != ERR_OK) {
+            found->result = result;
+            step = sector - offset % sector;
+        } else if (head.magic == FLASH_LOG_MAGIC && head.size <= size - offset - FLASH_LOG_HEAD_SIZE) {
             RTS_UI32 length = record_length(head.size);
             if (offset + length > end)
                 end = offset + length;
@@ -97,25 +101,22 @@ static RTS_RESULT scan_half(const FLASH_LOG *log, RTS_UI32 start, const WANTED *
                 if (is_wanted(wanted, &head))
                     note(found, &head, start + offset);
                 step = length;
-            } else if (result != ERR_CRC_FAILED) {
-                return result; /* it may be the newest: nothing is to take its number */
+            } else if (FLASH_READS_FAIL && result != ERR_CRC_FAILED) {
+                found->result = result;
             }
         }
         offset += step;
     }
     if (found->any && found->position >= start)
         found->end = end;
-    return ERR_OK;
 }
 
 /* Finds the newest wanted record, of all records when `wanted` is NULL. */
-static RTS_RESULT scan(const FLASH_LOG *log, const WANTED *wanted, FOUND *found)
+static void scan(const FLASH_LOG *log, const WANTED *wanted, FOUND *found)
 {
-    RTS_RESULT result;
-
     memset(found, 0, sizeof *found);
-    result = scan_half(log, 0, wanted, found);
-    return result == ERR_OK ? scan_half(log, half_size(log), wanted, found) : result;
+    scan_half(log, 0, wanted, found);
+    scan_half(log, half_size(log), wanted, found);
 }
 
 static bool is_erased(const RTS_UI8 *data, RTS_UI32 size)
@@ -147,25 +148,27 @@ RTS_RESULT FlashLogOpen(FLASH_LOG *log, RTS_UI32 file)
     log->file = file;
     log->kept = FLASH_LOG_NONE;
     log->used = half_size(log); /* without a record the first one erases its half */
-    log->opened = scan(log, NULL, &found);
-    if (log->opened != ERR_OK || !found.any)
+    scan(log, NULL, &found);
+    log->opened = found.result; /* ERR_DEVICE: nothing is to take the number of a record that was not seen */
+    if (!found.any)
         return log->opened;
     if (found.position >= half_size(log))
         log->start = half_size(log);
     log->newest = found.position;
     log->sequence = found.sequence;
     log->used = skip_garbage(log, found.end);
-    return ERR_OK;
+    return log->opened;
 }
 
 RTS_RESULT FlashLogReadNewest(const FLASH_LOG *log, RTS_UI32 tag, void *data, RTS_UI32 size)
 {
     FLASH_LOG_HEAD head;
-    RTS_RESULT result = SysFileRead(log->file, log->newest, &head, sizeof head);
+    RTS_RESULT result =
+        log->sequence == 0 ? (RTS_RESULT)ERR_NO_OBJECT : SysFileRead(log->file, log->newest, &head, sizeof head);
 
     if (result != ERR_OK)
         return result;
-    if (log->sequence == 0 || head.tag != tag || head.size != size)
+    if (head.tag != tag || head.size != size)
         return ERR_NO_OBJECT;
     return SysFileRead(log->file, log->newest + FLASH_LOG_HEAD_SIZE, data, size);
 }
@@ -174,12 +177,10 @@ RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 ta
 {
     const WANTED wanted = {range, false, tag, size};
     FOUND found;
-    RTS_RESULT result = scan(log, &wanted, &found);
 
-    if (result != ERR_OK)
-        return result;
+    scan(log, &wanted, &found);
     if (!found.any)
-        return ERR_NO_OBJECT;
+        return found.result != ERR_OK ? found.result : (RTS_RESULT)ERR_NO_OBJECT;
     return SysFileRead(log->file, found.position + FLASH_LOG_HEAD_SIZE, data, size);
 }
 
@@ -187,12 +188,12 @@ RTS_RESULT FlashLogKeep(FLASH_LOG *log, RTS_UI32 until)
 {
     const WANTED wanted = {{until - 0x7FFFFFFF, until}, true, 0, 0};
     FOUND found;
-    RTS_RESULT result = scan(log, &wanted, &found);
 
+    scan(log, &wanted, &found);
     FlashLogKeepNone(log);
-    if (result == ERR_OK && found.any)
+    if (found.any)
         log->kept = found.position < half_size(log) ? 0 : half_size(log);
-    return result;
+    return found.result;
 }
 
 void FlashLogKeepNone(FLASH_LOG *log)
@@ -270,6 +271,18 @@ RTS_RESULT FlashLogMark(FLASH_LOG *log)
 bool FlashLogIsMarked(const FLASH_LOG *log, RTS_UI32 size)
 {
     return log->start + log->used > log->newest + record_length(size);
+}
+
+void FlashLogTurn(FLASH_LOG *log)
+{
+    log->used = half_size(log);
+}
+
+void FlashLogRenew(FLASH_LOG *log)
+{
+    log->sequence += half_size(log); /* more than the records that a half has room for */
+    log->opened = ERR_OK;
+    FlashLogTurn(log);
 }
 
 RTS_UI32 FlashLogCapacity(const FLASH_LOG *log)

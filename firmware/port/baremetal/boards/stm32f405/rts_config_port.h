@@ -24,6 +24,7 @@
 #define BOARD_FLASH_SIZE 0x100000u
 #define BOARD_FLASH_SECTOR_SIZE 0x4000u
 #define FLASH_SECTOR_AT(offset) ((offset) < 0x10000u ? 0x4000u : (offset) < 0x20000u ? 0x10000u : 0x20000u)
+#define FLASH_READS_FAIL 0 /* it is memory, without ECC */
 
 /* Programs in two sectors each, the commit log in two small ones, which are erased quickly, the retain log in the last
  * two. The others are the runtime's (stm32f405.ld), and one of 16 KiB is left over. */
