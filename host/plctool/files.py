@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import shlex
+import stat
 import sys
 import tempfile
 from pathlib import Path
@@ -13,6 +14,10 @@ from typing import NamedTuple
 from plctool.errors import UsageError
 
 STDOUT = Path("-")  # in place of the path of an output
+MAX_TEXT = 32 << 20
+MAX_SETTINGS = 1 << 20
+MAX_BINARY = 256 << 20
+"""Bytes that are read of a source or a library, of a TOML file, and of an image or its symbols."""
 _SHOWN = 80  # characters of an invalid path
 
 
@@ -46,6 +51,44 @@ def _no_path(text: str, why: str) -> UsageError:
 def path_error(error: OSError) -> UsageError:
     """What to say of a file that the system refuses, where nothing better is known."""
     return UsageError(f"{os.fsdecode(error.filename)} cannot be used: {error.strerror}.", "path")
+
+
+def is_inside(path: Path, folder: Path) -> bool:
+    """True if a path lies in a folder after all links have been followed, whether it exists or not."""
+    root = os.path.realpath(folder)
+    try:
+        return os.path.commonpath([root, os.path.realpath(path)]) == root
+    except ValueError:  # different drives
+        return False
+
+
+def check_inside(path: Path, folder: Path) -> None:
+    """Raises UsageError if a file that a checked-out project names lies outside the project (docs/security.md)."""
+    if not is_inside(path, folder):
+        real = os.path.realpath(path)
+        way = f", a link to {real}," if path.is_symlink() else ""
+        raise UsageError(
+            f"{path}{way} is outside {os.path.realpath(folder)}, so it is not used; copy it there, or name it on the "
+            "command line.",
+            "outside",
+        )
+
+
+def read_regular(path: Path, most: int) -> bytes:
+    """The bytes of a file. Raises OSError for what cannot be read, is a device or a pipe, or has more than `most`
+    bytes; `strerror` says what to do."""
+    mode = os.stat(path).st_mode  # before it is opened: that waits for the other end of a pipe
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "it is a device or a pipe; give a regular file", str(path))
+    with open(path, "rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(
+            errno.EFBIG, f"it has more than {most >> 20} MiB; split it or take out what is not needed", str(path)
+        )
+    return data
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -94,7 +137,7 @@ def file_path(text: str) -> Path:
 def read_utf8(path: Path, code: str) -> str:
     """The text of a file, perhaps with a byte order mark. Raises UsageError with that code for one that is none."""
     try:
-        data = path.read_bytes()
+        data = read_regular(path, MAX_SETTINGS)
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}.", code) from None
     return decode_utf8(data, path, code)
@@ -111,7 +154,7 @@ def decode_utf8(data: bytes, path: Path, code: str) -> str:
 def read_image(path: Path) -> bytes:
     """The bytes of an image file, whatever they are."""
     try:
-        return path.read_bytes()
+        return read_regular(path, MAX_BINARY)
     except IsADirectoryError:
         build = f"plctool build {shlex.quote(str(path))} -o app.cdl"
         raise UsageError(f"{path} is a folder; make an image of its sources first: {build}.", "no-image") from None

@@ -8,16 +8,17 @@ from typing import Any
 import pytest
 from test_pytest_plugin import run_pytest
 
+from plctool import files
 from plctool.templates import new_project
 
 COUNTING = """
-from pathlib import Path
-read, count = Path.read_bytes, []
-def counted(path):
+from plctool import files
+read, count = files.read_regular, []
+def counted(path, most):
     if path.name == "plc.toml":
         count.append(path)
-    return read(path)
-Path.read_bytes = counted
+    return read(path, most)
+files.read_regular = counted
 def pytest_unconfigure():
     print(len(count), "times")
 """
@@ -32,15 +33,15 @@ def project(scratch: Path) -> Path:
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """The project files that are read."""
-    read_bytes, files = Path.read_bytes, []
+    read_regular, found = files.read_regular, []
 
-    def counted(path: Path) -> bytes:
+    def counted(path: Path, most: int) -> bytes:
         if path.name == "plc.toml":
-            files.append(path)
-        return read_bytes(path)
+            found.append(path)
+        return read_regular(path, most)
 
-    monkeypatch.setattr(Path, "read_bytes", counted)
-    return files
+    monkeypatch.setattr(files, "read_regular", counted)
+    return found
 
 
 @pytest.mark.parametrize("command", ["build", "check", "check --missing", "test", "test --junit report.xml", "run"])

@@ -324,7 +324,7 @@ def _add_file_actions(command: Callable[..., argparse.ArgumentParser]) -> None:
 
     action = _actions(command("source", "keep the sources of the program on the device, and get them back"))
     get = action("get", "write the sources that the device keeps into a folder")
-    get.add_argument("-o", "--output", type=file_path, default=Path("source"), metavar="DIR", help="default: source")
+    get.add_argument("-o", "--output", type=file_path, metavar="DIR", help="default: source")
     _add_link(get)
     put = action("put", "put the sources of the program that is on the device there as well")
     put.set_defaults(no_warn=[], werror=None)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from plctool.cli import io_documents
 from plctool.cli.io_documents import Document
-from plctool.cli.overwriting import check_not_read, check_output
+from plctool.cli.overwriting import check_no_way_out, check_not_read, check_output
 from plctool.cli.plants import attached, files_of_plant, plan_faults
 from plctool.errors import EXIT_INTERRUPTED, DeviceError, LinkError, PlcError, UsageError
 from plctool.files import STDOUT, read_image, write_atomically, write_output
@@ -61,6 +61,7 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
     inputs = settings.every_file
     check_output(output, inputs(), f"-o {output.stem}.cdl", is_image=True)
     check_not_read(symbol_path(output), inputs(), f"-o {output.stem}-image.cdl")
+    _check_way_of(settings)
     made_of = fingerprint(settings)  # before the sources are read: a change during the build makes the image stale
     result = _compile(settings, settings.target)
     result.symbols.made_of = made_of
@@ -80,6 +81,17 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
     if channels:
         document["io"] = io_documents.summary(result.symbols.io)
     return document, result.rendered_warnings
+
+
+def _check_way_of(settings: Settings) -> None:
+    """Refuses links out of the project, and out of the current folder if there is no project."""
+    from plctool.debug.symbols import symbol_path
+
+    output = settings.output
+    if not settings.output_named:
+        check_no_way_out(output, settings.files.root or Path(), f"-o {output.stem}-image.cdl")
+    folder = None if settings.output_named else settings.files.root
+    check_no_way_out(symbol_path(output), folder or output.parent, f"-o {output.stem}-image.cdl")
 
 
 def compiled(settings: Settings) -> BuildResult:
@@ -221,6 +233,7 @@ def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
     written = force or not source.exists()
     for file in (header, source) if written else (header,):
         check_not_read(file, files.every_file(), "-o interface, a folder for it")
+        check_no_way_out(file, folder, "-o interface, a folder for it")
     make_folder(folder)
     write_atomically(header, interface.header.encode("latin-1", "replace"))
     if written:
@@ -330,6 +343,8 @@ def test(settings: Settings, pattern: str, junit: Path | None, coverage: Path | 
         check_output(junit, settings.files.every_file(), "--junit report.xml")
     if coverage:
         check_output(coverage / "cobertura.xml", settings.files.every_file(), "--coverage coverage")
+        for file in coverage.iterdir() if coverage.is_dir() else ():
+            check_no_way_out(file, coverage, "--coverage new-folder")
     report = st_tests.run_tests(
         settings.files,
         pattern=pattern,

@@ -12,7 +12,7 @@ from plctool.cli.io_documents import Document
 from plctool.cli.source_archive import Archive, archive_of, unpacked
 from plctool.debug.symbols import find_symbols
 from plctool.errors import DeviceError, UsageError
-from plctool.files import write_atomically, write_output
+from plctool.files import write_output
 from plctool.link.file_services import SOURCE_NAME, SYMBOLS_NAME
 
 if TYPE_CHECKING:
@@ -28,10 +28,9 @@ def list_files(plc: Plc) -> Document:
     return {"files": files, "room": found.room}
 
 
-def get_file(plc: Plc, name: str, output: Path | None, progress: Progress) -> Document:
-    path = Path(name) if output is None else output
+def get_file(plc: Plc, name: str, path: Path, progress: Progress) -> Document:
     data = plc.read_file(name, progress)
-    (write_atomically if output is None else write_output)(path, data)
+    write_output(path, data)
     return {"name": name, "file": str(path), "size": len(data)}
 
 

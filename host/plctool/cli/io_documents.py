@@ -10,9 +10,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from plctool.cli.overwriting import check_not_read
+from plctool.cli.overwriting import check_no_way_out, check_not_read
 from plctool.errors import UsageError, did_you_mean
-from plctool.files import make_folder, write_atomically
+from plctool.files import is_inside, make_folder, write_atomically
+from plctool.project import find_project
 
 if TYPE_CHECKING:
     from plctool.device import Plc
@@ -102,8 +103,23 @@ def init(path: Path, device: Path | None) -> Document:
     if not path.name.endswith(".io.toml"):
         raise UsageError(f"A description is called NAME.io.toml; write {path.stem}.io.toml.", "bad-output")
     board = None if device is None else _board(device)
+    if device is not None:
+        _check_can_be_named(device, path)
     write_atomically(path, beginning(board, None if device is None else _beside(device, path)).encode())
     return {"description": str(path)}
+
+
+def _check_can_be_named(device: Path, description: Path) -> None:
+    """Raises UsageError for a device file outside the project, which a description cannot name."""
+    from plctool.io.description import root_of
+
+    project = find_project(description.parent)
+    folder = root_of(description, None if project is None else project.parent)
+    if not is_inside(device, folder):
+        raise UsageError(
+            f"{device} is outside {folder.resolve()}, so {description.name} cannot name it; copy it there first.",
+            "outside",
+        )
 
 
 def _beside(device: Path, path: Path) -> str:
@@ -117,6 +133,7 @@ def export_board(device: Path, folder: Path) -> Document:
 
     name, text = board_header(_board(device))
     check_not_read(folder / name, [device], "-o interface, a folder for it")
+    check_no_way_out(folder / name, folder, "-o interface, a folder for it")
     make_folder(folder)
     write_atomically(folder / name, text.encode("ascii"))
     return {"header": str(folder / name)}

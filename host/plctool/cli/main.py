@@ -148,7 +148,7 @@ def _run(args: argparse.Namespace) -> int:
     if args.output and not args.trace:
         raise UsageError("-o is the file of --trace; write for example --trace 'Main.*' -o trace.csv.", "usage")
     _check_one_output(args)
-    trace = documents.TraceFile(args.trace, args.output or Path("trace.csv")) if args.trace else None
+    trace = documents.TraceFile(args.trace, _output_or(args, "trace.csv")) if args.trace else None
     faults = [parse_fault(text) for text in args.fault]
     document, texts = documents.run(
         _program_to_run(args),
@@ -162,6 +162,16 @@ def _run(args: argparse.Namespace) -> int:
         aside=args.json or args.output == STDOUT,
     )
     return _show(args, document, lambda d: output.run_text(d, texts), _beside_output(args))
+
+
+def _output_or(args: argparse.Namespace, default: str) -> Path:
+    """The output that the arguments name, else `default` in the current folder. Raises UsageError if that is a link to
+    elsewhere."""
+    from plctool.cli.overwriting import check_no_way_out
+
+    if args.output is None:
+        check_no_way_out(Path(default), Path(), f"-o new-{default}")
+    return Path(default) if args.output is None else args.output
 
 
 def _program_to_run(args: argparse.Namespace) -> Path | documents.Built:
@@ -434,7 +444,7 @@ def _files(args: argparse.Namespace) -> int:
 
     operations: dict[str, Callable[[Plc, ShowProgress], Document]] = {
         "list": lambda plc, show: file_documents.list_files(plc),
-        "get": lambda plc, show: file_documents.get_file(plc, args.name, args.output, show),
+        "get": lambda plc, show: file_documents.get_file(plc, args.name, _output_or(args, args.name), show),
         "put": lambda plc, show: file_documents.put_file(plc, args.file, args.name, show),
         "delete": lambda plc, show: file_documents.delete_file(plc, args.name),
     }
@@ -454,8 +464,9 @@ def _source(args: argparse.Namespace) -> int:
     from plctool.cli import file_documents
 
     if args.what == "get":
+        output = _output_or(args, "source")
         return _with_progress(
-            args, lambda plc, show: file_documents.get_source(plc, args.output, show), file_documents.source_text
+            args, lambda plc, show: file_documents.get_source(plc, output, show), file_documents.source_text
         )
     settings = _settings(args)
     return _with_progress(

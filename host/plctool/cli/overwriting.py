@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from plctool.errors import UsageError, with_article
+from plctool.files import is_inside
 from plctool.project import IMAGE_SUFFIX, SYMBOL_SUFFIX
 
 _IMAGE = "image"
@@ -20,6 +21,18 @@ def check_output(output: Path, inputs: Iterable[Path], better: str, is_image: bo
     if kind and not (is_image and kind == _IMAGE):
         raise UsageError(f"{output} has the name of {with_article(kind)}; write for example {better}.", "bad-output")
     check_not_read(output, inputs, better)
+
+
+def check_no_way_out(output: Path, folder: Path, better: str) -> None:
+    """For a file whose name the user did not give: refuses a link out of the folder that it goes to, or to a file of
+    another kind. A checked-out project may contain such a link."""
+    real = Path(os.path.realpath(output))
+    if output.is_symlink() and not (is_inside(output, folder) and real.suffix.lower() == output.suffix.lower()):
+        raise UsageError(
+            f"{output} is a link to {real}, which is not written unless it is named; write for example {better}, or "
+            "remove the link.",
+            "bad-output",
+        )
 
 
 def check_not_read(output: Path, inputs: Iterable[Path], better: str) -> None:

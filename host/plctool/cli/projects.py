@@ -20,12 +20,13 @@ DEFAULT_LEVEL: Level = 2
 
 @dataclass(frozen=True)
 class Settings:
-    """`files`: what the program is made of; `own_folder`: the project says where `output` is, so that its folder may be
-    made; the others as in `compile_sources`."""
+    """`files`: what the program is made of; `output_named`: the command line says where `output` is; `own_folder`: the
+    project says so, so that its folder may be made; the others as in `compile_sources`."""
 
     files: ProgramFiles
     warnings: WarningOptions
     output: Path = Path(DEFAULT_IMAGE)
+    output_named: bool = False
     own_folder: bool = False
     target: str | None = None
     level: Level = DEFAULT_LEVEL
@@ -53,6 +54,7 @@ def settings_of(args: argparse.Namespace) -> Settings:
     return Settings(
         files,
         _warnings(args, project),
+        output_named=getattr(args, "output", None) is not None,
         own_folder=project is not None and getattr(args, "output", None) is None,
         board=_board(args, project),
         firmware=getattr(args, "firmware", None),

@@ -23,7 +23,7 @@ from plctool.compiler.source_files import files_read, load, read_contents
 from plctool.compiler.syntax.lexer import KEYWORDS
 from plctool.compiler.toml_files import error_at, read_checked
 from plctool.errors import UsageError, did_you_mean
-from plctool.files import Pos, decode_utf8, read_utf8
+from plctool.files import Pos, check_inside, decode_utf8, is_inside, read_utf8
 from plctool.iec.types import ELEMENTARY
 from plctool.io.tables import Table
 from plctool.project import LIBRARY_FILE
@@ -108,6 +108,7 @@ def read_library(path: Path) -> LibraryFiles:
             raise UsageError(f"{path} has no {LIBRARY_FILE}, neither at its top nor in its only folder.", "bad-library")
         text = decode_utf8(data, path / LIBRARY_FILE, "bad-library")
     else:
+        check_inside(path / LIBRARY_FILE, path)
         text = read_utf8(path / LIBRARY_FILE, "bad-library")
     return read_checked(str(path / LIBRARY_FILE), text, LIBRARY_FILE, lambda table: _read(path, text, table))
 
@@ -192,7 +193,8 @@ def no_library(path: Path) -> str:
 class _Resolution:
     """The libraries that are given and those that they need, each once."""
 
-    def __init__(self) -> None:
+    def __init__(self, root: Path | None) -> None:
+        self._root = root
         self.found: dict[str, LibraryFiles] = {}
         self._needed_by: dict[str, str] = {}
         self._nearby: dict[Path, list[LibraryFiles]] = {}
@@ -249,10 +251,13 @@ class _Resolution:
         return f"{library.name} needs the library {needed.name}, which is not here{hint}"
 
     def _near(self, library: LibraryFiles) -> list[LibraryFiles]:
-        """The libraries in the folder of a library. What is none of them, and not right either, does not matter."""
+        """The libraries in the folder of a library. What is none of them, and not right either, does not matter. The
+        libraries of a project are not looked for outside the project."""
         folder = _folder_of(library)
         if folder not in self._nearby:
-            self._nearby[folder] = [other for path in _libraries_in(folder) if (other := _readable(path))]
+            root = self._root if self._root is not None and is_inside(library.path, self._root) else None
+            paths = [path for path in _libraries_in(folder) if root is None or is_inside(path, root)]
+            self._nearby[folder] = [other for path in paths if (other := _readable(path))]
         return self._nearby[folder]
 
 
@@ -269,11 +274,13 @@ def _readable(path: Path) -> LibraryFiles | None:
         return None
 
 
-def resolve_libraries(paths: Iterable[Path], sources: Iterable[Path] = ()) -> list[LibraryFiles]:
+def resolve_libraries(
+    paths: Iterable[Path], sources: Iterable[Path] = (), root: Path | None = None
+) -> list[LibraryFiles]:
     """The libraries of these paths, and those that they need, and those that `sources` need if a library is among them:
-    one that is checked or tested by itself. Raises UsageError, with the line of library.toml where
-    there is one, for what is missing, does not fit together or needs itself."""
-    resolution = _Resolution()
+    one that is checked or tested by itself. `root`: the folder of the project, if there is one. Raises UsageError, with
+    the line of library.toml where there is one, for what is missing, does not fit together or needs itself."""
+    resolution = _Resolution(root)
     given = [read_library(library) for path in paths for library in find_libraries(path)]
     for library in given:
         resolution.add(library)

@@ -45,6 +45,11 @@ class ProgramFiles:
     info: ApplicationInfo
     project: Project | None = None
 
+    @property
+    def root(self) -> Path | None:
+        """The folder of the project, which contains all that the project names; None if there is no project."""
+        return None if self.project is None else self.project.file.parent
+
     @cached_property
     def source_files(self) -> Sequence[Path]:
         """The files of the sources, and projects of other systems that name them; not read yet. Raises UsageError when
@@ -52,7 +57,7 @@ class ProgramFiles:
         from plctool.compiler.source_files import files_read
 
         try:
-            return list(files_read(self.sources))
+            return list(files_read(self.sources, self.root))
         except OSError as error:
             raise _unreadable(error) from None
 
@@ -69,7 +74,7 @@ class ProgramFiles:
         from plctool.compiler.source_files import load
 
         try:
-            return load(self.sources)
+            return load(self.sources, self.root)
         except OSError as error:
             raise _unreadable(error) from None
 
@@ -78,7 +83,7 @@ class ProgramFiles:
         from plctool.compiler.library_files import resolve_libraries
 
         yield from self.source_files
-        for library in resolve_libraries(self.libraries, self.sources):
+        for library in resolve_libraries(self.libraries, self.sources, self.root):
             yield from library.files
         io = self.load_io()
         yield from map(Path, io.contents if io is not None else ())
@@ -88,7 +93,7 @@ class ProgramFiles:
         from plctool.compiler.imports import import_libraries
         from plctool.compiler.library_files import resolve_libraries
 
-        return import_libraries(resolve_libraries(self.libraries, self.sources))
+        return import_libraries(resolve_libraries(self.libraries, self.sources, self.root))
 
     def load_io(self) -> Description | None:
         """The inputs and outputs, for one check; None if there is no description. Raises UsageError for a file that
@@ -98,10 +103,10 @@ class ProgramFiles:
         if not self.io.wanted:
             return None
         device = self.io.device
-        found = self.io.description or find_description(self.beside)
+        found = self.io.description or find_description(self.beside, self.root)
         if found is None and device is not None:
             raise UsageError(f"There is no description (NAME.io.toml) that uses {device}; name it with --io.", "io")
-        return None if found is None else load_description(found, device)
+        return None if found is None else load_description(found, device, self.root)
 
 
 def _unreadable(error: OSError) -> UsageError:

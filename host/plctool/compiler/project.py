@@ -19,19 +19,21 @@ from plctool.compiler.source_files import READERS
 from plctool.compiler.toml_files import read_checked
 from plctool.compiler.warnings import WARNINGS
 from plctool.errors import UsageError, did_you_mean, listed
-from plctool.files import read_utf8
+from plctool.files import is_inside, read_utf8
 from plctool.iec.dialect import DIALECTS
 from plctool.image.board import known_boards
 from plctool.image.file import ApplicationInfo
 from plctool.image.targets import TARGETS
 from plctool.io.tables import Entry, Table
-from plctool.project import DEFAULT_IMAGE, PROJECT_FILE
+from plctool.project import DEFAULT_IMAGE, IMAGE_SUFFIX, PROJECT_FILE
 
 _LEVELS: dict[object, Level] = {0: 0, 1: 1, 2: 2, 3: 3, "s": "s"}
 _INFORMATION = ("name", "version", "author", "description")
 _OPTIONS = ("optimisation", "checks", "debug", "dialect", "no-warn", "werror")
 _MAX_TEXT = 255  # characters of what the image says about the project
 _PATTERN = re.compile(r"[*?\[]")
+_OPTION_OF = {"libraries": "--library", "io": "--io", "device": "--device", "output": "-o"}
+"""What names a path on the command line, by its key; sources stand there without an option."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,20 @@ def _path(folder: Path, entry: Entry, table: Table) -> Path | None:
     except OSError as error:
         table.mistakes.error(entry.pos, f"{path} cannot be used: {error.strerror}")
         return None
-    return path
+    return path if _belongs(folder, path, entry, table) else None
+
+
+def _belongs(folder: Path, path: Path, entry: Entry, table: Table) -> bool:
+    """True if a path lies in the folder of the project, links followed; reports it if not."""
+    if is_inside(path, folder):
+        return True
+    option = _OPTION_OF.get(entry.key)
+    named = "name the sources" if option is None else f"give it with {option}"
+    table.mistakes.error(
+        entry.pos,
+        f"{path} is outside the folder of {PROJECT_FILE}; take it out of here, and {named} on the command line",
+    )
+    return False
 
 
 def _path_of(folder: Path, table: Table, key: str) -> Path | None:
@@ -125,6 +140,9 @@ def _output(folder: Path, table: Table) -> Path:
     path = _path_of(folder, table, "output") or folder / DEFAULT_IMAGE
     if os.path.isdir(path):  # False as well for a name that no file can have, as below
         table.error(f'{path} is a folder; write for example output = "{DEFAULT_IMAGE}"', "output")
+    elif path.suffix.lower() != IMAGE_SUFFIX:
+        example = f'output = "{path.stem or "app"}{IMAGE_SUFFIX}"'
+        table.error(f"the name of the image ends in {IMAGE_SUFFIX}, not as {path.name} does; write {example}", "output")
     return path
 
 
@@ -167,6 +185,8 @@ def _matching(folder: Path, entry: Entry, table: Table) -> list[Path]:
         table.mistakes.error(entry.pos, f'{wrong}; write for example "src/**/*.st"')
         return []
     files = sorted(p for p in folder.glob(text) if p.is_file() and p.suffix.lower() in READERS)
+    if not all(_belongs(folder, file, entry, table) for file in files):
+        return []
     if not files:
         table.mistakes.error(entry.pos, f"no source fits {path}")
     return files
@@ -189,8 +209,9 @@ def _libraries(folder: Path, table: Table) -> list[Path]:
         path = _path(folder, entry, table)
         if path is None:
             continue
-        if libraries_at(path):
-            found.append(path)
+        if libraries := libraries_at(path):
+            if all(_belongs(folder, library, entry, table) for library in libraries):
+                found.append(path)
         elif not is_stand_in(entry.value.partition(",")[0].strip()):
             message = no_library(path).rstrip(".")
             table.mistakes.error(entry.pos, f"{message[:1].lower()}{message[1:]}")

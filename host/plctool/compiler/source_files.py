@@ -23,6 +23,7 @@ from plctool.compiler.formats import (
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.source import Finding, Piece, Source
 from plctool.errors import UsageError
+from plctool.files import MAX_TEXT, check_inside, is_inside, read_regular
 from plctool.project import LIBRARY_FILE
 
 _UNIT = re.compile(r"^\s*(?:PROGRAM|FUNCTION|FUNCTION_BLOCK|TYPE|VAR_GLOBAL|INTERFACE)\b", re.IGNORECASE | re.MULTILINE)
@@ -68,29 +69,34 @@ SUFFIXES = frozenset(READERS) - {".xml"}
 """That sources alone have, in lower case. An .xml is taken from a folder when it is a project."""
 
 
-def load(paths: Iterable[Path]) -> list[Source]:
-    """The files named, those of projects named, and all sources in folders named.
+def load(paths: Iterable[Path], root: Path | None = None) -> list[Source]:
+    """The files named, those of projects named, and all sources in folders named. `root`: the folder of the plc.toml
+    that names them; None if they are named on the command line, so that each folder or project may use its own files.
 
-    Raises OSError when one cannot be read, UsageError when there is nothing to read.
+    Raises OSError when one cannot be read, UsageError when there is nothing to read or a file is outside `root`.
     """
     files: dict[Path, None] = {}
     for path in paths:
-        files.update(dict.fromkeys(_files(path)))
-    return _read_all(files, Path.read_bytes)
+        files.update(dict.fromkeys(_files(path, root)))
+    return _read_all(files, _content)
 
 
-def files_read(paths: Iterable[Path]) -> Iterator[Path]:
+def files_read(paths: Iterable[Path], root: Path | None = None) -> Iterator[Path]:
     """The files that `load` reads, and the projects that name them; the same errors."""
     for path in paths:
         if not path.is_dir():
             yield path
-        yield from _files(path)
+        yield from _files(path, root)
 
 
 def read_contents(contents: Mapping[Path, bytes]) -> list[Source]:
     """The sources among files that are not on disk, such as those of a .zip."""
     wanted = [path for path, data in contents.items() if _has_sources(path, data)]
     return _read_all(wanted, contents.__getitem__)
+
+
+def _content(path: Path) -> bytes:
+    return read_regular(path, MAX_TEXT)
 
 
 def _read_all(files: Iterable[Path], content: Callable[[Path], bytes]) -> list[Source]:
@@ -129,40 +135,53 @@ def _read(path: Path, data: bytes) -> list[Source]:
     return READERS.get(path.suffix.lower(), _structured_text)(str(path), decode(data))
 
 
-def _files(path: Path) -> list[Path]:
+def _files(path: Path, root: Path | None) -> list[Path]:
     if path.is_dir():
-        return find_sources(path)
-    suffix = path.suffix.lower()
+        return find_sources(path, root)
+    if root is not None:
+        check_inside(path, root)
+    suffix, root = path.suffix.lower(), root or path.parent
     if suffix == ".plcproj":
-        return [p for p in twincat.project_files(path, decode(path.read_bytes())) if p.suffix.lower() in SUFFIXES]
+        return _inside(
+            root, (p for p in twincat.project_files(path, decode(_content(path))) if p.suffix.lower() in SUFFIXES)
+        )
     if suffix == ".tsproj":
-        projects = twincat.projects_of_solution(path, decode(path.read_bytes()))
+        projects = twincat.projects_of_solution(path, decode(_content(path)))
         if not projects:
             raise UsageError(f"{path} does not name a PLC project (.plcproj) that exists.", "no-source")
-        return [file for project in projects for file in _files(project)]
+        return [file for project in projects for file in _files(project, root)]
     return [path]
 
 
-def find_sources(folder: Path) -> list[Path]:
-    """The source files in a folder and those below it; of a TwinCAT project, those that belong to it. Libraries below
-    it are not part of it.
+def _inside(root: Path, files: Iterable[Path]) -> list[Path]:
+    """The files, of which none is outside `root`."""
+    found = list(files)
+    for file in found:
+        check_inside(file, root)
+    return found
 
-    Raises UsageError when there are none, or several projects.
+
+def find_sources(folder: Path, root: Path | None = None) -> list[Path]:
+    """The source files in a folder and those below it; of a TwinCAT project, those that belong to it. Libraries below
+    it are not part of it. `root`: as in `load`.
+
+    Raises UsageError when there are none, or several projects, or one is outside `root`.
     """
+    root = root or folder
     projects = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".plcproj" and path.is_file())
     if len(projects) > 1:
         names = ", ".join(str(path) for path in projects)
         raise UsageError(f"There are several PLC projects in {folder}; give one of them: {names}.", "no-source")
     libraries = {file.parent for file in folder.rglob(LIBRARY_FILE)} - {folder}
-    found = sorted(path for path in folder.rglob("*") if _is_source(path) and libraries.isdisjoint(path.parents))
+    found = sorted(path for path in folder.rglob("*") if _is_source(path, root) and libraries.isdisjoint(path.parents))
     found = [path for path in found if not _is_generated(path, found)]
     if projects:
         home = projects[0].parent
         others = (path for path in found if home not in path.parents or not path.suffix.lower().startswith(".tc"))
-        found = sorted({*_files(projects[0]), *others})
+        found = sorted({*_files(projects[0], root), *others})
     if not found:
         raise UsageError(
-            f"{_named(folder)} has no source file (.st, .exp, .TcPOU ...){_other_files(folder)}.", "no-source"
+            f"{_named(folder)} has no source file (.st, .exp, .TcPOU ...){_other_files(folder, root)}.", "no-source"
         )
     return found
 
@@ -171,22 +190,23 @@ def _named(folder: Path) -> str:
     return "The current folder" if folder == Path() else f"The folder {folder}"
 
 
-def _other_files(folder: Path) -> str:
+def _other_files(folder: Path, root: Path) -> str:
     """What to do with the files that hold programs but no text, or have the name of another text."""
     files = sorted(folder.rglob("*"))
     for path in files:
         if advice := unreadable.WHAT_TO_DO.get(path.suffix.lower()):
             return f"; {path.name} is not text: {advice}"
     for path in files:
-        if path.suffix.lower() == ".txt" and path.is_file() and _UNIT.search(decode(path.read_bytes())):
+        if path.suffix.lower() == ".txt" and _is_text(path, root) and _UNIT.search(decode(_content(path))):
             return f"; {path.name} seems to be one: rename it to {path.stem.removesuffix('.st')}.st"
     return ""
 
 
-def _is_source(path: Path) -> bool:
+def _is_source(path: Path, root: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix not in READERS or not path.is_file():
         return False
+    check_inside(path, root)
     if suffix != ".xml":
         return True
     with path.open("rb") as file:
@@ -197,6 +217,10 @@ def _has_sources(path: Path, data: bytes) -> bool:
     """Whether a file, of which this is at least the beginning, is one."""
     suffix = path.suffix.lower()
     return suffix in SUFFIXES or (suffix == ".xml" and plcopen.is_project(decode(data[: plcopen.HEAD])))
+
+
+def _is_text(path: Path, root: Path) -> bool:
+    return path.is_file() and is_inside(path, root) and path.stat().st_size <= MAX_TEXT
 
 
 def _is_generated(path: Path, found: Container[Path]) -> bool:

@@ -23,7 +23,7 @@ from plctool.debug.bounds import BoundsCheck, Read, what_was_outside
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Symbol, Units, constant_symbol, shown, walk
 from plctool.errors import UsageError
-from plctool.files import write_atomically
+from plctool.files import MAX_BINARY, read_regular, write_atomically
 from plctool.iec.addresses import parse_address
 from plctool.iec.type_descriptions import DescribedTypes, describe
 from plctool.iec.types import ELEMENTARY, ArrayType, OpenArrayType, StructType
@@ -419,7 +419,7 @@ def _pattern(text: str) -> str:
 def load_symbols(path: Path) -> SymbolTable:
     """Raises UsageError when the file is missing or not a symbol file."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular(path, MAX_BINARY).decode("utf-8")
     except OSError as error:
         raise UsageError(f"The symbol file {path} cannot be read: {error.strerror}.", "no-symbols") from None
     except UnicodeDecodeError:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from plctool.errors import UsageError
-from plctool.files import Pos, read_utf8
+from plctool.files import Pos, check_inside, is_inside, read_utf8
 from plctool.io.board_header import check_names
 from plctool.io.device_file import DeviceFile, read_device_file
 from plctool.io.kinds import KINDS
@@ -19,9 +19,10 @@ from plctool.io.tables import Table
 SUFFIX = ".io.toml"
 
 
-def find_description(sources: Sequence[Path]) -> Path | None:
+def find_description(sources: Sequence[Path], project: Path | None = None) -> Path | None:
     """The description beside the sources, or in a folder of them; None if there is none. Of several, that beside a
-    source of its name. Raises UsageError if it is not clear which one is meant."""
+    source of its name. Raises UsageError if it is not clear which one is meant, or it is a link that leads out of its
+    folder, or of that of the `project`."""
     folders = {(path if path.is_dir() else path.parent).resolve(): path for path in reversed(sources)}
     named = [path if path.is_dir() else path.parent for path in folders.values()]
     found = sorted(file for folder in named for file in folder.glob(f"*{SUFFIX}") if file.is_file())
@@ -31,16 +32,20 @@ def find_description(sources: Sequence[Path]) -> Path | None:
     if len(found) > 1:
         names = ", ".join(str(file) for file in found)
         raise UsageError(f"There are several descriptions of inputs and outputs; choose one with --io: {names}.", "io")
-    return found[0] if found else None
+    if not found:
+        return None
+    check_inside(found[0], project or found[0].parent)
+    return found[0]
 
 
-def load_description(path: Path, device: Path | None = None) -> Description:
-    """Reads a description and the device file: `device`, else the one it names. What is wrong with them is in
+def load_description(path: Path, device: Path | None = None, project: Path | None = None) -> Description:
+    """Reads a description and the device file: `device`, else the one it names, which is in the folder of the
+    description, or in that of the `project` if the description is there. What is wrong with them is in
     `mistakes`. Raises UsageError for a file that cannot be read."""
-    return read_description(str(path), read_utf8(path, "io"), device)
+    return read_description(str(path), read_utf8(path, "io"), device, project)
 
 
-def read_description(path: str, text: str, device: Path | None = None) -> Description:
+def read_description(path: str, text: str, device: Path | None = None, project: Path | None = None) -> Description:
     """The same for a text."""
     mistakes = Mistakes()
     made = Description(path, [], mistakes, {path: text})
@@ -52,10 +57,14 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
         return made
     root = Table(toml, (), toml.values, mistakes)
     named = root.text("device")
+    folder = root_of(Path(path), project)
     if device is None and named is not None:
         device = Path(path).parent / named
         if not os.path.isfile(device):  # False as well for a name that no file can have
             root.error(f"there is no file {device}", "device")
+            device = None
+        elif not is_inside(device, folder):
+            root.error(f"{device} is outside {folder.resolve()}; copy it there, or name it with --device", "device")
             device = None
     if device is not None:
         made.device = _device_file(device, made)
@@ -69,6 +78,12 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
     root.close()
     _check_names(made.connectors, _check_taken(made.connectors, mistakes), mistakes)
     return made
+
+
+def root_of(description: Path, project: Path | None) -> Path:
+    """The folder that contains the device file which a description names: that of the project, if the description is
+    there, else that of the description."""
+    return project if project is not None and is_inside(description, project) else description.parent
 
 
 def _device_file(path: Path, made: Description) -> DeviceFile | None:
