@@ -505,6 +505,37 @@ def test_a_port_of_the_project_begins_at_its_folder(
     assert opened == ["serial:../plc.tty?baud=115200"]
 
 
+@pytest.mark.parametrize("command", ["status", "stop", "read Main.n", "scan", "log"])
+def test_a_command_says_that_the_project_names_its_link(
+    tool: Any, opened: list[str], scratch: Path, command: str
+) -> None:
+    (scratch / "plc.toml").write_text('link = "serial:/dev/project"\n')
+    said = "plctool: the link is serial:/dev/project?baud=115200, from plc.toml\n"
+    assert tool(*command.split()).err.count(said) == 1
+    assert said not in tool(*command.split(), "--json").err
+    assert said not in tool(*command.split(), *PORT).err
+
+
+@pytest.mark.parametrize("url", ["socket://host:1", "loop://", "rfc2217://host:1"])
+@pytest.mark.parametrize("kind", ["serial", "modbus", "can:slcan"])
+def test_the_project_names_no_url(
+    tool: Any, scratch: Path, monkeypatch: pytest.MonkeyPatch, url: str, kind: str
+) -> None:
+    (scratch / "plc.toml").write_text(f'link = "{kind}:{url}"\n')
+    done = tool("status")
+    assert done.status == 2
+    assert f"{url} is a URL, which plc.toml cannot name" in done.err and f"PLC_LINK={kind}:{url}." in done.err
+
+
+def test_a_link_of_the_project_writes_no_file(tool: Any, scratch: Path) -> None:
+    (scratch / "victim").write_text("precious")
+    for url in (f"spy://loop://?file={scratch}/victim", f"SPY://loop://?file={scratch}/victim"):
+        (scratch / "plc.toml").write_text(f'link = "serial:{url}"\n')
+        assert "is not a port" in (done := tool("status")).err and done.status == 2
+        assert "is not a port" in (done := tool("status", "--port", url)).err and done.status == 2
+    assert (scratch / "victim").read_text() == "precious"
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -23,8 +23,8 @@ from plctool.link.transports import TRANSPORTS, Link, make_link, open_transport,
         ("serial:/dev/ttyS0?baud=9600", "/dev/ttyS0", 9600),
         ("serial:COM3", "COM3", DEFAULT_BAUD),
         ("serial:socket://host:4711", "socket://host:4711", DEFAULT_BAUD),
-        ("serial:spy:///dev/ttyS0?file=log.txt", "spy:///dev/ttyS0?file=log.txt", DEFAULT_BAUD),
-        ("serial:spy:///dev/ttyS0?file=log.txt?baud=1200", "spy:///dev/ttyS0?file=log.txt", 1200),
+        ("serial:loop://?logging=debug", "loop://?logging=debug", DEFAULT_BAUD),
+        ("serial:rfc2217://host:1?ign_set_control?baud=1200", "rfc2217://host:1?ign_set_control", 1200),
         ("serial:/dev/serial/by-id/usb:1-if00", "/dev/serial/by-id/usb:1-if00", DEFAULT_BAUD),
     ],
 )
@@ -33,6 +33,24 @@ def test_a_link_is_its_kind_its_place_and_its_options(text: str, place: str, bau
     assert link == Link("serial", place, {"baud": baud})
     assert parse_link(str(link)) == link
     assert make_link("serial", place, baud=baud) == link
+
+
+@pytest.mark.parametrize(
+    "url", ["spy:///dev/ttyS0?file=x", "SPY://loop://", "hwgrep://.*", "alt:///dev/ttyS0", "://x", "x://"]
+)
+@pytest.mark.parametrize("link", ["serial", "modbus", "can:slcan", "can:serial"])
+def test_a_url_that_is_no_line_is_refused(url: str, link: str) -> None:
+    with pytest.raises(
+        UsageError, match="is not a port: name one, or a URL that begins with loop://, rfc2217:// or soc"
+    ):
+        parse_link(f"{link}:{url}")
+
+
+@pytest.mark.parametrize(
+    "link", ["serial:socket://h:1", "serial:RFC2217://h:1", "modbus:loop://", "can:slcan:socket://h:1"]
+)
+def test_a_url_of_a_line_is_a_link(link: str) -> None:
+    assert str(parse_link(link)).startswith(link)
 
 
 @pytest.mark.parametrize(

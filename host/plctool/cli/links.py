@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 from plctool.errors import LinkError, UsageError
 from plctool.files import read_utf8
 from plctool.io.positions import BadToml, TomlText
-from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link
+from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link, url_of
 from plctool.project import PROJECT_FILE, find_project
 
 VARIABLE = "PLC_LINK"
@@ -40,7 +41,7 @@ def find_link(args: argparse.Namespace) -> Link | None:
         if not (place := _argument(args, kind.flag)):
             raise UsageError(f"--{kind.flag} is followed by nothing; write for example {kind.example}.", "no-link")
         return make_link(given[0], place, **_options(args))
-    link = _default_link()
+    link = _default_link(args)
     return None if link is None else make_link(link.scheme, link.place, **{**link.options, **_options(args)})
 
 
@@ -69,11 +70,21 @@ def _options(args: argparse.Namespace) -> dict[str, Value]:
     return {name: value for name in sorted(names) if (value := _argument(args, name)) is not None}
 
 
-def _default_link() -> Link | None:
+def _default_link(args: argparse.Namespace) -> Link | None:
     if text := os.environ.get(VARIABLE):
         return _parse(text, f"In the environment's {VARIABLE}")
     file = find_project()
-    return None if file is None else _link_in(file)
+    link = None if file is None else _link_in(file)
+    if link is not None:
+        _announce(args, f"the link is {link}, from {file}")
+    return link
+
+
+def _announce(args: argparse.Namespace, words: str) -> None:
+    """Says once that a file decides which controller a command is for: it may have come with a checked-out project."""
+    if not args.json and "announced" not in args:
+        args.announced = True
+        print(f"plctool: {words}", file=sys.stderr, flush=True)
 
 
 def _link_in(file: Path) -> Link | None:
@@ -95,8 +106,16 @@ def _link_in(file: Path) -> Link | None:
 
 
 def project_link(file: Path, line: int, text: str) -> Link:
-    """The link that a line of a project names. Raises UsageError if it is none."""
-    return _beside(file, _parse(text, f"{file}:{line}"))
+    """The link that a line of a project names. Raises UsageError if it is none, or a URL: a checked-out project names
+    ports and addresses only."""
+    link = _parse(text, f"{file}:{line}")
+    if url_of(link.place) is not None:
+        raise UsageError(
+            f"{file}:{line}: {link.place} is a URL, which {PROJECT_FILE} cannot name; give it with "
+            f"--{TRANSPORTS[link.scheme].flag} or in the environment: {VARIABLE}={text}.",
+            "bad-project",
+        )
+    return _beside(file, link)
 
 
 def _beside(file: Path, link: Link) -> Link:

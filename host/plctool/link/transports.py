@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plctool.errors import UsageError
+from plctool.errors import UsageError, listed
 from plctool.link.transport import DEFAULT_BAUD, BlockTransport
 
 if TYPE_CHECKING:
@@ -21,6 +21,9 @@ PARITIES = ("even", "odd", "none")
 _LAST_NODE = 127  # CAN_NODE_MAX; the command line starts without the core
 _LAST_UNIT = 247  # MODBUS_MAX_UNIT
 _MODBUS_BAUD = 38400
+URLS = ("loop", "rfc2217", "socket")
+"""The URLs of pyserial that name a line. Others write a file (spy://), look for a port (hwgrep://) or wrap another URL
+(alt://)."""
 
 
 @dataclass(frozen=True)
@@ -204,7 +207,7 @@ TRANSPORTS: dict[str, Transport] = {
         flag="port",
         shape="PORT",
         example="/dev/ttyS0",
-        help="serial port or pyserial URL, for example /dev/ttyS0",
+        help="serial port, for example /dev/ttyS0, or URL: socket://HOST:PORT, rfc2217://HOST:PORT",
         options={"baud": Option(DEFAULT_BAUD, _above_zero, _BAUD_HELP)},
         is_shared=True,
     ),
@@ -279,6 +282,9 @@ def make_link(scheme: str, place: str, /, **options: Value) -> Link:
     kind = TRANSPORTS[scheme]
     if bool(place) != bool(kind.flag):
         raise _no_link(f"{scheme}:{place}")
+    if (url := url_of(place)) is not None and url not in URLS:
+        usable = listed((f"{name}://" for name in URLS), "or")
+        raise UsageError(f"{place} is not a port: name one, or a URL that begins with {usable}.", "no-such-link")
     values = {name: option.default for name, option in kind.options.items()}
     for name, value in options.items():
         if name not in values:
@@ -289,6 +295,13 @@ def make_link(scheme: str, place: str, /, **options: Value) -> Link:
         except ValueError as error:
             raise UsageError(f"The option {name} of {scheme}:{place} is wrong: {error}.", "no-such-link") from None
     return Link(scheme, place, values)
+
+
+def url_of(place: str) -> str | None:
+    """The kind of the URL that a place is or, after the interface of a CAN bus, contains: `socket` of `socket://host:1`.
+    None if it is no URL."""
+    kind, mark, _ = place.partition("://")
+    return kind.rpartition(":")[2].lower() if mark else None
 
 
 def open_transport(link: Link) -> BlockTransport:
