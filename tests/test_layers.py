@@ -20,7 +20,7 @@ ROOT = Path(plctool.__file__).parent
 
 # From the ground up; the packages and modules of one line do not know each other. "" is what `import plctool` gives.
 FLOORS = (
-    ("errors", "version"),
+    ("errors", "printable", "version"),
     ("core",),
     ("files", "iec", "project"),
     ("image",),

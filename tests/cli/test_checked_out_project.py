@@ -1,4 +1,4 @@
-"""A project that somebody else wrote reads and writes its own folder only, unless the command line names more."""
+"""A project of another author reads and writes its own folder only, unless the command line names more."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ def test_a_default_output_is_not_written_through_a_link(tool: Any, project: Path
     assert (outside / "precious").read_text() == "precious"
 
 
-# ---- files that are none
+# ---- devices and pipes
 
 
 @pytest.mark.parametrize("where", ["command line", "project", "folder"])

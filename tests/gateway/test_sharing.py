@@ -216,4 +216,4 @@ def test_tools_learn_of_each_other(served: Served) -> None:
 def test_what_a_tool_calls_itself_is_fit_for_another_ones_terminal(served: Served) -> None:
     served.connect("evil \x1b[2J\n" + "x" * 1000)
     (other,) = served.connect().others()
-    assert other.tool.startswith("evil ?[2J?xxx") and len(other.tool) <= 100
+    assert other.tool.startswith("evil \\x1b[2J\\nxxx") and len(other.tool) <= 100

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from plctool.errors import UsageError
+from plctool.files import MAX_BINARY, read_regular
 from plctool.version import plctool_version
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def fingerprint(settings: Settings) -> str:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path, MAX_BINARY)
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}.", "no-source") from None
 

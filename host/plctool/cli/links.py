@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from plctool.cli import output
 from plctool.errors import LinkError, UsageError
 from plctool.files import read_utf8
 from plctool.io.positions import BadToml, TomlText
@@ -84,7 +85,7 @@ def _announce(args: argparse.Namespace, words: str) -> None:
     """Says once that a file decides which controller a command is for: it may have come with a checked-out project."""
     if not args.json and "announced" not in args:
         args.announced = True
-        print(f"plctool: {words}", file=sys.stderr, flush=True)
+        output.say(f"plctool: {words}", sys.stderr)
 
 
 def _link_in(file: Path) -> Link | None:

@@ -17,6 +17,8 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from plctool.printable import one_line
+
 _FRAME = 6  # lines that are not rows: head, borders, caption, cursor
 _KEYS = {
     b"\x1b[A": ("line", -1), b"k": ("line", -1), b"\x1b[B": ("line", 1), b"j": ("line", 1),
@@ -73,7 +75,7 @@ class LiveTable:
             caption = f"{self._top + 1} to {self._top + len(shown)} of {len(rows)}, arrow keys scroll; {caption}"
         table = Table("variable", "value")
         for name, text in shown:
-            table.add_row(Text(name, no_wrap=True), Text(text, no_wrap=True, overflow="ellipsis"))
+            table.add_row(Text(one_line(name), no_wrap=True), Text(one_line(text), no_wrap=True, overflow="ellipsis"))
         self._live.update(Group(table, Text(caption, no_wrap=True, style="dim")), refresh=True)
 
 

@@ -22,6 +22,7 @@ from plctool.cli.unknown_commands import check_command
 from plctool.errors import EXIT_INTERRUPTED, InternalError, PlcError, UsageError
 from plctool.files import STDOUT, path_error
 from plctool.link.transports import Link
+from plctool.printable import one_line
 from plctool.project import IMAGE_SUFFIX
 from plctool.version import plctool_version
 
@@ -43,7 +44,7 @@ EXIT_BROKEN_PIPE = 141
 def _print_warnings(args: argparse.Namespace, warnings: Sequence[str]) -> None:
     if not args.json:
         for warning in warnings:
-            print(output.coloured(warning, sys.stderr), file=sys.stderr)
+            output.say(warning, sys.stderr, colours=True)
 
 
 def _build(args: argparse.Namespace) -> int:
@@ -68,7 +69,7 @@ def _check(args: argparse.Namespace) -> int:
         _show(args, document, output.missing_text)
         return EXIT_OK if all(name["stand_in"] for name in document["missing"]) else EXIT_USAGE
     document, texts = documents.check(settings, documents.CheckReports(args.sarif, args.junit))
-    _show(args, document, lambda d: output.coloured("\n".join(texts), sys.stdout))
+    _show(args, document, lambda d: "\n".join(texts), colours=True)
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
 
 
@@ -100,7 +101,7 @@ def _fresh_image(args: argparse.Namespace, settings: Settings | None) -> Path:
         document, warnings = documents.build(settings)
         _print_warnings(args, warnings)
         if not args.json:
-            print(f"Built {output.build_text(document)}", file=sys.stderr)
+            output.say(f"Built {output.build_text(document)}", sys.stderr)
     return settings.output
 
 
@@ -189,7 +190,7 @@ def _test(args: argparse.Namespace) -> int:
 
     document, report = documents.test(_settings(args), args.filter, args.junit, args.coverage)
     _print_warnings(args, report.warning_texts())
-    _show(args, document, lambda d: report_text(report, colour=output.wants_colour(sys.stdout)))
+    _show(args, document, lambda d: report_text(report), colours=True)
     return EXIT_FAILED if report.failed else EXIT_OK
 
 
@@ -320,7 +321,7 @@ def _flash(args: argparse.Namespace) -> int:
     def announce(others: Sequence[OtherTool]) -> None:
         if others and not args.json:
             users = "1 other tool uses" if len(others) == 1 else f"{len(others)} other tools use"
-            print(f"{users} this line: {', '.join(map(str, others))}", flush=True)
+            output.say(f"{users} this line: {', '.join(one_line(str(other)) for other in others)}")
 
     def flash(plc: Plc) -> Document:
         with _Progress(not args.json) as progress:
@@ -366,7 +367,7 @@ class _Progress:
                 TransferSpeedColumn,
             )
 
-            label = TextColumn("{task.description}")
+            label = TextColumn("{task.description}", markup=False)
             columns = (label, BarColumn(), DownloadColumn(), TransferSpeedColumn(), TimeRemainingColumn())
             self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
 
@@ -491,7 +492,7 @@ def _port_check(args: argparse.Namespace) -> int:
     from plctool.port_check import outcome_text, summary_text
 
     def power_cycle() -> None:
-        print("Switch the board off and on, then press Enter.", file=sys.stderr)
+        output.say("Switch the board off and on, then press Enter.", sys.stderr)
         sys.stdin.readline()
 
     document, report = documents.port_check(
@@ -502,7 +503,7 @@ def _port_check(args: argparse.Namespace) -> int:
         power_cycle=power_cycle if args.power_cycle else None,
         wires=args.wire,
         device=args.device,
-        show=lambda outcome: None if args.json else print(outcome_text(outcome), flush=True),
+        show=lambda outcome: None if args.json else output.say(one_line(outcome_text(outcome))),
     )
     _show(args, document, lambda d: summary_text(report))
     return EXIT_FAILED if document["failed"] else EXIT_OK
@@ -512,7 +513,7 @@ def _read(args: argparse.Namespace) -> int:
     with _connect(args) as plc:
         document, texts = documents.read(plc, args.names)
     if not (document["consistent"] or args.json):
-        print("plctool: a task ran during the read; the values may come from different cycles.", file=sys.stderr)
+        output.say("plctool: a task ran during the read; the values may come from different cycles.", sys.stderr)
     return _show(args, document, lambda d: output.values_text(texts))
 
 
@@ -531,7 +532,7 @@ def _watch(args: argparse.Namespace) -> int:
         return _watch_live(args)
     with _connect(args) as plc:
         for sample, texts in _samples(args, plc, _say_waiting):
-            print(f"{sample['time_s']:8.3f} s  {output.values_text(texts, '  ')}", flush=True)
+            output.say(f"{sample['time_s']:8.3f} s  {output.values_text(texts, '  ')}")
     return EXIT_OK
 
 
@@ -542,14 +543,14 @@ def _samples(
 
 
 def _say_waiting(reason: str) -> None:
-    print(f"plctool: {reason}", file=sys.stderr, flush=True)
+    output.say(f"plctool: {one_line(reason)}", sys.stderr)
 
 
 def _watch_json(args: argparse.Namespace) -> int:
     """A document a line, each at once, until the count is reached or Ctrl-C."""
     with _connect(args) as plc, suppress(KeyboardInterrupt):
         for sample, _ in _samples(args, plc, _say_waiting):
-            print(output.as_json(sample), flush=True)
+            output.say(output.as_json(sample))
     return EXIT_OK
 
 
@@ -576,7 +577,7 @@ def _watch_live(args: argparse.Namespace) -> int:
     from plctool.cli.live_table import LiveTable
 
     with _connect(args) as plc, LiveTable().shown() as table:
-        for sample, texts in _samples(args, plc, lambda reason: table.say(f"plctool: {reason}")):
+        for sample, texts in _samples(args, plc, lambda reason: table.say(f"plctool: {one_line(reason)}")):
             table.show(sample["time_s"], texts)
     return EXIT_OK
 
@@ -643,12 +644,17 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
 
 
 def _show(
-    args: argparse.Namespace, document: Document, text: Callable[[Document], str], stream: TextIO | None = None
+    args: argparse.Namespace,
+    document: Document,
+    text: Callable[[Document], str],
+    stream: TextIO | None = None,
+    *,
+    colours: bool = False,
 ) -> int:
     """Prints a result for machines or for users."""
-    shown = output.as_json(document) if args.json else text(document)
-    if shown:
-        print(shown, file=stream)
+    words = output.as_json(document) if args.json else text(output.shown(document))
+    if words:
+        output.say(words, stream, colours=colours and not args.json)
     return EXIT_OK
 
 
@@ -668,7 +674,7 @@ def _command(arguments: Sequence[str]) -> int:
         check_command(arguments[0], ACTIONS)
     args = parser().parse_args(arguments)
     if args.version:
-        print(f"plctool {plctool_version()}")
+        output.say(f"plctool {plctool_version()}")
         return EXIT_OK
     if not args.command:
         raise UsageError("Say what to do; 'plctool --help' lists the commands.", "usage")
@@ -682,17 +688,17 @@ def _report(error: PlcError, as_json: bool) -> int:
             document["diagnostics"] = [documents.diagnostic_document(d) for d in diagnostics]
         if exception := getattr(error, "exception", None):
             document["exception"] = documents.exception_document(exception)
-        print(output.as_json(document))
+        output.say(output.as_json(document))
     else:
         is_compilers = hasattr(error, "diagnostics")  # these begin with their location
-        text = output.coloured(error.message, sys.stderr) if is_compilers else f"plctool: {error.message}"
-        print(text, file=sys.stderr)
+        text = error.message if is_compilers else f"plctool: {one_line(error.message)}"
+        output.say(text, sys.stderr, colours=is_compilers)
     return error.exit_code
 
 
 def _internal_error(error: Exception, as_json: bool) -> int:
     if os.environ.get("PLCTOOL_DEBUG"):
-        traceback.print_exc()
+        output.say(traceback.format_exc(), sys.stderr)
     return _report(error if isinstance(error, InternalError) else InternalError(error), as_json)
 
 

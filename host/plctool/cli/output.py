@@ -1,4 +1,8 @@
-"""How documents look to users: short lines and aligned columns, no decoration that disturbs other tools."""
+"""How documents look to users: short lines and aligned columns, no decoration that disturbs other tools.
+
+All that a command prints goes through `say`, because names, logs and errors come from devices and files that others
+made.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +11,38 @@ import math
 import os
 import re
 import shlex
+import sys
 from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
 
 from plctool.errors import counted
+from plctool.printable import one_line, printable
 
 _LOG_COLUMN = 27  # where the text of a log entry begins
-_DIAGNOSTIC = re.compile(r"^(.+?:\d+:\d+:) (error|warning):(?= )|^(\s*\^)$", re.MULTILINE)
+_DIAGNOSTIC = re.compile(r"^(.+?:\d+:\d+:) (error|warning):(?= )|^(\s*\^)$|^  (pass|FAIL)(?=  )", re.MULTILINE)
+_OF_SEVERAL_LINES = ("answer", "script", "page")
+"""The strings of documents whose line breaks are shown: of a shell, a script and a manual page."""
 _BOLD, _RED, _MAGENTA, _GREEN, _PLAIN = "\33[1m", "\33[1;31m", "\33[1;35m", "\33[1;32m", "\33[0m"
+
+
+def say(text: str, stream: TextIO | None = None, *, colours: bool = False) -> None:
+    """Prints text to a stream, by default the standard output, at once. `colours`: of diagnostics and of the results of
+    tests, if the stream wants them."""
+    stream = stream or sys.stdout
+    safe = printable(text)
+    print(coloured(safe, stream) if colours else safe, file=stream, flush=True)
+
+
+def shown(value: Any) -> Any:
+    """A document whose strings are parts of lines, but for those that have several lines."""
+    if isinstance(value, str):
+        return one_line(value)
+    if isinstance(value, dict):
+        return {
+            one_line(name) if isinstance(name, str) else name: item if name in _OF_SEVERAL_LINES else shown(item)
+            for name, item in value.items()
+        }
+    return [shown(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def as_json(document: Any) -> str:
@@ -40,12 +68,14 @@ def wants_colour(stream: TextIO) -> bool:
 
 
 def coloured(text: str, stream: TextIO) -> str:
-    """Diagnostics with location, kind and caret in colours, if the stream wants them."""
+    """Diagnostics with location, kind and caret in colours, and results of tests, if the stream wants them."""
     return _DIAGNOSTIC.sub(_colour, text) if wants_colour(stream) else text
 
 
 def _colour(match: re.Match[str]) -> str:
-    location, kind, caret = match.groups()
+    location, kind, caret, result = match.groups()
+    if result:
+        return f"  {_GREEN if result == 'pass' else _RED}{result}{_PLAIN}"
     if caret:
         return f"{_GREEN}{caret}{_PLAIN}"
     return f"{_BOLD}{location}{_PLAIN} {_RED if kind == 'error' else _MAGENTA}{kind}:{_PLAIN}"
@@ -53,7 +83,7 @@ def _colour(match: re.Match[str]) -> str:
 
 def values_text(texts: dict[str, str], separator: str = "\n") -> str:
     """Names and values, as ST writes them."""
-    return separator.join(f"{name} = {text}" for name, text in texts.items())
+    return separator.join(f"{one_line(name)} = {one_line(text)}" for name, text in texts.items())
 
 
 def table(rows: Sequence[dict[str, Any]], columns: Iterable[str]) -> str:

@@ -40,6 +40,7 @@ from plctool.gateway.shared import CLAIM_SILENCE, SharedDevice, Tool
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import Connection, bounded_factor
 from plctool.link.transports import TRANSPORTS, Link
+from plctool.printable import one_line
 from plctool.version import plctool_version
 
 MAX_TOOLS = 32
@@ -402,7 +403,7 @@ def _failure(number: int, error: PlcError) -> Frame:
 
 def _printable(words: object) -> str:
     """What a tool calls itself, fit for another tool's terminal."""
-    return "".join(c if c.isprintable() else "?" for c in str(words or "")[:MAX_WORDS])
+    return one_line(str(words or ""))[:MAX_WORDS]
 
 
 def _integer(document: dict[str, Any], name: str) -> int:

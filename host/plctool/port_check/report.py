@@ -11,6 +11,7 @@ from typing import Any
 from plctool.errors import PlcError
 from plctool.link.services import Identity
 from plctool.link.transports import Link
+from plctool.printable import one_line
 from plctool.version import plctool_version
 
 FORMAT = 1  # of the document; grows when something is named or meant otherwise than before
@@ -96,8 +97,8 @@ def summary_text(report: Report) -> str:
     options = "".join(f", {value} {name}" for name, value in report.link.options.items())
     tail = f", {missing} not available" if missing else ""
     return (
-        f"{who.device_name} of {who.vendor_name}, version {who.version}, serial number {who.serial_number}, "
-        f"runtime {who.runtime_version}, {report.target}\n"
+        f"{one_line(who.device_name)} of {one_line(who.vendor_name)}, version {one_line(who.version)}, serial number "
+        f"{one_line(who.serial_number)}, runtime {one_line(who.runtime_version)}, {report.target}\n"
         f"{report.date:%Y-%m-%d %H:%M} UTC, plctool {report.plctool}{options}\n"
         f"{report.count('passed')} passed, {report.count('failed')} failed{tail}"
     )

@@ -90,9 +90,8 @@ class Report:
 # ---- for people ------------------------------------------------------------------------------------------------------
 
 
-def report_text(report: Report, *, colour: bool = False) -> str:
+def report_text(report: Report) -> str:
     """The tests by file, what failed and where, and the sum."""
-    green, red, plain = ("\033[32m", "\033[31m", "\033[0m") if colour else ("", "", "")
     lines: list[str] = []
     file = ""
     for outcome in report.outcomes:
@@ -100,9 +99,9 @@ def report_text(report: Report, *, colour: bool = False) -> str:
             file = outcome.file
             lines.append(file)
         if outcome.failure is None:
-            lines.append(f"  {green}pass{plain}  {outcome.name}")
+            lines.append(f"  pass  {outcome.name}")
         else:
-            lines.append(f"  {red}FAIL{plain}  {outcome.name}")
+            lines.append(f"  FAIL  {outcome.name}")
             lines += [f"        {line}" for line in _failure_lines(outcome.failure, report.sources)]
     failed, total = report.failed, len(report.outcomes)
     lines.append("")
