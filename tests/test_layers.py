@@ -22,7 +22,7 @@ ROOT = Path(plctool.__file__).parent
 FLOORS = (
     ("errors", "printable", "version"),
     ("core",),
-    ("files", "iec", "project"),
+    ("archives", "files", "iec", "project"),
     ("image",),
     ("io",),
     ("debug",),

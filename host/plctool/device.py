@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import gzip
 import os
 import sys
 import time
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
+from plctool.archives import MAX_BYTES, ArchiveError, inflate
 from plctool.controller import Closed, Controller, OtherTool
 from plctool.core import lib
 from plctool.debug.symbols import SymbolTable, load_symbols
@@ -300,8 +299,8 @@ class Plc(Controller):
 
     def _own_symbols(self, crc: int) -> SymbolTable | None:
         """Those that the controller keeps; None if it has none of this image."""
-        with suppress(DeviceError, UsageError, OSError, EOFError, ValueError, zlib.error):
-            text = gzip.decompress(self.read_file(SYMBOLS_NAME)).decode()
+        with suppress(DeviceError, UsageError, ArchiveError, ValueError):
+            text = inflate(self.read_file(SYMBOLS_NAME), MAX_BYTES, gzip=True).decode()
             table = SymbolTable.from_json(text, SYMBOLS_NAME)
             return table if table.image_crc == crc else None
         return None

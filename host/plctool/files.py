@@ -18,6 +18,7 @@ MAX_TEXT = 32 << 20
 MAX_SETTINGS = 1 << 20
 MAX_BINARY = 256 << 20
 """Bytes that are read of a source or a library, of a TOML file, and of an image or its symbols."""
+_PART = 1 << 20  # bytes that are read at once: a file may grow, and those of /proc do not know their size
 _SHOWN = 80  # characters of an invalid path
 
 
@@ -82,13 +83,15 @@ def read_regular(path: Path, most: int) -> bytes:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if not stat.S_ISREG(mode):
         raise OSError(errno.EINVAL, "it is a device or a pipe; give a regular file", str(path))
+    data = bytearray()
     with open(path, "rb") as file:
-        data = file.read(most + 1)
+        while len(data) <= most and (part := file.read(_PART)):
+            data += part
     if len(data) > most:
         raise OSError(
             errno.EFBIG, f"it has more than {most >> 20} MiB; split it or take out what is not needed", str(path)
         )
-    return data
+    return bytes(data)
 
 
 def write_atomically(path: Path, data: bytes) -> None:

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from library_support import check, library, manifest, messages, zipped
 
-from plctool.compiler import imports, library_zip, load_sources, program_files
+from plctool import archives
+from plctool.compiler import imports, load_sources, program_files
 from plctool.compiler.front import parse_all
 from plctool.compiler.library_files import resolve_libraries
 from plctool.errors import UsageError
@@ -231,14 +232,14 @@ def test_zip_with_a_symbolic_link_is_refused(tmp_path: Path) -> None:
 
 
 def test_huge_zip_is_refused_before_it_is_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    bomb = {"library.toml": manifest("Lib"), "get.st": " " * (library_zip.MAX_BYTES + 1)}
+    bomb = {"library.toml": manifest("Lib"), "get.st": " " * (archives.MAX_BYTES + 1)}
     path = zipped(tmp_path / "lib.zip", bomb)
     assert path.stat().st_size < 200_000
     monkeypatch.setattr(zipfile.ZipExtFile, "read", lambda *words: pytest.fail("it is unpacked"))
     found = refusal(path)
     assert "unpacks to 67108" in found and "at most 67108864 bytes (64 MiB)" in found and "give it as a folder" in found
-    many = zipped(tmp_path / "many.zip", {f"{n}.st": "" for n in range(library_zip.MAX_FILES + 1)})
-    assert "has 10001 files; a library has at most 10000" in refusal(many)
+    many = zipped(tmp_path / "many.zip", {f"{n}.st": "" for n in range(archives.MAX_FILES + 1)})
+    assert "has 10001 files, of at most 10000; make it again without what is no source" in refusal(many)
 
 
 def test_zip_that_lies_about_sizes_is_refused(tmp_path: Path) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import random
 import struct
 import tempfile
+import zipfile
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,7 +14,11 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from plctool.cli.links import project_link
+from plctool.cli.source_archive import Archive, unpacked
 from plctool.compiler import check_with_tests, compile_sources, load_io
+from plctool.compiler.library_files import read_library
+from plctool.compiler.project import read_project
 from plctool.compiler.source_files import load
 from plctool.core import lib
 from plctool.debug.symbols import SymbolTable
@@ -247,6 +253,66 @@ def description(data: bytes) -> None:
         check_with_tests(load([program]), load=lambda: load_io([program]))
 
 
+def project(data: bytes) -> None:
+    """plc.toml and its link."""
+    file = in_file("plc.toml", data)
+    in_file("plc.st", PROGRAM.encode())
+    with suppress(UsageError):
+        found = read_project(file)
+        if found.link:
+            project_link(file, found.link_line, found.link)
+
+
+def project_files() -> Iterator[bytes]:
+    yield b"""sources = ["plc.st", "*.st", "../x"]
+libraries = ["lib", "Util"]
+target = "cortex-m3"
+board = "mps2-an385/full"
+device = "device.toml"
+io = "main.io.toml"
+output = "out/app.cdl"
+link = "can:socketcan:can0?node=1,press&bitrate=500000/2000000"
+[options]
+optimisation = "s"
+checks = ["div"]
+dialect = "codesys"
+no-warn = ["unused"]
+[information]
+name = "x"
+"""
+    yield from files("host/plctool/templates/*/plc.toml")()
+
+
+def library(data: bytes) -> None:
+    """A library that is a .zip."""
+    with suppress(UsageError):
+        check_with_tests(read_library(in_file("lib.zip", data)).sources)
+
+
+def library_files() -> Iterator[bytes]:
+    contents = {
+        "lib/library.toml": 'name = "L"\nversion = "1.0"\n',
+        "lib/a.st": "FUNCTION f : INT\nf := 1;\nEND_FUNCTION",
+    }
+    for method in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        out = io.BytesIO()
+        with zipfile.ZipFile(out, "w", method) as archive:
+            for name, text in contents.items():
+                archive.writestr(name, text)
+        yield out.getvalue()
+
+
+def source_archive(data: bytes) -> None:
+    """What a device keeps as the sources of its program; it is written where nothing is yet."""
+    with suppress(DeviceError, UsageError), tempfile.TemporaryDirectory(dir=FOLDER) as folder:
+        for file in unpacked(data).unpack(Path(folder) / "source"):
+            assert file.resolve().is_relative_to(Path(folder).resolve() / "source"), file
+
+
+def source_archives() -> Iterator[bytes]:
+    yield Archive(0x1234, ["plc.toml"], {"plc.toml": b"", "src/main.st": PROGRAM.encode()}).pack()
+
+
 def gateway(data: bytes) -> None:
     with suppress(FrameError):
         for frame in Decoder().feed(data):
@@ -284,5 +350,8 @@ TARGETS = {
     "symbols": Target(symbols, symbol_files),
     "production": Target(production, production_files),
     "sources": Target(sources, source_files),
+    "project": Target(project, project_files),
+    "library": Target(library, library_files),
+    "source_archive": Target(source_archive, source_archives),
     "description": Target(description, files("examples/**/*.io.toml", "host/plctool/templates/**/*.toml")),
 }

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
+from plctool.archives import ArchiveError, read_archive
 from plctool.errors import DeviceError, UsageError
 from plctool.files import make_folder, write_atomically
 from plctool.link.file_services import SOURCE_NAME
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 _FACTS = "plctool-source.json"
 _FORMAT = 1
-_MOST_FILES, _MOST_BYTES = 10_000, 64 << 20
 _NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same sources are the same archive
 
 
@@ -61,30 +61,37 @@ class Archive:
 def unpacked(data: bytes) -> Archive:
     """Raises DeviceError for what `pack` did not write: any tool may have put it on the device."""
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as file:
-            infos = file.infolist()
-            if len(infos) > _MOST_FILES or sum(info.file_size for info in infos) > _MOST_BYTES:
-                raise ValueError("it is too large")
-            files = {info.filename: _read(file, info) for info in infos}
-        facts = json.loads(files.pop(_FACTS))
-        build = facts["build"]
-        if facts["format"] != _FORMAT or not all(isinstance(word, str) for word in build):
-            raise ValueError("it has another format")
-        return Archive(int(facts["image_crc"]), list(build), files)
-    except (zipfile.BadZipFile, KeyError, TypeError, ValueError, EOFError, RuntimeError, NotImplementedError) as error:
-        raise DeviceError(
-            f"{SOURCE_NAME} on the device is no archive of sources ({error}); 'plctool files get' gets it as it is.",
-            "bad-source",
-        ) from None
+        files = read_archive(data)
+        return _archive(json.loads(files.pop(_FACTS, b"{}")), files)
+    except ArchiveError as error:
+        raise _refused(error.why) from None
+    except RecursionError:
+        raise _refused(f"has a {_FACTS} that is nested too deeply") from None
+    except ValueError as error:
+        raise _refused(f"has a {_FACTS} that cannot be read: {error}") from None
 
 
-def _read(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
-    name = info.filename
-    parts = PurePosixPath(name).parts
-    if not parts or ".." in parts or name.startswith("/") or "\\" in name or ":" in name or not name.isprintable():
-        raise ValueError(f"the file {name!a} leads out of it")
-    with file.open(info) as content:
-        return content.read(info.file_size)
+def _archive(facts: Any, files: dict[str, bytes]) -> Archive:
+    """Raises ArchiveError unless the facts are those that `pack` writes."""
+    if not isinstance(facts, dict) or facts.get("format") != _FORMAT:
+        raise ArchiveError(f"has no {_FACTS} of format {_FORMAT}")
+    crc, build = facts.get("image_crc"), facts.get("build")
+    if type(crc) is not int or not 0 <= crc < 1 << 32:
+        raise ArchiveError(f"has no CRC of an image in {_FACTS}")
+    if not isinstance(build, list) or not all(isinstance(word, str) for word in build):
+        raise ArchiveError(f"has no words after 'plctool build' in {_FACTS}")
+    folders = {str(folder).casefold() for name in files for folder in PurePosixPath(name).parents}
+    if both := next((name for name in files if str(PurePosixPath(name)).casefold() in folders), None):
+        raise ArchiveError(f"has '{both}' as a file and as a folder")
+    return Archive(crc, build, files)
+
+
+def _refused(why: str) -> DeviceError:
+    return DeviceError(
+        f"{SOURCE_NAME} on the device {why}; put the sources there again with 'plctool source put', or get it as it is "
+        f"with 'plctool files get {SOURCE_NAME}'.",
+        "bad-source",
+    )
 
 
 def archive_of(settings: Settings, crc: int, target: str) -> Archive:

@@ -19,6 +19,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from plctool.archives import MAX_BYTES, ArchiveError, inflate_all
 from plctool.debug.bounds import BoundsCheck, Read, what_was_outside
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Symbol, Units, constant_symbol, shown, walk
@@ -342,7 +343,7 @@ class SymbolTable:
                 document["aliases"],
                 document["classes"],
                 {n: _read_constant(n, c, types) for n, c in document["constants"].items()},
-                [zlib.decompress(base64.b64decode(text)) for text in document["debug"]],
+                inflate_all([base64.b64decode(text) for text in document["debug"]], MAX_BYTES),
                 [KeptName(*entry) for entry in document.get("kept", [])],
                 document.get("io", {}),
                 [BoundsCheck.from_list(entry) for entry in document.get("bounds", [])],
@@ -351,7 +352,7 @@ class SymbolTable:
                 document.get("made_of", ""),
                 document.get("internal", {}),
             )
-        except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
+        except (ArchiveError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None
 
     def save(self, path: Path) -> None:
