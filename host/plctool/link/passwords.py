@@ -70,13 +70,15 @@ def verifier_of(password: str | None) -> bytes:
 
 
 def proof_of(password: str, challenge: bytes) -> bytes:
-    """The DEV_PROOF that answers a DEV_CHALLENGE. Raises LinkError for a challenge that no device of ours gives: a weak
-    one would make it easy to find the password from the proof."""
+    """The DEV_PROOF that answers a DEV_CHALLENGE. Raises LinkError for one with fewer iterations than this tool sets: a
+    false device would find the password from the proof sooner."""
     asked = _CHALLENGE.unpack(challenge)
-    if not lib.PASSWORD_MIN_ITERATIONS <= asked.iterations <= lib.PASSWORD_MAX_ITERATIONS:
+    if not _ITERATIONS <= asked.iterations <= lib.PASSWORD_MAX_ITERATIONS:
         raise LinkError(
-            f"The device asks for {asked.iterations} iterations of the password, which is not safe; it may not be the "
-            "device that you think it is.",
+            f"The device asks for {asked.iterations} iterations of the password, and plctool answers {_ITERATIONS} to "
+            f"{lib.PASSWORD_MAX_ITERATIONS}: with fewer the password is easier to guess from the answer. It may not be "
+            "the device that you think it is. If it is, another tool has set its password: remove that at the device "
+            "(docs/security.md, 'Forgotten') and set it again with 'plctool passwd'.",
             "protocol",
         )
     nonce = secrets.token_bytes(16)
