@@ -14,6 +14,7 @@ from runners import RUNNERS, Runner
 
 from plctool.compiler.front import check_sources
 from plctool.compiler.source import Source
+from plctool.iec.dialect import find_dialect
 
 SIGNED = {"SINT": 8, "INT": 16, "DINT": 32, "LINT": 64}
 UNSIGNED = {"USINT": 8, "UINT": 16, "UDINT": 32, "ULINT": 64}
@@ -38,6 +39,7 @@ REALS = {
 }
 MANTISSA_BITS = {"REAL": 24, "LREAL": 53}
 NUMBERS = [*SIGNED, *UNSIGNED, *REALS]
+NARROW = ["SINT", "INT", "USINT", "UINT", "BYTE", "WORD"]
 COUNT = 48  # values of each type
 SQUARE = COUNT * COUNT
 
@@ -146,14 +148,29 @@ def bits(type_name: str) -> str:
     return program("Main", variables, [*body, "END_FOR;", "END_FOR;"])
 
 
+def results_of_32_bits(type_name: str) -> str:
+    """Operators whose operands are below 32 bits, and what takes their whole results."""
+    variables = [f"v : ARRAY[0..{COUNT - 1}] OF {type_name} := [{values(type_name)}];"]
+    names = ("sum", "product", "mean", "quotient", "magnitude", "most")
+    variables += [f"{name} : ARRAY[0..{SQUARE - 1}] OF LINT;" for name in names]
+    variables += [f"less : ARRAY[0..{SQUARE - 1}] OF BOOL;", "k : DINT;"]
+    body = [f"FOR i := 0 TO {COUNT - 1} DO", f"FOR j := 0 TO {COUNT - 1} DO", f"k := i * {COUNT} + j;"]
+    body += ["sum[k] := v[i] + v[j];", "product[k] := v[i] * v[j];", "mean[k] := (v[i] + v[j]) / 2;"]
+    body += ["IF v[j] <> 0 THEN quotient[k] := v[i] * 100 / v[j] - v[i] MOD v[j]; END_IF;"]
+    body += ["magnitude[k] := ABS(TO_INT(v[i]) - TO_INT(v[j]));", "most[k] := MAX(v[i] + v[j], v[i] * v[j]);"]
+    body += ["less[k] := v[i] - v[j] < v[j];", "END_FOR;", "END_FOR;"]
+    return program("Main", variables, body)
+
+
 @cache
 def recordings() -> list[Recording]:
     texts = {f"arithmetic {name}": arithmetic(name) for name in NUMBERS}
     texts |= {f"conversions {name}": conversions(name) for name in NUMBERS}
     texts |= {f"bits {name}": bits(name) for name in BITS}
+    wide = {f"32 bits {name}": results_of_32_bits(name) for name in NARROW}
     found = []
-    for name, text in texts.items():
-        checked = check_sources([Source(f"{name}.st", text)])
+    for name, text in (texts | wide).items():
+        checked = check_sources([Source(f"{name}.st", text)], dialect=find_dialect("codesys" if name in wide else None))
         assert checked.program, checked.diagnostics
         recording = Recording(name, checked.program)
         with Recorder(recording) as plc:

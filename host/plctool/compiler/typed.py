@@ -226,11 +226,13 @@ Place = VarPlace | MemberPlace | IndexPlace | DerefPlace | BitPlace | ValuePlace
 
 @dataclass
 class Const(Node):
-    """int for integers, bits, TIME, enums; bool as 0/1; float for reals; str for STRING (latin-1 characters)."""
+    """int for integers, bits, TIME, enums; bool as 0/1; float for reals; str for STRING (latin-1 characters). `whole`:
+    what was computed in 32 bits and does not fit `type` (see `Convert.cuts`)."""
 
     value: int | float | str
     type: Type
     pos: Pos
+    whole: Const | None = None
 
 
 @dataclass
@@ -304,7 +306,8 @@ class Convert(Node):
 
     integer/bit/time/enum -> integer/bit/time/enum: sign- or zero-extend by the source, truncate to the target; anything
     -> BOOL: <> 0; real -> integer: as `rounding` says; integer -> real: nearest. `check` carries the subrange limits to
-    test first.
+    test first. `cuts`: the operand was computed in 32 bits or more, and the rules that need its whole value take it
+    from there (`whole_value`).
     """
 
     children: ClassVar = ("operand",)
@@ -313,6 +316,7 @@ class Convert(Node):
     pos: Pos
     rounding: Rounding = Rounding.EVEN
     check: tuple[int, int] | None = None
+    cuts: bool = False
 
 
 class Intrinsic(Enum):

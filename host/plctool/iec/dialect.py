@@ -15,13 +15,15 @@ class Dialect:
     """What the rules ask. It holds for the program and its libraries, not for the standard library.
 
     `errors`: warnings that are errors; `limits_each_turn`: FOR evaluates its end and step in each turn; `reals_wrap`:
-    REAL and LREAL to BYTE .. LWORD as `Rounding.AWAY` says.
+    REAL and LREAL to BYTE .. LWORD as `Rounding.AWAY` says; `computes_in_32_bits`: arithmetic of integers below 32 bits
+    has the result of 32 bits, which an assignment or a conversion cuts.
     """
 
     name: str
     errors: frozenset[str] = frozenset()
     limits_each_turn: bool = False
     reals_wrap: bool = False
+    computes_in_32_bits: bool = False
 
 
 OWN = Dialect("")
@@ -31,8 +33,8 @@ DIALECTS = {
     dialect.name: dialect
     for dialect in (
         Dialect("iec", errors=frozenset(("enum",))),
-        Dialect("codesys", limits_each_turn=True, reals_wrap=True),
-        Dialect("twincat", limits_each_turn=True, reals_wrap=True),
+        Dialect("codesys", limits_each_turn=True, reals_wrap=True, computes_in_32_bits=True),
+        Dialect("twincat", limits_each_turn=True, reals_wrap=True, computes_in_32_bits=True),
     )
 }
 

@@ -103,6 +103,7 @@ class Checker:
         e = self.constant(node)
         if e is None:
             return None
+        e = e if e.whole is None else e.whole
         base = elementary(e.type)
         if isinstance(e.value, int) and base is not None and base.kind in NUMBERS:
             return e.value

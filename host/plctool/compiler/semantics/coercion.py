@@ -17,10 +17,12 @@ from plctool.compiler.semantics.conversions import (
     convert,
     elementary,
     error_value,
+    finally_cut,
     same_lengths,
     same_type,
     scaled,
     time_to_ltime,
+    whole_value,
 )
 from plctool.compiler.semantics.pitfalls import lost_fraction, overlays
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
@@ -62,7 +64,7 @@ class Coercion:
         """`e` as a value of `target`; what does not fit is reported and becomes the error value."""
         source = e.type
         if source is target or source == target:
-            return e
+            return self._cut(e)
         if source is ERROR or target is ERROR:
             return error_value(e.pos)
         if isinstance(target, SubrangeType):
@@ -85,6 +87,13 @@ class Coercion:
         if from_ is to:
             return Const(e.value, target, e.pos) if isinstance(e, Const) else convert(e, target)
         return self._scalar(e, from_, to)
+
+    def _cut(self, e: Expr) -> Expr:
+        """A value of the type already; of a constant that was computed in 32 bits, what fits."""
+        if isinstance(e, Const) and e.whole is not None:
+            self._warn(e.pos, "narrowing", f"{e.whole.value} does not fit {e.type}, it is cut off")
+            return finally_cut(e)
+        return e
 
     # ---- errors ----
 
@@ -191,7 +200,7 @@ class Coercion:
             return Const(value.value, target, e.pos)
         if isinstance(e.type, SubrangeType) and target.low <= e.type.low and e.type.high <= target.high:
             return Convert(value, target, e.pos)
-        return Convert(value, target, e.pos, check=(target.low, target.high))
+        return Convert(whole_value(value), target, e.pos, check=(target.low, target.high))
 
     def _to_enum(self, e: Expr, target: EnumType) -> Expr:
         source = elementary(e.type)

@@ -6,6 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 from plctool.compiler.semantics import constants
@@ -28,7 +29,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.iec.common_types import common_scalar
+from plctool.iec.common_types import NUMBERS, common_scalar
 from plctool.iec.types import (
     BOOL,
     BYTE,
@@ -125,9 +126,42 @@ def convert(e: Expr, target: Type, *, rounding: Rounding = Rounding.EVEN) -> Exp
     """A plain `Convert`, folded for constants."""
     if e.type is target:
         return e
+    e = whole_value(e)
+    if e.type is target:
+        return e
     if isinstance(e, Const):
         return Const(constants.convert(e.value, e.type, target, rounding=rounding), target, e.pos)
     return Convert(e, target, e.pos, rounding)
+
+
+def whole_value(e: Expr) -> Expr:
+    """The value as it was computed: of a result of 32 bits that stands for a narrower one, the former."""
+    if isinstance(e, Const):
+        return e if e.whole is None else e.whole
+    return e.operand if isinstance(e, Convert) and e.cuts else e
+
+
+def is_narrow(t: Type) -> bool:
+    """Whether it is an integer or bit string of less than 32 bits."""
+    base = elementary(t)
+    return base is not None and base.kind in NUMBERS and base.bits < DINT.bits
+
+
+def cut(e: Expr, t: Elementary) -> Expr:
+    """A result of 32 bits or more as a value of `t`, with the whole of it at hand."""
+    if e.type is t or e.type is ERROR:
+        return e
+    if isinstance(e, Const):
+        fits = isinstance(e.value, int) and constants.fits(e.value, t)
+        return Const(constants.convert(e.value, e.type, t), t, e.pos, None if fits else e)
+    return Convert(e, t, e.pos, cuts=True)
+
+
+def finally_cut(e: Expr) -> Expr:
+    """The value without what does not fit its type, as a conversion to that type has it."""
+    if isinstance(e, Const):
+        return e if e.whole is None else replace(e, whole=None)
+    return replace(e, cuts=False) if isinstance(e, Convert) and e.cuts else e
 
 
 def time_to_ltime(e: Expr) -> Expr:

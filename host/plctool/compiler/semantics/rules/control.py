@@ -10,7 +10,7 @@ from collections.abc import Collection
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.checker import Checker, checks_statement
-from plctool.compiler.semantics.conversions import elementary, is_untyped
+from plctool.compiler.semantics.conversions import elementary, is_untyped, whole_value
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.labels import Labels
 from plctool.compiler.semantics.loop_bounds import known_values, passed_bounds
@@ -180,7 +180,7 @@ def _constant_condition(node: ast.Expr, condition: Expr) -> bool | None:
 @checks_statement(ast.Case)
 def case_statement(c: Checker, node: ast.Case) -> list[Statement]:
     """CASE; labels are constants, and none is there twice."""
-    selector = c.settled(node.selector)
+    selector = whole_value(c.settled(node.selector))
     base = elementary(selector.type)
     if selector.type is not ERROR and (base is None or base.kind not in NUMBERS):
         hint = "; write IF" if base is BOOL or isinstance(selector.type, StringType) else ""

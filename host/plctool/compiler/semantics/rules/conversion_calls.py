@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from plctool.compiler.semantics import arithmetic
 from plctool.compiler.semantics.arithmetic import as_number
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import BITS, UNSIGNED, convert, elementary, is_untyped, settle
+from plctool.compiler.semantics.conversions import BITS, UNSIGNED, convert, elementary, finally_cut, is_untyped, settle
 from plctool.compiler.semantics.pitfalls import lost_fraction, misread, not_a_value
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol, TypeSymbol
@@ -110,7 +110,7 @@ def _operand(c: Checker, name: str, node: ast.Call, wanted: Type | None = None) 
     if argument.value is None or argument.output or (argument.name or "IN").upper() != "IN":
         return c.error(argument.pos, "arguments", f"{name} has one argument, which is written IN := ...")
     e = c.expr(argument.value, wanted)
-    return e if wanted is None else c.coerce(e, wanted)
+    return e if wanted is None or e.type is wanted else c.coerce(e, wanted)
 
 
 def conversion_hint(c: Checker, name: str) -> str:
@@ -313,7 +313,7 @@ def _scalar(c: Checker, e: Expr, source: Elementary, to: Elementary) -> Expr:
     if e.type is not source:
         e = convert(e, source)
     if source is to:
-        return e
+        return finally_cut(e)
     if source in arithmetic.UNIT_NS and to in arithmetic.UNIT_NS:
         return arithmetic.convert_date(e, to)
     if to is BOOL:

@@ -12,12 +12,23 @@ from dataclasses import dataclass, replace
 
 from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import convert, elementary, error_value, is_untyped, load, settle
+from plctool.compiler.semantics.conversions import (
+    convert,
+    cut,
+    elementary,
+    error_value,
+    is_narrow,
+    is_untyped,
+    load,
+    settle,
+    whole_value,
+)
 from plctool.compiler.semantics.once import calls, kept_value
 from plctool.compiler.semantics.rules.library_calls import call_by_name
-from plctool.compiler.semantics.rules.literals import common_of, untyped_bits
+from plctool.compiler.semantics.rules.literals import common_of, untyped_bits, wholly
 from plctool.compiler.semantics.rules.operators import fold_unary, operate
 from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.semantics.widths import negated_type
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, UnaryOp, VarPlace
 from plctool.iec.common_types import NUMBERS
@@ -194,6 +205,10 @@ def _abs(c: Checker, f: Applied) -> Expr:
     base = elementary(e.type)
     if base is None or base.kind not in (Kind.INT, Kind.REAL, Kind.TIME):
         return c.error(f.node.pos, "type", f"ABS needs a number, not {e.type}")
+    if c.dialect.computes_in_32_bits and is_narrow(base):
+        e = whole_value(e)
+        t = negated_type(e)
+        return cut(_intrinsic(c, Intrinsic.ABS, [convert(e, t)], t, f.node), base)
     return _intrinsic(c, Intrinsic.ABS, [convert(e, base)], base, f.node)
 
 
@@ -247,6 +262,9 @@ def _mux_index(key: str) -> int | None:
 def _choose(c: Checker, intrinsic: Intrinsic, selector: Expr, f: Applied) -> Expr:
     """One of the arguments after the selector."""
     values = f.args[1:]
+    narrow, values = wholly(c, values, f.name, f.node.pos, f.expected)
+    if narrow is not None:
+        return cut(_choose(c, intrinsic, selector, replace(f, args=[selector, *values])), narrow)
     t = common_of(c, values, f.name, f.node.pos, f.expected)
     if t is ERROR or selector.type is ERROR:
         return error_value(c.pos(f.node.pos))
@@ -254,6 +272,9 @@ def _choose(c: Checker, intrinsic: Intrinsic, selector: Expr, f: Applied) -> Exp
 
 
 def _extreme(c: Checker, f: Applied) -> Expr:
+    narrow, values = wholly(c, f.args, f.name, f.node.pos, f.expected)
+    if narrow is not None:
+        return cut(_extreme(c, replace(f, args=values)), narrow)
     t = common_of(c, f.args, f.name, f.node.pos, f.expected)
     if t is ERROR:
         return error_value(c.pos(f.node.pos))

@@ -9,7 +9,7 @@ import re
 from dataclasses import replace
 
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import common_type, elementary, error_value, is_untyped, settle
+from plctool.compiler.semantics.conversions import common_type, cut, elementary, error_value, is_untyped, settle
 from plctool.compiler.semantics.generics import (
     LIBRARY_STRING,
     WIDE_LIBRARY_STRING,
@@ -21,7 +21,7 @@ from plctool.compiler.semantics.generics import (
     is_group,
 )
 from plctool.compiler.semantics.rules.arguments import Actual, arguments_text, bind, parameter_lines, typed_call
-from plctool.compiler.semantics.rules.literals import common_of
+from plctool.compiler.semantics.rules.literals import common_of, wholly
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Direction, Expr
@@ -175,8 +175,14 @@ def _instantiate(
     formal: bool = False,
 ) -> Expr:
     """Finds the types the ANY_... parameters stand for, and calls that instance."""
-    groups: dict[str, list[Expr]] = {}
     name = symbol.decl.name
+    if symbol.library and name == "LIMIT":
+        given = {i: value for i, value in values.items() if value is not None and not isinstance(value, ast.Argument)}
+        narrow, whole = wholly(c, list(given.values()), name, offset, expected)
+        if narrow is not None:
+            values = values | dict(zip(given, whole, strict=True))
+            return cut(_instantiate(c, symbol, values, offset, None, formal=formal), narrow)
+    groups: dict[str, list[Expr]] = {}
     bindings: dict[str, Type] = {}
     for i, (parameter, direction, group) in enumerate(parameter_lines(symbol.decl)):
         actual = values.get(i)

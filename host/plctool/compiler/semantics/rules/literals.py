@@ -14,19 +14,24 @@ from plctool.compiler.semantics.conversions import (
     NS_PER_MS,
     character,
     common_type,
+    convert,
     elementary,
     error_value,
+    is_narrow,
     is_untyped,
     literal_type,
     settle,
+    whole_value,
 )
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
+from plctool.compiler.semantics.widths import has_whole_value
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Pos
 from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
     BOOL,
     CHAR,
+    DINT,
     ELEMENTARY,
     LREAL,
     LTIME,
@@ -34,6 +39,7 @@ from plctool.iec.types import (
     TIME,
     TOD,
     WCHAR,
+    Elementary,
     EnumType,
     Kind,
     PointerType,
@@ -187,6 +193,20 @@ def common_of(c: Checker, values: list[Expr], name: str, offset: int, expected: 
         c.error(offset, "type", f"{name} cannot combine {listed}")
         return ERROR
     return result.base if isinstance(result, SubrangeType) else result
+
+
+def wholly(
+    c: Checker, values: list[Expr], name: str, offset: int, expected: Type | None
+) -> tuple[Elementary | None, list[Expr]]:
+    """The narrow type that arguments have in common, and what was computed for them in 32 bits. None, and the
+    arguments as they are, when none was."""
+    if not any(has_whole_value(value) for value in values):
+        return None, values
+    t = elementary(common_of(c, values, name, offset, expected))
+    if t is None or not is_narrow(t):
+        return None, values
+    typed = [whole_value(value) for value in values]
+    return t, [value if is_untyped(value) or not is_narrow(value.type) else convert(value, DINT) for value in typed]
 
 
 def _literal_common(literal: Expr, t: Type, expected: Type | None) -> Type | None:

@@ -13,16 +13,20 @@ from plctool.compiler.semantics.conversions import (
     character,
     common_type,
     convert,
+    cut,
     elementary,
     error_value,
+    is_narrow,
     is_referred,
     is_untyped,
     scaled,
+    whole_value,
 )
 from plctool.compiler.semantics.pitfalls import always, lost_in_constants, negated_number
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.rules.literals import match_literals, untyped_bits
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
+from plctool.compiler.semantics.widths import compared, in_32_bits, is_widened, negated_type
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, Unary, UnaryOp
 from plctool.iec.common_types import NUMBERS, SIGNED, common_number
@@ -87,6 +91,9 @@ def unary_operator(c: Checker, node: ast.Unary, expected: Type | None) -> Expr:
         return e
     if not base.signed and not is_untyped(e):
         base = _minus_of(base, e)
+    if c.dialect.computes_in_32_bits and is_narrow(e.type):
+        e = whole_value(e)
+        return cut(fold_unary(c, UnaryOp.NEG, convert(e, negated_type(e)), node.pos), base)
     return fold_unary(c, UnaryOp.NEG, convert(e, base), node.pos)
 
 
@@ -162,6 +169,8 @@ def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expe
         return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
     if t in _UNTYPED:
         return _build(c, op, left, right, t, offset)
+    if c.dialect.computes_in_32_bits and is_widened(op, left, right, t):
+        return cut(_build(c, op, *in_32_bits(op, left, right), offset), t)
     return _build(c, op, _as_operand(c, left, t), _as_operand(c, right, t), t, offset)
 
 
@@ -290,6 +299,7 @@ def _character_hint(left: Expr, right: Expr) -> str:
 
 
 def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr:
+    left, right = compared(left, right)
     if is_untyped(left) is not is_untyped(right):
         _report_decided(c, op, left, right, offset)
     left, right = match_literals(c, left, right, None)

@@ -17,6 +17,7 @@ from plctool.compiler.semantics.conversions import (
     literal_type,
     load,
     place_of,
+    whole_value,
 )
 from plctool.compiler.semantics.generics import bounds_of
 from plctool.compiler.semantics.rules.calls import property_of
@@ -224,7 +225,7 @@ def _character(c: Checker, base: Expr, nodes: list[ast.Expr]) -> Expr:
 
 def _subscript(c: Checker, node: ast.Expr) -> Expr:
     """An array index: any integer type."""
-    e = c.expr(node, DINT)
+    e = whole_value(c.expr(node, DINT))
     if e.type is UNTYPED_INT:
         assert isinstance(e, Const) and isinstance(e.value, int)
         return Const(e.value, DINT if constants.fits(e.value, DINT) else literal_type(e.value) or DINT, e.pos)
