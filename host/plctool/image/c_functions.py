@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from plctool.image.targets import Machine
+from plctool.image.targets import Machine, Target
 
 _FUNCTIONS = {
     "CmpIecTask": """
@@ -117,6 +117,22 @@ COMPILER_COMPONENTS = {
 }
 """The last three, and what their functions are for."""
 
+_ON_CORTEX_M0 = frozenset(
+    (
+        "__muldi3", "__ashldi3", "__ashrdi3", "__lshrdi3", "__divsi3", "__udivsi3", "__modsi3", "__umodsi3",
+        "__clzsi2", "__clzdi2",
+    )
+)  # fmt: skip
+"""Other processors have instructions for it, so their firmware does not register these."""
+
+_WITHOUT_FPU = frozenset(
+    (
+        "sqrtf", "__addsf3", "__subsf3", "__mulsf3", "__divsf3", "__eqsf2", "__nesf2", "__ltsf2", "__lesf2",
+        "__gtsf2", "__gesf2", "__unordsf2", "__fixsfsi", "__fixunssfsi", "__floatsisf", "__floatunsisf",
+    )
+)  # fmt: skip
+"""The firmware of a processor that computes with REAL itself does not register these."""
+
 VERSION = 0x00010000
 """Of the library of all of them."""
 
@@ -139,6 +155,12 @@ class CFunction:
     @property
     def signature(self) -> int:
         return interface_signature(self.interface)
+
+    def is_registered(self, target: Target) -> bool:
+        """Whether its component registers it on a processor."""
+        if self.name in _ON_CORTEX_M0:
+            return target.machine is Machine.THUMB_V6M
+        return self.name not in _WITHOUT_FPU or not target.has_fpu
 
     def stack(self, machine: Machine) -> int:
         """Bytes on a processor."""

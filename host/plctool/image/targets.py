@@ -58,6 +58,11 @@ class Target:
         return self.machine is not Machine.THUMB_V6M
 
     @property
+    def has_fpu(self) -> bool:
+        """Whether the processor has registers for REAL."""
+        return self.registers[1] > 0
+
+    @property
     def small_flash(self) -> bool:
         """Whether programs are in a small flash."""
         return self.pointer_size == 4

@@ -9,6 +9,7 @@ from plctool.image.board import Board, known_boards
 from plctool.image.c_functions import COMPILER_COMPONENTS, CFunction, find_c_function
 from plctool.image.file import Image
 from plctool.image.limits import MOST_SHOWN, Need, check_fit
+from plctool.image.targets import TARGETS
 from plctool.io.configuration import configuration_of_image
 from plctool.io.room import DRIVER_OF, DRIVERS, IO_MANAGER, MODBUS, needs_of_io, required
 
@@ -18,13 +19,26 @@ def check_board(image: Image, needs: Mapping[str, Need], board: Board, advice: s
     and outputs; `advice`: a sentence about what to do when it needs too much."""
     lacking = _lacking(image, board)
     limits = {name: limit for name, limit in board.limits.items() if DRIVER_OF.get(name) not in lacking}
-    check_fit({**needs, **_needs_of_io(image)}, limits, board.title, advice, _sentences(lacking, board))
+    sentences = [*_sentences(lacking, board), *_other_processors(_unregistered(image, board), board)]
+    check_fit({**needs, **_needs_of_io(image)}, limits, board.title, advice, sentences)
 
 
 def _needs_of_io(image: Image) -> dict[str, Need]:
     configuration = configuration_of_image(image)
     calls = any(function.component == MODBUS for function in _functions(image))
     return ({} if configuration is None else needs_of_io(configuration)) | {"modbus_calls": Need(int(calls))}
+
+
+def _unregistered(image: Image, board: Board) -> list[str]:
+    """Functions that a component of the firmware has, but not on this processor."""
+    target = TARGETS[board.target]
+    return [
+        function.name
+        for function in _functions(image)
+        if function.component in board.components
+        and not function.is_registered(target)
+        and not board.offers(function.signature)
+    ]
 
 
 def _lacking(image: Image, board: Board) -> dict[str, list[str]]:
@@ -56,6 +70,11 @@ def _sentences(lacking: Mapping[str, Sequence[str]], board: Board) -> Iterator[s
         others = [b.slug for b in known_boards() if b.name == board.name and component in b.components]
         where = f"; {listed(others)} {'have' if len(others) > 1 else 'has'} it" if others else ""
         yield f"It needs {component} for {_shown(users)}, which the firmware does not have{where}."
+
+
+def _other_processors(names: Sequence[str], board: Board) -> Iterator[str]:
+    if names:
+        yield f"It calls {_shown(names)}, which firmware for {board.target} does not have; build it with another -O."
 
 
 def _shown(names: Sequence[str]) -> str:

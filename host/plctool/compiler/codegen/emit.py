@@ -22,6 +22,8 @@ registers for it."""
 _WORTH = 1.03  # such code is a little slower
 
 _NARROW = re.compile(r"^  (\S+) = (udiv|urem) (?:exact )?i(8|16) (\S+), (-?\d+)(.*)$", re.MULTILINE)
+_LONG_SHIFT = re.compile(r" = (?:shl|lshr|ashr) [a-z ]*i64 [^,]+, %|@llvm\.fsh[lr]\.i64\(i64 [^,]+, i64 [^,]+, i64 %")
+"""Of 64 bits by a variable."""
 
 _code_generator = Lock()  # its options are those of the process
 
@@ -112,9 +114,10 @@ def _widen(module: llvm.ModuleRef) -> llvm.ModuleRef:
 
 def _shorten(module: llvm.ModuleRef) -> None:
     """Has short instructions chosen, and registers that they reach. Only now: with this attribute hardly anything is
-    inlined, and the code is larger."""
+    inlined, and the code is larger. A function that shifts 64 bits by a variable does without: LLVM would call the
+    compiler runtime for it, whose shifts only the firmware of a Cortex-M0 has."""
     for function in module.functions:
-        if not function.is_declaration:
+        if not function.is_declaration and not _LONG_SHIFT.search(str(function)):
             function.add_function_attribute("minsize")
 
 
