@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -69,6 +70,43 @@ def test_a_step_that_becomes_zero_is_an_exception_where_it_is_looked_at(tmp_path
     with Simulator.from_sources(tmp_path, dialect=dialect) as plc:
         plc.run_cycles(1)
         assert plc.read("Main.caught") is (dialect in VENDORS)
+
+
+OWN_VARIABLE = """
+FUNCTION Limit3 : INT
+VAR_INPUT k : INT; END_VAR
+Limit3 := SEL(k < 3, 0, 100);
+END_FUNCTION
+
+PROGRAM Main
+VAR i, j, down, turns, shrinking, downward, own, b : INT; u : USINT; wrapped : INT; end : USINT := 254; by : SINT := -100; s : SINT; END_VAR
+turns := 0; shrinking := 0; downward := 0; own := 0; wrapped := 0;
+FOR i := 0 TO Limit3(i) DO turns := turns + 1; END_FOR
+FOR j := 0 TO 10 - j DO shrinking := shrinking + 1; END_FOR
+FOR down := 10 TO down / 2 - 3 BY -4 DO downward := downward + 1; END_FOR
+FOR u := 250 TO end DO end := 255; wrapped := wrapped + 1; END_FOR
+FOR s := 100 TO -128 BY by DO own := own + 1; END_FOR
+END_PROGRAM
+"""
+
+
+@pytest.mark.parametrize("level", [0, 1, 2, 3, "s"])
+@pytest.mark.parametrize("dialect", NAMES)
+def test_the_end_of_a_loop_sees_its_variable_after_each_step(tmp_path: Path, dialect: str | None, level: Any) -> None:
+    (tmp_path / "loop.st").write_text(OWN_VARIABLE)
+    with Simulator.from_sources(tmp_path, level=level, dialect=dialect) as plc:
+        plc.run_cycles(2)
+        names = ("turns", "i", "shrinking", "j", "downward", "wrapped", "u", "own", "s")
+        found = [plc.read(f"Main.{name}") for name in names]
+    vendor = [3, 3, 6, 6, 5, 6, 255, 3, -128]
+    assert (found == vendor) is (dialect in VENDORS)
+
+
+@pytest.mark.parametrize("dialect", NAMES)
+def test_an_end_that_reads_its_own_variable_is_a_warning(tmp_path: Path, dialect: str | None) -> None:
+    (tmp_path / "loop.st").write_text(OWN_VARIABLE)
+    found = [w.line for w in compile_sources([tmp_path], dialect=dialect).warnings if w.code == "for-bound"]
+    assert [10, 11, 12] == [line for line in found if line != 13]
 
 
 def test_only_a_loop_that_computes_its_end_once_warns_of_a_change(tmp_path: Path) -> None:

@@ -49,6 +49,9 @@ def _loop_body(frame: Body, body: list[Statement], on_continue: str, on_exit: st
 @rule(STATEMENTS, For)
 def for_loop(frame: Body, s: For) -> None:
     """Ends with the first value of the variable past `stop`, or with the limit of its type."""
+    if s.each_turn and (known_integer(s.stop) is None or known_integer(s.step) is None):
+        _loop_with_limits_of_each_turn(frame, s)
+        return
     fn = frame.fn
     start = frame.value(s.start)
     stop, step = _stop_and_step(frame, s)
@@ -67,15 +70,46 @@ def for_loop(frame: Body, s: For) -> None:
     _loop_body(frame, s.body, following, end)
     fn.begin(following)
     frame.at(s.pos)
-    if s.each_turn:
-        stop, step = _stop_and_step(frame, s)
-        loop.use(stop, step)
     loop.turn(body, end)
     fn.begin(end)
     loop.show()
     if var is not None:
         frame.shadows.pop(var, None)
         frame.ranges.pop(var, None)
+
+
+def _loop_with_limits_of_each_turn(frame: Body, s: For) -> None:
+    """The variable is set before `stop` is computed, in each turn anew; `step` at the start and after each turn."""
+    fn = frame.fn
+    start, known_step = frame.value(s.start), known_integer(s.step)
+    var = frame.effects.owns_loop_variable(s, frame.pou) if frame.pou else None
+    text, step = value_type(s.step.type), _step(frame, s)
+    kept = None if known_step is not None else fn.slot(text)
+    if kept is not None:
+        fn.do(f"store {text} {step}, ptr {kept}")
+    loop = _Loop(frame, s, start, step, known_step, var)
+    loop.set(start)
+    test, body, following, end = (fn.label(name) for name in ("to", "for", "next", "endfor"))
+    fn.begin(test)
+    frame.at(s.pos)
+    loop.show()
+    if kept is not None:
+        step = fn.value(f"load {text}, ptr {kept}")
+    loop.use(frame.value(s.stop), step)
+    fn.branch_if(loop.enters(loop.current()), body, end)
+    fn.begin_detached(body)
+    _check_subrange(frame, s)
+    _loop_body(frame, s.body, following, end)
+    fn.begin(following)
+    frame.at(s.pos)
+    step = _step(frame, s)
+    if kept is not None:
+        fn.do(f"store {text} {step}, ptr {kept}")
+    loop.advance(step, test, end)
+    fn.begin_detached(end)
+    loop.show()
+    if var is not None:
+        frame.shadows.pop(var, None)
 
 
 def _check_subrange(frame: Body, s: For) -> None:
@@ -87,10 +121,14 @@ def _check_subrange(frame: Body, s: For) -> None:
 
 def _stop_and_step(frame: Body, s: For) -> tuple[Value, Value]:
     """Their values now; a step of 0 is an exception."""
-    stop, step = frame.value(s.stop), frame.value(s.step)
+    return frame.value(s.stop), _step(frame, s)
+
+
+def _step(frame: Body, s: For) -> Value:
+    step = frame.value(s.step)
     if known_integer(s.step) is None and Check.DIV in frame.checks:
         frame.require(frame.fn.value(f"icmp ne {value_type(s.step.type)} {step}, 0"), DIVIDE_BY_ZERO, s.step.pos)
-    return stop, step
+    return step
 
 
 class _Loop:
@@ -115,12 +153,13 @@ class _Loop:
     def show(self) -> None:
         """At the start of each iteration, and after the last one."""
         if self._shadow is not None:
-            self._store(self._current())
+            self._store(self.current())
 
     def _store(self, value: Value) -> None:
         self._body.store(self._body.ref(self._s.var), value)
 
-    def _current(self) -> Value:
+    def current(self) -> Value:
+        """The value of the variable."""
         body = self._body
         if self._shadow is not None:
             return body.fn.value(f"load {self.text}, ptr {self._shadow}")
@@ -136,7 +175,7 @@ class _Loop:
     def turn(self, again: str, end: str) -> None:
         """Sets the next value. Branches to `again`, or to `end` when it is past `stop`, or would wrap, which leaves
         the limit of the type."""
-        fn, current = self._body.fn, self._current()
+        fn, current = self._body.fn, self.current()
         following = fn.value(f"add {self.text} {current}, {self._step}")
         if self._shadow is not None and self._next_fits():
             self.set(following)
@@ -152,6 +191,26 @@ class _Loop:
             fn.begin_detached(advance)
             self.set(following)
             fn.branch(again)
+        fn.begin_detached(last)
+        self.set(self._saturated(current))
+        fn.branch(end)
+
+    def advance(self, step: Value, again: str, end: str) -> None:
+        """Sets the next value. Branches to `again`, or to `end` when it would wrap, which leaves the limit of the
+        type."""
+        self._step = step
+        body, fn, current, t = self._body, self._body.fn, self.current(), self._s.var.type
+        following = fn.value(f"add {self.text} {current}, {step}")
+        up, down = (compare(body, op, following, current, t) for op in (BinaryOp.GT, BinaryOp.LT))
+        if self._known_step is not None:
+            fits = up if self._known_step > 0 else down
+        else:
+            fits = fn.value(f"select i1 {self._upwards()}, i1 {up}, i1 {down}")
+        fitting, last = fn.label("again"), fn.label("last")
+        fn.branch_if(fits, fitting, last)
+        fn.begin_detached(fitting)
+        self.set(following)
+        fn.branch(again)
         fn.begin_detached(last)
         self.set(self._saturated(current))
         fn.branch(end)
@@ -192,8 +251,6 @@ class _Loop:
         stop = value_range(self._s.stop, self._body.ranges)
         if start is None or stop is None or self._known_step is None:
             return None
-        if self._s.each_turn and known_integer(self._s.stop) is None:
-            return None  # a later end may be further away
         return (start[0], stop[1]) if self._known_step > 0 else (stop[0], start[1])
 
     def _next_fits(self) -> bool:

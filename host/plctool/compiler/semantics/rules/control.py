@@ -276,7 +276,7 @@ def for_statement(c: Checker, node: ast.For) -> list[Statement]:
     body = _loop_body(c, node.body)
     if place is None or ERROR in (start.type, stop.type, step.type):
         return []
-    if not c.dialect.limits_each_turn:
+    if not _report_own_variable(c, node, place, [stop, step]) and not c.dialect.limits_each_turn:
         _report_changes(c, node, stop if node.step is None else [stop, step], body)
     loop = For(place, start, stop, step, body, pos, c.dialect.limits_each_turn)
     for at, message in passed_bounds(loop):
@@ -315,6 +315,18 @@ def _report_changes(c: Checker, node: ast.For, limits: Expr | list[Expr], body: 
             f"{changed[0].rpartition('.')[2]} changes in this loop, but end and step are computed once, at its start"
         )
         c.warning(node.pos, "for-bound", f"{message}; write WHILE to use the new value")
+
+
+def _report_own_variable(c: Checker, node: ast.For, var: Place, limits: list[Expr]) -> bool:
+    """Warns of an end or step that reads the variable of the loop: systems disagree about the value it then has."""
+    own = var.var if isinstance(var, VarPlace) else None
+    if own is None or all(place.var is not own for place in walk(limits) if isinstance(place, VarPlace)):
+        return False
+    name = own.name.rpartition(".")[2]
+    when = "in each turn" if c.dialect.limits_each_turn else f"once, before {name} is set"
+    message = f"end or step of this loop read its own variable {name}; they are computed {when}; use another variable"
+    c.warning(node.pos, "for-bound", message)
+    return True
 
 
 def _step_value(c: Checker, node: ast.Expr, target: Type) -> Expr:
