@@ -239,17 +239,150 @@ def test_the_project_file_of_twincat_says_which_files_belong(tmp_path: Path) -> 
     assert [Path(s.path).name for s in load_sources([solution])] == ["MAIN.TcPOU"]
 
 
-def test_a_missing_file_of_a_twincat_project_is_named(tmp_path: Path) -> None:
-    (tmp_path / "plant.plcproj").write_text(PROJECT)
-    with pytest.raises(UsageError, match=r"plant.plcproj:3: POUs.Main.TcPOU belongs to the project but is missing"):
-        load_sources([tmp_path])
+def project_of(*names: str) -> str:
+    """A PLC project with these files."""
+    files = "".join(f'<Compile Include="{name}"/>' for name in names)
+    return f"<Project><ItemGroup>{files}</ItemGroup></Project>"
 
 
-def test_several_twincat_projects_in_a_folder_are_named(tmp_path: Path) -> None:
+def write_plant(folder: Path, project: str = PROJECT) -> Path:
+    """A PLC project with a program, in a folder of its own."""
+    (folder / "plant" / "POUs").mkdir(parents=True)
+    (folder / "plant" / "POUs" / "Main.TcPOU").write_text(COUNTING)
+    path = folder / "plant" / "plant.plcproj"
+    path.write_text(project)
+    return path
+
+
+def names_of(path: Path) -> list[str]:
+    return [Path(s.path).name for s in load_sources([path])]
+
+
+def found_in(path: Path) -> list[tuple[str, str]]:
+    """File and message of each error."""
+    found = check_sources(load_sources([path])).diagnostics
+    return [(Path(d.file).name, d.message) for d in found if d.severity == "error"]
+
+
+def test_missing_files_of_a_twincat_project_are_one_error_and_the_others_are_checked(tmp_path: Path) -> None:
+    project = write_plant(tmp_path, project_of(r"POUs\Main.TcPOU", r"POUs\Pump.TcPOU", "GVL.TcGVL"))
+    main = project.parent / "POUs" / "Main.TcPOU"
+    used = "sum := GVL.total;\npump();\nsum := 'a';\nother();"
+    main.write_text(COUNTING.replace("sum := sum + 1;", used).replace("sum,", "pump : Pump; sum,"))
+    assigned, unknown, missing = sorted(found_in(project))
+    assert missing == (
+        "plant.plcproj",
+        r"POUs\Pump.TcPOU, GVL.TcGVL belong to the project but are missing; "
+        "restore what is missing, or remove it from the project",
+    )
+    assert "STRING" in assigned[1]
+    assert "other" in unknown[1]
+    assert sorted(found_in(tmp_path)) == [assigned, unknown, missing]
+
+
+def test_so_many_missing_files_that_no_message_has_room_for_them_are_counted(tmp_path: Path) -> None:
+    names = [f"POUs\\Unit{i}.TcPOU" for i in range(100)]
+    project = write_plant(tmp_path, project_of(r"POUs\Main.TcPOU", *names))
+    ((_, message),) = found_in(project)
+    assert r"POUs\Unit0.TcPOU, POUs\Unit1.TcPOU, " in message
+    assert " more belong to the project but are missing; restore" in message
+
+
+@pytest.mark.parametrize("name", [r"VISUs\Panel.TcVIS", "Texts.TcGTLO", "Cams.TcCD", "GlobalImages.TcGIPO", "x.tmc"])
+def test_a_missing_file_that_is_not_compiled_does_not_matter(tmp_path: Path, name: str) -> None:
+    assert names_of(write_plant(tmp_path, project_of(r"POUs\Main.TcPOU", name))) == ["Main.TcPOU"]
+
+
+def test_escapes_in_the_names_of_a_twincat_project_are_decoded(tmp_path: Path) -> None:
+    project = write_plant(tmp_path, project_of(r"POUs\Fill %28old%29 100%25.TcPOU"))
+    (project.parent / "POUs" / "Main.TcPOU").rename(project.parent / "POUs" / "Fill (old) 100%.TcPOU")
+    assert names_of(project) == ["Fill (old) 100%.TcPOU"]
+
+
+DIRECT = r'<TcSmProject><Project><Plc><Project PrjFilePath="plant\plant.plcproj"/></Plc></Project></TcSmProject>'
+INDEPENDENT = '<TcSmProject><Project><Plc><Project File="Plant &amp; Co.xti"/></Plc></Project></TcSmProject>'
+ITEM = r'<TcSmItem><Project Name="plant" PrjFilePath="..\..\plant\plant.plcproj"/></TcSmItem>'
+SOLUTION = """
+Microsoft Visual Studio Solution File, Format Version 12.00
+Project("{1}") = "Documents", "Documents", "{2}"
+EndProject
+Project("{3}") = "line", "Line\\line.TSPROJ", "{4}"
+EndProject
+"""
+
+
+def write_independent(folder: Path) -> Path:
+    """A TwinCAT project whose PLC project is in an independent project file."""
+    write_plant(folder)
+    (folder / "_Config" / "PLC").mkdir(parents=True)
+    (folder / "_Config" / "PLC" / "plant & co.xti").write_text(ITEM)
+    path = folder / "line.tsproj"
+    path.write_text(INDEPENDENT)
+    return path
+
+
+def test_a_twincat_project_with_an_independent_project_file_leads_to_its_sources(tmp_path: Path) -> None:
+    solution = write_independent(tmp_path)
+    assert names_of(solution) == ["Main.TcPOU"]
+    assert names_of(tmp_path / "_Config" / "PLC" / "plant & co.xti") == ["Main.TcPOU"]
+
+
+@pytest.mark.parametrize("suffix", [".tsproj", ".tspproj", ".TsProj"])
+def test_a_twincat_project_with_its_plc_project_in_it_leads_to_its_sources(tmp_path: Path, suffix: str) -> None:
+    write_plant(tmp_path)
+    (tmp_path / f"line{suffix}").write_text(DIRECT)
+    assert names_of(tmp_path / f"line{suffix}") == ["Main.TcPOU"]
+
+
+def test_a_solution_leads_to_the_sources_of_its_plc_project(tmp_path: Path) -> None:
+    write_independent(tmp_path / "line")
+    solution = tmp_path / "factory.sln"
+    solution.write_text(SOLUTION, "utf-8-sig")
+    assert names_of(solution) == ["Main.TcPOU"]
+
+
+def test_a_solution_without_twincat_says_what_to_give(tmp_path: Path) -> None:
+    solution = tmp_path / "factory.sln"
+    solution.write_text('Project("{1}") = "tool", "tool\\tool.csproj", "{2}"\nEndProject\n')
+    with pytest.raises(UsageError, match=r"factory.sln names no PLC project .* Give the sources or their folder"):
+        load_sources([solution])
+
+
+@pytest.mark.parametrize(
+    ("removed", "named"),
+    [("line/line.tsproj", "Line.line.TSPROJ"), ("line/_Config/PLC/plant & co.xti", "Plant & Co.xti"),
+     ("line/plant/plant.plcproj", "plant.plant.plcproj")],
+)  # fmt: skip
+def test_a_solution_names_the_project_file_that_is_missing(tmp_path: Path, removed: str, named: str) -> None:
+    write_independent(tmp_path / "line")
+    (tmp_path / removed).unlink()
+    solution = tmp_path / "factory.sln"
+    solution.write_text(SOLUTION)
+    with pytest.raises(UsageError, match=rf"names .*{named}, which is missing. Give the PLC project"):
+        load_sources([solution])
+
+
+def test_several_twincat_projects_in_a_folder_or_solution_are_named(tmp_path: Path) -> None:
+    entries = ""
     for name in ("a", "b"):
         (tmp_path / f"{name}.plcproj").write_text(PROJECT)
-    with pytest.raises(UsageError, match=r"several PLC projects .* give one of them: .*a.plcproj, .*b.plcproj"):
-        load_sources([tmp_path])
+        entries += f'Project("{{1}}") = "{name}", "{name}.plcproj", "{{2}}"\nEndProject\n'
+    (tmp_path / "all.sln").write_text(entries)
+    for path in (tmp_path, tmp_path / "all.sln"):
+        with pytest.raises(UsageError, match=r"several PLC projects .* give one of them.*: .*a.plcproj, .*b.plcproj"):
+            load_sources([path])
+
+
+def test_a_twincat_project_beside_another_one_is_its_library_under_any_namespace(tmp_path: Path) -> None:
+    program = write_plant(tmp_path / "program")
+    main = program.parent / "POUs" / "Main.TcPOU"
+    main.write_text(COUNTING.replace("sum,", "tank : Tanks.FB_Tank; sum,").replace("sum := sum + 1", "tank()"))
+    library = write_plant(tmp_path / "library", project_of("FB_Tank.TcPOU"))
+    (library.parent / "FB_Tank.TcPOU").write_text(
+        BLOCK.replace("FB_Counter", "FB_Tank").replace("IMPLEMENTS I_Counter", "")
+    )
+    assert check_sources(load_sources([program, library])).ok
+    assert [message for _, message in found_in(program)] == ["unknown type Tanks.FB_Tank"]
 
 
 def test_a_folder_without_sources_says_what_sources_are(tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from plctool.files import is_inside
 from plctool.project import IMAGE_SUFFIX, SYMBOL_SUFFIX
 
 _IMAGE = "image"
-_PROJECTS = (".plcproj", ".tsproj")
 
 
 def check_output(output: Path, inputs: Iterable[Path], better: str, is_image: bool = False) -> None:
@@ -45,6 +44,7 @@ def check_not_read(output: Path, inputs: Iterable[Path], better: str) -> None:
 
 
 def _kind(output: Path) -> str:
+    from plctool.compiler.formats.twincat_projects import CONTAINERS, PLC_PROJECT
     from plctool.compiler.source_files import SUFFIXES
 
     suffix = output.suffix.lower()
@@ -54,7 +54,7 @@ def _kind(output: Path) -> str:
         IMAGE_SUFFIX: _IMAGE,
         SYMBOL_SUFFIX: "symbol file",
         ".toml": "settings file",
-        **dict.fromkeys(_PROJECTS, "project"),
+        **dict.fromkeys((PLC_PROJECT, *CONTAINERS), "project"),
     }
     return kinds.get(suffix, "")
 

@@ -120,10 +120,14 @@ def _check(
     syntax = [d for d in world.diagnostics.sorted() if d.severity == "error"]
     for source in sources:
         world.diagnostics.found_by_reader(source)
-    if syntax or any(found.code == "xml" for source in sources for found in source.findings):
+    if syntax or any(source.absent or _is_not_xml(source) for source in sources):
         _check_the_others(program, texts, syntax)
         return None
     return _check_parsed(program, sources, texts, suite, python)
+
+
+def _is_not_xml(source: Source) -> bool:
+    return any(found.code == "xml" for found in source.findings)
 
 
 def _check_parsed(
@@ -241,7 +245,8 @@ def _check_the_others(program: Program, texts: Sequence[tuple[Source, Parsed]], 
     whole: list[tuple[Source, Parsed]] = []
     hidden: set[str] = set()
     for source, parsed in texts:
-        if any(f.code == "xml" for f in source.findings):
+        hidden |= source.absent
+        if _is_not_xml(source):
             hidden |= declared_names(source.original or source.text)
             continue
         rest = remaining(source, parsed.declarations, [d.line for d in syntax if d.file == source.path])

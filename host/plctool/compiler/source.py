@@ -49,7 +49,7 @@ class Source:
 
     `name`: what the list of globals in it is called, unless by the file. `shared`: the file had more than globals, so
     this is no part of their full names. `original`: the file, when the text was made from it, in `pieces` that begin at
-    offset 0.
+    offset 0. `absent`: names, case-folded, of units whose files are missing; what needs them cannot be checked.
     """
 
     path: str
@@ -59,6 +59,7 @@ class Source:
     original: str | None = field(default=None, repr=False)
     pieces: tuple[Piece, ...] = field(default=(), repr=False, compare=False)
     findings: tuple[Finding, ...] = field(default=(), compare=False)
+    absent: frozenset[str] = field(default=frozenset(), compare=False)
 
     @cached_property
     def line_starts(self) -> list[int]:

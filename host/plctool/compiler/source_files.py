@@ -18,6 +18,7 @@ from plctool.compiler.formats import (
     object_text,
     plcopen,
     twincat,
+    twincat_projects,
     unreadable,
 )
 from plctool.compiler.garbage import no_collection
@@ -132,6 +133,8 @@ def _read(path: Path, data: bytes) -> list[Source]:
     refused = unreadable.refusal(path, data)
     if refused:
         return [Source(str(path), "", findings=(Finding(1, 1, "file", refused),))]
+    if path.suffix.lower() == twincat_projects.PLC_PROJECT:
+        return [twincat_projects.missing_members(path, decode(data), SUFFIXES)]
     return READERS.get(path.suffix.lower(), _structured_text)(str(path), decode(data))
 
 
@@ -141,16 +144,24 @@ def _files(path: Path, root: Path | None) -> list[Path]:
     if root is not None:
         check_inside(path, root)
     suffix, root = path.suffix.lower(), root or path.parent
-    if suffix == ".plcproj":
-        return _inside(
-            root, (p for p in twincat.project_files(path, decode(_content(path))) if p.suffix.lower() in SUFFIXES)
-        )
-    if suffix == ".tsproj":
-        projects = twincat.projects_of_solution(path, decode(_content(path)))
-        if not projects:
-            raise UsageError(f"{path} does not name a PLC project (.plcproj) that exists.", "no-source")
-        return [file for project in projects for file in _files(project, root)]
+    if suffix == twincat_projects.PLC_PROJECT:
+        return _files_of_project(path, root)
+    if suffix in twincat_projects.CONTAINERS:
+        return _files_of_project(twincat_projects.plc_project(path, lambda file: _text_inside(file, root)), root)
     return [path]
+
+
+def _files_of_project(project: Path, root: Path) -> list[Path]:
+    """The sources of a PLC project; if some are missing, also the project itself, for the error about them."""
+    members = twincat_projects.members(project, _text_inside(project, root), SUFFIXES)
+    found = _inside(root, (member.path for member in members if member.path is not None))
+    return found if len(found) == len(members) else [project, *found]
+
+
+def _text_inside(file: Path, root: Path) -> str:
+    """Returns the text of a project file, which is not outside `root`."""
+    check_inside(file, root)
+    return decode(_content(file))
 
 
 def _inside(root: Path, files: Iterable[Path]) -> list[Path]:
@@ -168,10 +179,9 @@ def find_sources(folder: Path, root: Path | None = None) -> list[Path]:
     Raises UsageError when there are none, or several projects, or one is outside `root`.
     """
     root = root or folder
-    projects = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".plcproj" and path.is_file())
+    projects = sorted(path for path in folder.rglob("*") if _is_plc_project(path))
     if len(projects) > 1:
-        names = ", ".join(str(path) for path in projects)
-        raise UsageError(f"There are several PLC projects in {folder}; give one of them: {names}.", "no-source")
+        raise UsageError(twincat_projects.several_projects(str(folder), projects), "no-source")
     libraries = {file.parent for file in folder.rglob(LIBRARY_FILE)} - {folder}
     found = sorted(path for path in folder.rglob("*") if _is_source(path, root) and libraries.isdisjoint(path.parents))
     found = [path for path in found if not _is_generated(path, found)]
@@ -184,6 +194,10 @@ def find_sources(folder: Path, root: Path | None = None) -> list[Path]:
             f"{_named(folder)} has no source file (.st, .exp, .TcPOU ...){_other_files(folder, root)}.", "no-source"
         )
     return found
+
+
+def _is_plc_project(path: Path) -> bool:
+    return path.suffix.lower() == twincat_projects.PLC_PROJECT and path.is_file()
 
 
 def _named(folder: Path) -> str:

@@ -1,4 +1,4 @@
-"""TwinCAT 3: units, lists and types in XML, tasks, and the project file that says which files belong.
+"""TwinCAT 3: units, lists and types in XML, and tasks.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -6,20 +6,17 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
-from pathlib import Path, PureWindowsPath
 
 from plctool.compiler.formats.text import Findings, Text
 from plctool.compiler.formats.units import unit_keyword
 from plctool.compiler.formats.xml_tree import Element, XmlError, read_xml
 from plctool.compiler.source import Source
-from plctool.errors import UsageError
 
 LOWEST_PRIORITY = 31
 _TEXT = frozenset(("ST", "STNonEdit"))
 _MEMBERS = {"Method": "METHOD", "Property": "PROPERTY", "Action": "ACTION"}
 _DRAWN = {"NWL": "LD, FBD or IL", "SFC": "SFC", "LD": "LD", "FBD": "FBD"}
 _EXPORT = "export the project as PLCopen XML, of which SFC, LD and FBD are read"
-_PROJECT_OF = re.compile(r"PrjFilePath=\"([^\"]+\.plcproj)\"", re.IGNORECASE)
 
 
 def read_object(path: str, text: str) -> Source:
@@ -116,50 +113,3 @@ def identifier(name: str) -> str:
     """A name of the system, which may hold blanks, as one that the language has."""
     found = re.sub(r"\W", "_", name)
     return found if found and not found[0].isdecimal() else f"_{found}"
-
-
-# ---- projects ------------------------------------------------------------------------------------------------------
-
-
-def project_files(project: Path, text: str) -> list[Path]:
-    """The source files that a .plcproj names. Raises UsageError when it is no such file, or one of them is missing."""
-    try:
-        root = read_xml(text)
-    except XmlError as error:
-        raise UsageError(f"{project}:{error.at.line}: {error}.", "xml") from None
-    found = []
-    for item in root.every("Compile"):
-        left_out = item.child("ExcludeFromBuild")
-        if left_out is not None and left_out.text.lower() == "true":
-            continue
-        name = item.get("Include")
-        path = _resolved(project.parent, PureWindowsPath(name).parts)
-        if path is None:
-            raise UsageError(f"{project}:{item.at.line}: {name} belongs to the project but is missing.", "no-source")
-        found.append(path)
-    return found
-
-
-def projects_of_solution(solution: Path, text: str) -> list[Path]:
-    """The .plcproj files that a .tsproj names."""
-    names = dict.fromkeys(_PROJECT_OF.findall(text))
-    found = [_resolved(solution.parent, PureWindowsPath(name).parts) for name in names]
-    return [path for path in found if path is not None]
-
-
-def _resolved(folder: Path, parts: tuple[str, ...]) -> Path | None:
-    """A path of Windows, where upper and lower case are the same."""
-    at = folder
-    for part in parts:
-        if part in (".", ".."):
-            at = at / part
-            continue
-        exact = at / part
-        if exact.exists():
-            at = exact
-            continue
-        same = [p for p in at.iterdir() if p.name.casefold() == part.casefold()] if at.is_dir() else []
-        if not same:
-            return None
-        at = same[0]
-    return at
