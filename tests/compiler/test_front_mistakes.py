@@ -353,3 +353,10 @@ def test_mistakes_of_a_task_in_its_place_are_not_about_its_place(task: str) -> N
 def test_variables_with_the_names_of_keywords_elsewhere_are_no_exceptions(statement: str) -> None:
     found = messages(f"PROGRAM P VAR n, x, try, catch : INT; END_VAR\n{statement}\nEND_PROGRAM")
     assert found and "__TRY" not in " ".join(found)
+
+
+@pytest.mark.parametrize("comment", ["// switch to manual", "(* switch to manual *)", "/* switch\nto manual */"])
+def test_messages_are_not_about_words_in_comments(comment: str) -> None:
+    (said,) = in_body(f"a := 1 {comment}\nb := 2;")
+    assert "expected ;" in said
+    assert in_body(f"switch (a) {comment}\nb := 2;")[0] == f"1: {CHOICE}"

@@ -151,3 +151,12 @@ def test_files_may_be_named_without_a_folder(tmp_path: Path, monkeypatch: pytest
     written(tmp_path, {"a.st": "PROGRAM P\nEND_PROGRAM", ".b.st": "METHOD m\n"})
     monkeypatch.chdir(tmp_path)
     assert [s.path for s in load_sources(["a.st", ".b.st"])] == ["a.st", ".b.st"]
+
+
+def test_an_end_in_a_comment_or_string_ends_no_unit(tmp_path: Path) -> None:
+    text = (
+        "PROGRAM Main\nVAR\n    n : INT;\n    s : STRING := 'END_METHOD';\nEND_VAR\n// up to END_PROGRAM\nn := n + 1;\n"
+    )
+    with started(written(tmp_path, {"Main.st": text})) as plc:
+        plc.run_cycles(3)
+        assert plc.read("Main.n") == 3

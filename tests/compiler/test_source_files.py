@@ -491,6 +491,45 @@ def test_a_program_that_uses_a_block_in_c_is_reported(tmp_path: Path) -> None:
     assert any("code in C cannot be compiled" in d.message for d in found)
 
 
+UPLOADED = """PROGRAM Main
+  VAR
+    n : INT;
+  END_VAR
+  n := n + 1;
+END_PROGRAM
+
+CONFIGURATION Config0
+  RESOURCE Res0 ON PLC
+    TASK task0(INTERVAL := T#20ms,PRIORITY := 0);
+    PROGRAM instance0 WITH task0 : Main;
+  END_RESOURCE
+END_CONFIGURATION
+(*DBG:#include <stdbool.h>*)
+(*DBG:void *place(size_t index) {*)
+(*DBG:    switch (known[index].type) {*)
+(*DBG:        case A: return (void *)&((__IEC_BOOL_t *) p)->value; /* (* */*)
+(*DBG:    }*)
+(*FILE:c_blocks.h extern void (*start)(void *); // it's*)
+(*DBG:*)
+"""
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_the_lines_of_c_after_a_program_of_openplc_editor_are_left_out(tmp_path: Path, newline: str) -> None:
+    path = tmp_path / "program.st"
+    path.write_bytes(UPLOADED.replace("\n", newline).encode())
+    with started(path) as plc:
+        plc.run_cycles(2)
+        assert plc.read("instance0.n") == 2
+
+
+def test_the_lines_of_c_after_a_program_hide_no_error_in_it_and_keep_its_lines(tmp_path: Path) -> None:
+    path = tmp_path / "program.st"
+    path.write_text(GENERATED + UPLOADED.replace("Main", "Other").replace("n + 1", "'a'"))
+    (found,) = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
+    assert path.read_text().splitlines()[found.line - 1] == "  n := 'a';"
+
+
 def test_structured_text_beside_a_twincat_project_belongs_to_it(tmp_path: Path) -> None:
     (tmp_path / "POUs").mkdir()
     (tmp_path / "POUs" / "MAIN.TcPOU").write_text(COUNTING)

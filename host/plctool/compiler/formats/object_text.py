@@ -17,6 +17,7 @@ from plctool.compiler.formats.text import Text
 from plctool.compiler.formats.units import UNITS, tokens_of
 from plctool.compiler.source import Piece, Source
 from plctool.compiler.syntax.lexer import Token
+from plctool.compiler.syntax.plain_text import plain_text
 
 _MEMBERS = frozenset(("METHOD", "PROPERTY", "ACTION"))
 _ACCESSORS = frozenset(("GET", "SET"))
@@ -25,7 +26,7 @@ _END = re.compile(rf"\bEND_(?:{'|'.join(sorted(UNITS | _MEMBERS | _ACCESSORS))})
 
 def read_object(path: str, text: str) -> Source:
     """A file of Structured Text, with what ends its unit."""
-    if _END.search(text):
+    if _END.search(text) and _END.search(plain_text(text, strings=False)):
         return Source(path, text)
     tokens = list(tokens_of(text))
     inserts = _inserts(tokens, text)

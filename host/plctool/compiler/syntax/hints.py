@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from plctool.compiler.syntax import slips
+from plctool.compiler.syntax.plain_text import is_in_comment
 
 _TYPE = (
     r"(?P<type>(?:STRING|WSTRING)(?:\s*[\[(]\s*\w+\s*[\])])?|BOOL|BYTE|[LD]?WORD|U?[SDL]?INT|L?REAL|L?TIME|L?DATE|L?TOD|L?DT|"
@@ -281,7 +282,8 @@ def hint(text: str, begin: int, pos: int, where: str) -> Said | None:
         if known.where not in ("", where):
             continue
         for match in re.finditer(known.pattern, window, re.IGNORECASE | re.MULTILINE):
-            if match.start(known.at or 0) <= column <= match.end(known.at or 0):
+            around = match.start(known.at or 0) <= column <= match.end(known.at or 0)
+            if around and not is_in_comment(text, start + match.start()):
                 said = known.message
                 message = said(match) if callable(said) else said.format(**match.groupdict())
                 return Said(start + match.start(known.at or 0), message, known.ends)

@@ -6,6 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import lru_cache
 
 NAME = r"(?u:(?!\d)\w++)"
@@ -16,6 +17,7 @@ FLAT_COMMENT = r"//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|
 """The pattern of a comment with none in it."""
 
 _MARKS = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
+_QUOTES = "'\""
 _STRUCTURE = re.compile(r":\s*(?:STRUCT|UNION)\b.*?\bEND_(?:STRUCT|UNION)\b", re.IGNORECASE | re.DOTALL)
 _LEFT_OUT = re.compile(
     rf"(?P<plain>{FLAT_COMMENT}|\{{[^{{}}]*\}}|\{{\{{.*?\}}\}})|(?P<nested>\(\*|/\*)|"
@@ -40,17 +42,31 @@ def comment_ends(text: str, mark: str, at: int, end: int) -> tuple[int, int]:
 def plain_text(text: str, *, strings: bool) -> str:
     """The text with blanks in place of comments, pragmas and, unless wanted, `strings`, so that all else stays where it
     is. All branches of a conditional pragma are in it."""
-    parts, kept, at = [], 0, 0
+    parts, kept = [], 0
+    for begin, end in _left_out(text):
+        if text[begin] not in _QUOTES or not strings:
+            parts += [text[kept:begin], " " * (end - begin)]
+            kept = end
+    return "".join([*parts, text[kept:]])
+
+
+def is_in_comment(text: str, offset: int) -> bool:
+    """True if the character at `offset` belongs to a comment."""
+    for begin, end in _left_out(text):
+        if offset < end:
+            return begin <= offset and text[begin] in "(/"
+    return False
+
+
+def _left_out(text: str) -> Iterator[tuple[int, int]]:
+    """Yields begin and end of comments, pragmas and strings."""
+    at = 0
     while match := _LEFT_OUT.search(text, at):
         begin, at = match.start(), match.end()
-        if match["string"] and strings:
-            continue
         if match["nested"]:
             ends = comment_ends(text, match["nested"], at, len(text))
             at = next((end for end in ends if end >= 0), len(text))
-        parts += [text[kept:begin], " " * (at - begin)]
-        kept = at
-    return "".join([*parts, text[kept:]])
+        yield begin, at
 
 
 def without_structures(types: str) -> str:
