@@ -70,7 +70,7 @@ def test_unknown_names_do_not_hide_other_errors() -> None:
 
 
 def test_many_missing_names_are_one_line_for_each_library(tmp_path: Path) -> None:
-    calls = "".join(f"MC_Thing{i}(a);\n" for i in range(30)) + "ADSLOGSTR(a);\nADSLOGSTR(a);\nWxyz(a);\n"
+    calls = "".join(f"MC_Thing{i}(a);\n" for i in range(30)) + "ADSREADEX(a);\nADSREADEX(a);\nWxyz(a);\n"
     (tmp_path / "main.st").write_text(f"PROGRAM Main\nVAR a : INT; END_VAR\n{calls}a := 'x';\nEND_PROGRAM\n")
     document, texts = check(Settings(program_files([tmp_path]), ALL_WARNINGS))
     assert "STRING" in texts[0]
@@ -79,17 +79,17 @@ def test_many_missing_names_are_one_line_for_each_library(tmp_path: Path) -> Non
         "  Tc2_MC2 or SM3_Basic (motion): MC_Thing0 (1), MC_Thing1 (1), MC_Thing10 (1), MC_Thing11 (1), "
         "MC_Thing12 (1), MC_Thing13 (1), MC_Thing14 (1), MC_Thing15 (1), and 22 more; "
         f"first at {tmp_path}/main.st:3",
-        f"  Tc2_System: ADSLOGSTR (2); first at {tmp_path}/main.st:33",
+        f"  Tc2_System: ADSREADEX (2); first at {tmp_path}/main.st:33",
         f"  no library known here: Wxyz (1); first at {tmp_path}/main.st:35",
     ]
-    assert [m["count"] for m in document["missing"] if m["name"] == "ADSLOGSTR"] == [2]
+    assert [m["count"] for m in document["missing"] if m["name"] == "ADSREADEX"] == [2]
     assert len(document["diagnostics"]) == 34
 
 
 def test_few_missing_names_are_shown_where_they_are(tmp_path: Path) -> None:
-    (tmp_path / "main.st").write_text("PROGRAM Main\nADSLOGSTR(1);\nEND_PROGRAM\n")
+    (tmp_path / "main.st").write_text("PROGRAM Main\nADSREADEX(1);\nEND_PROGRAM\n")
     _, texts = check(Settings(program_files([tmp_path]), ALL_WARNINGS))
-    assert texts[0].endswith("main.st:2:1: error: unknown function ADSLOGSTR\nADSLOGSTR(1);\n^")
+    assert texts[0].endswith("main.st:2:1: error: unknown function ADSREADEX\nADSREADEX(1);\n^")
 
 
 def test_a_few_names_of_one_library_are_one_line_after_everything_else(tmp_path: Path) -> None:

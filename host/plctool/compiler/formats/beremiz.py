@@ -1,8 +1,8 @@
 """Structured Text that OpenPLC Editor and Beremiz make of a project, with code in C.
 
-build/plc.st begins with blocks in C. The program.st that OpenPLC Editor uploads has lines of C after its configuration, each
-in a comment: (*DBG:...*) for the debugger, (*FILE:...*) for an added file. C may contain `*)`, so such a comment ends
-where the line ends; the runtime of OpenPLC cuts these lines off as well.
+build/plc.st begins with blocks in C. The program.st that OpenPLC Editor uploads has lines of C after its configuration,
+each in a comment: (*DBG:...*) for the debugger, (*FILE:...*) for an added file. C may contain `*)`, so such a comment
+ends where the line ends; the runtime of OpenPLC cuts these lines off as well.
 
 SPDX-License-Identifier: Apache-2.0
 """
