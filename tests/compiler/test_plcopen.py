@@ -232,3 +232,13 @@ def test_other_xml_files_in_a_folder_are_left_out(tmp_path: Path) -> None:
     (tmp_path / "build").mkdir()
     (tmp_path / "build" / "generated_plc.st").write_text("PROGRAM Main END_PROGRAM")
     assert {Path(s.path).name for s in load_sources([tmp_path])} == {"plc.xml"}
+
+
+@pytest.mark.parametrize(("interval", "microseconds"), [("00:00:00.100000", 100_000), ("00:01:01", 61_000_000)])
+def test_an_interval_may_be_a_time_of_day(tmp_path: Path, interval: str, microseconds: int) -> None:
+    task = f'<task name="T" priority="0" interval="{interval}"><pouInstance name="I" typeName="Main"/></task>'
+    resource = f'<configuration name="C"><resource name="R">{task}</resource></configuration>'
+    path = written(tmp_path, project(pou("Main", st("n := n + 1;"), variables("localVars", "n:INT")), "", resource))
+    program = check_sources(load_sources([path])).program
+    assert program is not None
+    assert [t.interval_us for t in program.tasks] == [microseconds]

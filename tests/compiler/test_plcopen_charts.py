@@ -45,6 +45,18 @@ def action(name: str, qualifier: str = "N", more: str = "") -> str:
     return f'<action qualifier="{qualifier}" {more}><reference name="{name}"/></action>'
 
 
+MAIN, ENTRY, EXIT = (
+    "700a583f-b4d4-43e4-8c14-629c7cd3bec8", "A6B08BD8-b696-47e3-9cbf-7408b61c9ff8",
+    "a2621e18-7de3-4ea6-ae6d-89e9e0b7befd",
+)  # fmt: skip
+
+
+def attributes(*found: tuple[str, str]) -> str:
+    """What CODESYS adds to a step: identifiers and values."""
+    listed = "".join(f'<attribute guid="{identifier}">{value}</attribute>' for identifier, value in found)
+    return f"<addData>{data('sfc/element', f'<attributes>{listed}</attributes>')}</addData>"
+
+
 def branch(kind: str, number: int, *sources: str) -> str:
     """A divergence or convergence."""
     return f'<{kind} localId="{number}">{into(*sources)}</{kind}>\n'
@@ -190,7 +202,7 @@ def test_an_action_may_have_a_qualifier_with_a_time(tmp_path: Path) -> None:
         (transition(9, "77", "TRUE"), "a transition has no step before or after it"),
         ('<transition localId="9">' + into("1") + "</transition>", "a transition has no condition"),
         (
-            step(9, "CS", "5", more=f"<addData>{data('sfc/element', '<attribute>Count</attribute>')}</addData>"),
+            step(9, "CS", "5", more=attributes(("11111111-1111-1111-1111-111111111111", "Count"))),
             "the step CS has an action of CODESYS, Count; use an action block",
         ),
     ],
@@ -198,6 +210,76 @@ def test_an_action_may_have_a_qualifier_with_a_time(tmp_path: Path) -> None:
 def test_what_has_no_translation_is_refused_by_name(tmp_path: Path, extra: str, why: str) -> None:
     found = errors(tmp_path, chart(*LOOP, extra, more=COUNT))
     assert found[0][1] == f"the diagram Main (SFC) cannot be compiled: {why}"
+
+
+def named_action(name: str, text: str) -> str:
+    """An action of a POU."""
+    return f'<action name="{name}"><body>{st(text)}</body></action>'
+
+
+STEP_ACTIONS = (
+    "<actions>" + named_action("Enter", "entered := entered + 1; log := log * 10 + 1;")
+    + named_action("Work", "worked := worked + 1; log := log * 10 + 2;")
+    + named_action("Leave", "left := left + 1; log := log * 10 + 3;")
+    + named_action("Next", "log := log * 10 + 4;") + "</actions>"
+)  # fmt: skip
+
+
+def test_actions_of_steps_run_on_entry_while_active_and_on_exit_without_a_final_scan(tmp_path: Path) -> None:
+    own = attributes((ENTRY, "Enter"), (MAIN, "Work"), (EXIT, "Leave"))
+    elements = (
+        step(1, "Start", initial=True, more=own),
+        transition(2, "1", "worked >= 3"),
+        step(3, "Busy", "2", more=attributes((MAIN, "Next"), (EXIT, ""), (ENTRY, ""))),
+        transition(4, "3", "FALSE"),
+        jump(5, "4", "Start"),
+    )
+    local = ("entered:INT", "worked:INT", "left:INT", "log:DINT")
+    with started(tmp_path, chart(*elements, more=STEP_ACTIONS, local=local)) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.log") == 12
+        plc.run_cycles(4)
+        assert plc.read("Main.log") == 1222344
+        assert [plc.read(f"Main.{name}") for name in ("entered", "worked", "left")] == [1, 3, 1]
+
+
+def test_several_steps_may_have_the_same_action(tmp_path: Path) -> None:
+    elements = (
+        step(1, "Start", initial=True, more=attributes((MAIN, "Next"))),
+        transition(2, "1", "TRUE"),
+        step(3, "Busy", "2", more=attributes((MAIN, "Next"), (ENTRY, "Enter"))),
+        transition(4, "3", "TRUE"),
+        jump(5, "4", "Start"),
+    )
+    local = ("entered:INT", "worked:INT", "left:INT", "log:DINT")
+    with started(tmp_path, chart(*elements, more=STEP_ACTIONS, local=local)) as plc:
+        plc.run_cycles(4)
+        assert plc.read("Main.log") == 414414
+
+
+def test_actions_of_steps_in_the_chart_of_an_action_are_refused(tmp_path: Path) -> None:
+    inner = f"<SFC>{step(1, 'Start', initial=True, more=attributes((MAIN, 'Next')))}</SFC>"
+    more = f'<actions><action name="Next"><body>{st("n := 1;")}</body></action>'
+    more += f'<action name="Inner"><body>{inner}</body></action></actions>'
+    found = errors(tmp_path, project(pou("Main", st("Inner();"), variables("localVars", "n:INT"), more=more)))
+    assert "Main.Inner cannot be compiled: its chart needs the action Start_main_action; move" in found[0][1]
+
+
+def test_an_action_of_an_instance_runs_in_an_action_block(tmp_path: Path) -> None:
+    motor = pou("Motor", st("calls := calls + 1;"), variables("outputVars", "calls:INT", "stops:INT"), "functionBlock",
+                f"<actions>{named_action('Stop', 'stops := stops + 1;')}</actions>")  # fmt: skip
+    elements = (
+        step(1, "Start", initial=True), transition(2, "1", "TRUE"), step(3, "Busy", "2"),
+        actions(4, "3", action("m.Stop", "D", 'duration="T#25ms"')), transition(5, "3", "m.stops >= 2"),
+        jump(6, "5", "Start"),
+    )  # fmt: skip
+    text = chart(*elements, local=("m:Motor",)).replace("<pous>", f"<pous>{motor}")
+    with started(tmp_path, text) as plc:
+        plc.run_cycles(4)
+        assert plc.read("Main.m.stops") == 0
+        plc.run_cycles(2)
+        assert plc.read("Main.m.stops") == 2
+        assert plc.read("Main.m.calls") == 0
 
 
 def test_an_error_in_a_condition_has_its_place(tmp_path: Path) -> None:

@@ -511,3 +511,35 @@ def test_a_function_of_the_library_is_called_though_nothing_reads_its_result(tmp
         block(4, "MEMSET", {"destAddr": "1", "fillByte": "2", "n": "3"}),
     )  # fmt: skip
     assert run(tmp_path, body, ["n:INT"]) == {"n": 0x0101}
+
+
+def execute(number: int, text: str, enable: str = "", row: int = 0, uri: str = "3s-software.com/plcopenxml") -> str:
+    """A box of Structured Text."""
+    read = f'<variable formalParameter="EN">{lines(enable)}</variable>' if enable else ""
+    code = f'<addData><data name="http://www.{uri}/stcode"><STCode>{text}</STCode></data></addData>'
+    return (
+        f'<block localId="{number}" typeName="EXECUTE">{at(row, 50)}<inputVariables>{read}</inputVariables>'
+        f'<outputVariables><variable formalParameter="ENO"/></outputVariables>{code}</block>\n'
+    )
+
+
+@pytest.mark.parametrize("uri", ["3s-software.com/plcopenxml", "openplc.org/plcopenxml"])
+@pytest.mark.parametrize(("enabled", "seen"), [("TRUE", (2, True)), ("FALSE", (0, False))])
+def test_a_box_of_structured_text_runs_while_its_input_is_true(
+    tmp_path: Path, uri: str, enabled: str, seen: tuple[int, bool]
+) -> None:
+    box = execute(3, "IF NOT z THEN n := n + 1; END_IF; // counts", "2", uri=uri)
+    body = ladder(contact(2, "a", "1"), box, coil(4, "b", "3.ENO", row=10))
+    local = [f"a:BOOL:={enabled}", "b:BOOL", "z:BOOL", "n:INT"]
+    values = run(tmp_path, body, local, cycles=2)
+    assert (values["n"], values["b"]) == seen
+
+
+def test_a_box_of_structured_text_runs_though_nothing_is_connected_to_it(tmp_path: Path) -> None:
+    assert run(tmp_path, network(execute(2, "n := n + 1;")), ["n:INT"], cycles=3)["n"] == 3
+
+
+def test_an_error_in_a_box_of_structured_text_has_its_place(tmp_path: Path) -> None:
+    text = project(pou("Main", network(execute(2, "\nn := n + 'a';")), variables("localVars", "n:INT")))
+    ((line, _),) = errors(tmp_path, text)
+    assert "n := n + 'a'" in text.splitlines()[line - 1]

@@ -202,13 +202,16 @@ class _Project:
         body = self._body(action, unit, f"{unit.name}.{name}")
         for variable, (spec, at) in body.all_variables().items():
             self._findings.add(at, "language", _REFUSED.format(f"{unit.name}.{name}", f"it needs {variable} : {spec}"))
+        for inner, _, at in body.actions:
+            message = f"its chart needs the action {inner}; move the chart into a POU"
+            self._findings.add(at, "language", _REFUSED.format(f"{unit.name}.{name}", message))
         plain = plain_text(action)
         if _begins_with(plain, {"ACTION"}):
             self.text.copied(plain)
             self.text.made("\n", action.at)
         else:
             self.text.made(f"ACTION {name}:\n", action.at)
-        if not body.variables:
+        if not body.variables and not body.actions:
             body.write(self.text)
         self.text.made("\nEND_ACTION\n", action.at)
 

@@ -1,5 +1,8 @@
 """PLCopen XML: Sequential Function Charts, written as steps, transitions and actions.
 
+A step of CODESYS may have actions of its own: one when it is entered, one while it is active, without a final scan, and
+one when it is left. Each is called by an action made for it, in the order in which CODESYS calls them.
+
 Blocks that are drawn beside a chart are executed in every cycle, by an action that the first step starts, as OpenPLC
 Editor and Beremiz do.
 
@@ -9,6 +12,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
 from plctool.compiler.formats.plcopen_graph import Network
@@ -18,6 +22,22 @@ from plctool.compiler.formats.xml_tree import Element
 
 _BRANCHES = ("selectionDivergence", "selectionConvergence", "simultaneousDivergence", "simultaneousConvergence")
 _COMPUTE = "COMPUTE_FUNCTION_BLOCKS"
+
+
+class _StepAction(NamedTuple):
+    """An action of a step in CODESYS: the qualifier and the statement with which it is called here."""
+
+    kind: str
+    qualifier: str
+    call: str
+
+
+_STEP_ACTIONS = {
+    "a2621e18-7de3-4ea6-ae6d-89e9e0b7befd": _StepAction("exit", "P0", "{action}();"),
+    "a6b08bd8-b696-47e3-9cbf-7408b61c9ff8": _StepAction("entry", "P1", "{action}();"),
+    "700a583f-b4d4-43e4-8c14-629c7cd3bec8": _StepAction("main", "N", "IF {step}.X THEN {action}(); END_IF;"),
+}
+"""By the identifier of the attribute that names the action; in the order of their calls in a cycle."""
 
 
 class Chart:
@@ -47,12 +67,28 @@ class Chart:
         computes = bool(self._blocks.parts)
         if computes:
             self._body.actions.append((_COMPUTE, Body(self._blocks.parts), self._root.at))
-        for step in self._root.all("step"):
-            self._step(step, computes=computes)
+        steps = self._root.all("step")
+        own = self._step_actions(steps)
+        for step in steps:
+            self._step(step, own.get(step.get("name"), []), computes=computes)
         for transition, condition in zip(transitions, conditions, strict=True):
             self._transition(transition, condition)
 
-    def _step(self, step: Element, *, computes: bool) -> None:
+    def _step_actions(self, steps: list[Element]) -> dict[str, list[str]]:
+        """Makes an action for each action of a step; returns how each step names its own, by the name of the step."""
+        found: dict[str, list[str]] = {}
+        for identifier, how in _STEP_ACTIONS.items():
+            for step in steps:
+                action = _attribute(step, identifier)
+                if not action:
+                    continue
+                name, made = step.get("name"), Body()
+                made.line(how.call.format(step=name, action=action), step.at)
+                self._body.actions.append((f"{name}_{how.kind}_action", made, step.at))
+                found.setdefault(name, []).append(f"{name}_{how.kind}_action({how.qualifier});")
+        return found
+
+    def _step(self, step: Element, own: list[str], *, computes: bool) -> None:
         self._check_actions(step)
         name = step.get("name")
         initial = step.get("initialStep") == "true"
@@ -61,14 +97,17 @@ class Chart:
             if step.get("localId") in _connections(block):
                 for action in block.all("action"):
                     self._action(action, name)
+        for association in own:
+            self._body.line(f"    {association}", step.at)
         if initial and computes:
             self._body.line(f"    {_COMPUTE}(S);", step.at)
         self._body.line("END_STEP", step.at)
 
     def _check_actions(self, step: Element) -> None:
-        """CODESYS has actions of a step (entry, active, exit) among its attributes."""
+        """Refuses an attribute of an unknown kind that names an action."""
         for attribute in step.every("attribute"):
-            if attribute.text.casefold() in self._unit.actions:
+            known = attribute.get("guid").lower() in _STEP_ACTIONS
+            if not known and attribute.text.casefold() in self._unit.actions - {step.get("name").casefold()}:
                 what = f"the step {step.get('name')} has an action of CODESYS, {attribute.text}"
                 raise NotTranslatedError(step.at, f"{what}; use an action block")
 
@@ -157,6 +196,11 @@ def expression(text: Element) -> list[Chunk | tuple[str, Place]]:
 
 def _connections(element: Element) -> list[str]:
     return [c.get("refLocalId") for point in element.all("connectionPointIn") for c in point.all("connection")]
+
+
+def _attribute(step: Element, identifier: str) -> str:
+    """Returns an attribute of CODESYS; "" if the step does not have it."""
+    return next((a.text for a in step.every("attribute") if a.get("guid").lower() == identifier), "")
 
 
 def _column(transition: Element) -> float:

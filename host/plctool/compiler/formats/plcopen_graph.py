@@ -31,6 +31,7 @@ _MODIFIED = {
 }  # fmt: skip
 """What may stand at an element, or at a connection of a block."""
 
+_EXECUTE = "EXECUTE"  # a box of CODESYS and OpenPLC Editor with Structured Text in it
 _TRIGGERS = {"rising": "R_TRIG", "falling": "F_TRIG"}
 
 
@@ -206,7 +207,7 @@ class Network:
 
     def _may_act(self, name: str) -> bool:
         """Whether a function is called even if nothing reads its result."""
-        return self._unit.blocks.get(name.casefold(), declared(name)) != {}
+        return name.upper() == _EXECUTE or self._unit.blocks.get(name.casefold(), declared(name)) != {}
 
     def _inputs(self, block: Element, key: str) -> tuple[str, list[tuple[str, str]]]:
         """EN, "" without one, and the other inputs that are connected, with their values."""
@@ -234,6 +235,9 @@ class Network:
     def _call_function(self, block: Element, key: str) -> None:
         name = block.get("typeName")
         enable, inputs = self._inputs(block, key)
+        if name.upper() == _EXECUTE and block.child_data("stcode"):
+            self._write_statements(block, key, enable)
+            return
         outputs = [v for v in _parameters(block, "outputVariables") if v.get("formalParameter").upper() != "ENO"]
         used = {c.get("formalParameter") for e in self._consumers.get(key, []) for c in e.every("connection")
                 if c.get("refLocalId") == key}  # fmt: skip
@@ -264,6 +268,14 @@ class Network:
         statement = f"{result} := {call};"
         self._body.line(f"IF {enable} THEN {statement} END_IF;" if enable else statement, block.at)
         self._done[key] = result
+
+    def _write_statements(self, block: Element, key: str, enable: str) -> None:
+        """Adds the statements of an EXECUTE box."""
+        self._done[key] = ""
+        if enable:
+            self._body.line(f"IF {enable} THEN", block.at)
+        self._body.parts += [chunk for data in block.child_data("stcode") for chunk in data.every_chunk()]
+        self._body.line("\nEND_IF;" if enable else "", block.at)
 
     def _reads(self, element: Element) -> int:
         """How often the value of an element is evaluated."""

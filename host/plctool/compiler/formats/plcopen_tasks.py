@@ -13,6 +13,7 @@ from plctool.compiler.formats.twincat import LOWEST_PRIORITY, identifier
 from plctool.compiler.formats.xml_tree import Element
 
 _ISO = re.compile(r"P(?:(\d+)D)?(?:T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?)?", re.IGNORECASE)
+_CLOCK = re.compile(r"(\d+):(\d+):(\d+(?:\.\d+)?)")
 _NAME = re.compile(r"\w+")  # a visualisation, which is run by a library, has a dot in it
 _UNITS = {"µs": "us", "us": "us", "ms": "ms", "s": "s"}
 
@@ -68,9 +69,14 @@ def _setting(settings: Element | None) -> str:
 
 
 def duration(text: str) -> str:
-    """`T#20ms` as it is, `PT0.02S` as a literal; other text, such as the name of a constant, as it is."""
+    """Returns `PT0.02S` and `00:00:00.020000` as a literal; other text, such as `T#20ms` or the name of a constant, as
+    it is."""
     match = _ISO.fullmatch(text)
-    if match is None or not text[1:]:
+    clock = _CLOCK.fullmatch(text)
+    if clock is not None:
+        days, (hours, minutes, seconds) = 0.0, map(float, clock.groups())
+    elif match is not None and text[1:]:
+        days, hours, minutes, seconds = (float(part or 0) for part in match.groups())
+    else:
         return text
-    days, hours, minutes, seconds = (float(part or 0) for part in match.groups())
     return f"LTIME#{round((((days * 24 + hours) * 60 + minutes) * 60 + seconds) * 1_000_000)}us"

@@ -122,7 +122,7 @@ def _hidden(decl: ast.PouDecl, chart: ast.Chart) -> list[ast.VarDecl]:
         if not action.plain:
             timed = any(use.time is not None for _, use in action.uses)
             found.append(_variable(action.target.pos, action.hidden, _CONTROL if timed else _UNTIMED_CONTROL))
-        elif isinstance(action.target, ast.Name) and action.name.casefold() not in own:
+        elif action.name.casefold() not in own:  # `motor.Stop` may be an action as well
             found.append(_variable(action.target.pos, action.hidden, "BOOL"))
     return found
 

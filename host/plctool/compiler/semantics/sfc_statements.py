@@ -9,6 +9,7 @@ from collections import defaultdict
 
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.rules.members import bound_member
 from plctool.compiler.semantics.rules.places import named_place
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc import (
@@ -196,7 +197,7 @@ class _Execution:
             for indicator in (i for _, use in action.uses for i in use.indicators):
                 named_place(self._checker, indicator, "an indicator")
             symbol = self._scope.lookup(action.name) if isinstance(action.target, ast.Name) else None
-            if isinstance(symbol, MemberSymbol):
+            if isinstance(symbol, MemberSymbol) or self._is_of_instance(action):
                 calls.append(action)
             elif isinstance(action.target, ast.Name) and symbol is None:
                 self._unknown(action)
@@ -207,6 +208,11 @@ class _Execution:
         if calls and is_sequential(self._chart) and all(action.plain for action in calls):
             return [*found, self._same_step(calls, every)]
         return found + every
+
+    def _is_of_instance(self, action: Action) -> bool:
+        """True for an action of an instance, such as `motor.Stop`."""
+        bound = bound_member(self._checker, action.target) if isinstance(action.target, ast.Member) else None
+        return bound is not None and bound.callable is not None
 
     def _same_step(self, calls: list[Action], otherwise: list[ast.Stmt]) -> ast.Stmt:
         """While the active step stays the same, its actions are all there is to call."""
