@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from io_support import addresses, build, messages
 
+from plctool.compiler import compile_sources
+from plctool.compiler.diagnostics import CompileError
 from plctool.sim import Simulator
 
 MAIN = "PROGRAM Main\nVAR {} END_VAR\n{}\nEND_PROGRAM\n"
@@ -74,3 +76,26 @@ def test_what_does_not_fit_is_an_error(tmp_path: Path, variables: str, descripti
     found = messages(tmp_path, MAIN.format(variables, "a := a;"), f"[sim]\n{description}")
     assert len(found) == 1
     assert expected in found[0]
+
+
+def test_without_a_description_such_addresses_are_memory_with_one_warning(tmp_path: Path) -> None:
+    declared = "a AT %IX4.0.1 : BOOL; b AT %QX4.0.0.1 : BOOL; c AT %IL0.2 : LREAL; d AT %QW1 : WORD;"
+    (tmp_path / "main.st").write_text(MAIN.format(declared, "b := NOT a; d := d + 1; %QW9.0.0 := d;"))
+    built = compile_sources([tmp_path / "main.st"])
+    (warning,) = built.warnings
+    assert "no channel leads to %IX4.0.1 (and 3 more), so it is memory that no device reads or writes" in str(warning)
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(3)
+        assert plc.read("Main.b") is True
+        assert plc.read("Main.d") == 3
+
+
+def test_without_a_description_an_address_has_one_variable_too(tmp_path: Path) -> None:
+    (tmp_path / "main.st").write_text(MAIN.format("a AT %QW4.0 : WORD; b : WORD;", "a := 5; b := %QW4.0;"))
+    built = compile_sources([tmp_path / "main.st"])
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.b") == 5
+    (tmp_path / "main.st").write_text(MAIN.format("a AT %QW4.0 : WORD; b AT %QW4.0 : WORD;", "a := b;"))
+    with pytest.raises(CompileError, match=r"%QW4.0 is Main.a already"):
+        compile_sources([tmp_path / "main.st"])

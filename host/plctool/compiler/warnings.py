@@ -50,7 +50,7 @@ WARNINGS = {
     "task": "a program is called that a task runs as well",
     "truncated": "a string is longer than the STRING it goes to",
     "uncalled": "a function block is given an input, but never called",
-    "unlocated": "a variable AT %I*, %Q* or %M* has no address in VAR_CONFIG",
+    "unlocated": "a variable AT %I*, %Q* or %M* has no address in VAR_CONFIG, or one such as %IW0.1 no channel",
     "unreachable": "a statement is never reached",
     "unused": "a variable, label or program is never used, not even by a test, or the result of a call",
     "widening": "a product is computed in a type that is narrower than where it goes",

@@ -71,6 +71,7 @@ class IoChannels:
         self._channels: dict[str, Channel] = {}  # by the full name of what they lead to, case-folded
         self._in_modules: dict[str, Channel] = {}  # by the address that they name, such as %IX4.0.1
         self._unmapped: dict[ModuleAddress, Pos] = {}  # such addresses that no channel names, where they are first
+        self._without_channel: dict[str, str] = {}  # the variables at them, by address
         self._faulty = False  # the description has errors, so there may be more channels
         self._connected: dict[Variable, list[tuple[int, int, Channel]]] = {}  # bytes of it: first, end
         self.variables: dict[str, Variable] = {}  # that have become inputs or outputs, by full name case-folded
@@ -133,13 +134,15 @@ class IoChannels:
         """Notes that the variable with these names, the first of them in full, is at an address of modules: it lives
         where a channel leads that names the one or the other."""
         channel = self._in_modules.get(address.text)
+        bound = self.bound(address)
+        if bound:
+            message = f"{address.text} is {bound} already; use that variable, or another address"
+            diagnostics.error(pos, "location", message)
+            return
         if channel is None:
             if not self.claims(address.text[1], names, diagnostics):
                 self._unmapped.setdefault(address, pos)
-            return
-        if channel.variable:
-            message = f"{address.text} is {channel.variable} already; use that variable, or another address"
-            diagnostics.error(pos, "location", message)
+                self._without_channel[address.text] = names[0]
             return
         channel.variable = names[0]
         other = self._channels.setdefault(names[0].casefold(), channel)
@@ -149,7 +152,7 @@ class IoChannels:
     def bound(self, address: ModuleAddress) -> str:
         """The full name of the variable at an address of modules, "" if there is none yet."""
         channel = self._in_modules.get(address.text)
-        return "" if channel is None else channel.variable
+        return self._without_channel.get(address.text, "") if channel is None else channel.variable
 
     # ---- parts of variables ----
 
@@ -212,6 +215,8 @@ class IoChannels:
         """Gives the variables their addresses, and the channels type and place. `tasks`: None for unit tests, which
         have none of the program's."""
         self._report_unmapped(diagnostics)
+        if self.description is None and self._unmapped:
+            _lay_out_open(allocation)
         if self.description is None or diagnostics.errors:
             return
         self._report_devices(diagnostics)
@@ -224,28 +229,29 @@ class IoChannels:
             elif not channel.variable:
                 self._declare(channel, allocation)
         self.variables |= {v.name.casefold(): v for v in allocation.variables if v.name.casefold() in self._channels}
-        for area in (Area.INPUT, Area.OUTPUT):
-            open_ones = {v.name: v for v in allocation.variables if v.area is area and v.offset < 0}
-            if open_ones:
-                places = lay_out({name: v.type for name, v in open_ones.items()}, allocation.sizes[area])
-                for name, offset in places.items():
-                    open_ones[name].offset = offset
-                    allocation.sizes[area] = max(allocation.sizes[area], offset + open_ones[name].type.size)
+        _lay_out_open(allocation)
         for connector, channel in self.description.channels:
             self._settle(connector, channel, diagnostics)
         if not diagnostics.errors:
             self._finish_devices(allocation, diagnostics)
 
     def _report_unmapped(self, diagnostics: Diagnostics) -> None:
-        """One error for all, at the first of them: mostly the description as a whole is still missing."""
+        """Reports the first address for all. Without a description it is memory, so that a program of another system
+        can be tried at once; in a description it is forgotten or mistyped."""
         if not self._unmapped or self._faulty:
             return
         address, pos = next(iter(self._unmapped.items()))
         more = f" (and {len(self._unmapped) - 1} more)" if len(self._unmapped) > 1 else ""
-        where = "NAME.io.toml" if self.description is None else Path(self.description.path).name
-        message = f"no channel leads to {address.text}{more}, and only a description of inputs and outputs can say"
+        message = f"no channel leads to {address.text}{more}"
+        if self.description is None:
+            hint = "name each address in a description of inputs and outputs (NAME.io.toml)"
+            diagnostics.warning(pos, "unlocated", f"{message}, so it is memory that no device reads or writes; {hint}")
+            return
+        where = Path(self.description.path).name
         hint = f"name {address.text} in {where}, or number the bytes or words as in {address.numbered}"
-        diagnostics.error(pos, "location", f"{message} where it is; {hint}")
+        diagnostics.error(
+            pos, "location", f"{message}, and only a description of inputs and outputs can say where it is; {hint}"
+        )
 
     def _report_devices(self, diagnostics: Diagnostics) -> None:
         """What a device reports of itself is not what its channels lead to. An output may show it of another one."""
@@ -335,6 +341,17 @@ class IoChannels:
 
 
 # ---- questions -----------------------------------------------------------------------------------------------------
+
+
+def _lay_out_open(allocation: Allocation) -> None:
+    """Gives the inputs and outputs without an address one after those that have one."""
+    for area in (Area.INPUT, Area.OUTPUT):
+        open_ones = {v.name: v for v in allocation.variables if v.area is area and v.offset < 0}
+        if open_ones:
+            places = lay_out({name: v.type for name, v in open_ones.items()}, allocation.sizes[area])
+            for name, offset in places.items():
+                open_ones[name].offset = offset
+                allocation.sizes[area] = max(allocation.sizes[area], offset + open_ones[name].type.size)
 
 
 def _area(channel: Channel) -> Area:
