@@ -215,3 +215,12 @@ def test_a_name_like_an_instruction_is_a_name(tmp_path: Path, statement: str) ->
 def test_what_a_person_misspelt_is_still_an_error(tmp_path: Path) -> None:
     errors = found(tmp_path, PROGRAM.replace("PROGRAM PLC_PRG", "PROGRM PLC_PRG"))
     assert any("PROGRM" in d.message for d in errors)
+
+
+def test_a_function_block_may_be_written_in_one_word(tmp_path: Path) -> None:
+    block = "FUNCTIONBLOCK Pulse\nVAR_OUTPUT\n\tn: INT;\nEND_VAR\nn := n + 1;\nEND_FUNCTION_BLOCK\n"
+    main = "PROGRAM PLC_PRG\nVAR\n\tp: Pulse;\nEND_VAR\np();\nEND_PROGRAM\n"
+    (tmp_path / "plc.EXP").write_text(block + main)
+    with started(tmp_path) as plc:
+        plc.run_cycles(2)
+        assert plc.read("PLC_PRG.p.n") == 2

@@ -170,7 +170,7 @@ def test_globals_of_a_configuration_are_known_everywhere() -> None:
         ("TASK t(INTERVAL := T#1s); TASK T(INTERVAL := T#1s);", "2:32: there is a task T already"),
         ("TASK t(INTERVAL := 5);", "2:20: INTERVAL is a duration such as T#10ms, not integer constant"),
         ("TASK t(INTERVAL := T#-1s);", "2:20: INTERVAL must be between 0 and 35 minutes"),
-        ("TASK t(PRIORITY := 32);", "2:20: PRIORITY is 0 (highest) to 31, not 32"),
+        ("TASK t(PRIORITY := 65536);", "2:20: PRIORITY is 0 (highest) to 31, not 65536"),
         ("TASK t(SINGLE := 5);", "2:18: SINGLE is a global BOOL variable or a bit such as %IX0.3"),
         ("TASK t(SINGLE := TRUE);", "2:18: SINGLE is a global BOOL variable or a bit such as %IX0.3"),
         ("TASK t(SINGLE := NOT %IX0.1);", "2:18: SINGLE is a global BOOL variable or a bit such as %IX0.3"),
@@ -204,3 +204,10 @@ def test_globals_of_a_configuration_are_known_everywhere() -> None:
 )
 def test_wrong_configuration_is_explained(items: str, message: str) -> None:
     assert messages(configuration(items)) == [message]
+
+
+def test_a_lower_priority_than_there_is_becomes_the_lowest_with_a_warning() -> None:
+    text = configuration("TASK t(INTERVAL := T#10ms, PRIORITY := 100);\nPROGRAM p WITH t : P;")
+    assert [task.priority for task in program(text).tasks] == [31]
+    found = messages(text, severity="warning")
+    assert found == ["2:40: PRIORITY is 0 (highest) to 31, not 100; 31 is taken"]

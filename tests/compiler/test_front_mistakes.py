@@ -360,3 +360,20 @@ def test_messages_are_not_about_words_in_comments(comment: str) -> None:
     (said,) = in_body(f"a := 1 {comment}\nb := 2;")
     assert "expected ;" in said
     assert in_body(f"switch (a) {comment}\nb := 2;")[0] == f"1: {CHOICE}"
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "{extern int f(int); f(1);}",
+        "{{ f(1); }}",
+        "{\nSetFbVar(Q, 1);\n}",
+        "{ static int k; k++; }",
+        "{\n#define A\nb(A);\n}",
+    ],
+)
+def test_code_in_c_is_not_taken_for_statements_in_braces(code: str) -> None:
+    assert in_body(f"IF x THEN\n{code}\nEND_IF;") == [
+        "2: code in C cannot be compiled; put it into an EXTERNAL function"
+    ]
+    assert in_body("IF (x)\n{ a := 1; }")[0] == "2: there are no { } around statements; write IF x THEN ... END_IF"

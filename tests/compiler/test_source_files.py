@@ -665,3 +665,14 @@ def test_current_folder_without_sources_is_named_in_words(tmp_path: Path, monkey
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UsageError, match=r"^The current folder has no source file"):
         load_sources([Path(".")])
+
+
+def test_several_programs_of_a_twincat_project_without_a_task_are_a_library(tmp_path: Path) -> None:
+    for name in ("First", "Second"):
+        (tmp_path / f"{name}.TcPOU").write_text(COUNTING.replace("MAIN", name))
+    result = check_sources(load_sources([tmp_path]))
+    assert result.ok
+    assert [d.message for d in result.diagnostics if d.code == "no-program"] == [
+        "several programs and no task, so nothing would run; write a CONFIGURATION that says what runs, "
+        "unless this is a library"
+    ]

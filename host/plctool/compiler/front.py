@@ -177,7 +177,8 @@ def _check_parsed(
     _check_sizes(world, sources)
     if not world.diagnostics.errors:  # else channels may have no addresses yet
         report_overlaps(allocation.variables, world.diagnostics)
-    if not application.tasks and not world.names.tests and not world.diagnostics.errors and sources:
+    runs_nothing = not application.tasks and not world.names.tests and not world.names.program_symbols()
+    if runs_nothing and not world.diagnostics.errors and sources:
         world.diagnostics.warning(sources[0].pos(0), "no-program", "there is no PROGRAM, so nothing would run")
     typed = TypedProgram(
         pous=world.pous,

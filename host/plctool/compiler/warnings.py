@@ -35,7 +35,7 @@ WARNINGS = {
     "lifetime": "an instance of a function block lives for one call only, and is initialised in the next one",
     "narrowing": "an integer or an LREAL goes where not all of its values fit",
     "no-effect": "an attribute, pragma or qualifier changes nothing here, though it does in other systems",
-    "no-program": "there is no PROGRAM, so nothing would run",
+    "no-program": "there is no PROGRAM, or none has a task, so nothing would run",
     "not": "NOT inverts a number that is compared, as in NOT a = 5",
     "overlap": "two variables with AT share memory, and neither is a bit of the other",
     "pointer": "a pointer becomes a pointer to something else",

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from plctool.compiler.formats.text import Findings, Place, Text
 from plctool.compiler.source import Source
 
+_BLOCK_IN_ONE_WORD = "FUNCTIONBLOCK"  # in exports of some systems made from CODESYS 2.3
 _ENDS = {
+    _BLOCK_IN_ONE_WORD: "END_FUNCTION_BLOCK",
     "PROGRAM": "END_PROGRAM", "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "FUNCTION": "END_FUNCTION", "TYPE": "END_TYPE",
     "ACTION": "END_ACTION", "VAR_GLOBAL": "END_VAR", "VAR_CONFIG": "END_VAR", "CONFIGURATION": "END_CONFIGURATION",
     "INTERFACE": "END_INTERFACE", "METHOD": "END_METHOD",
@@ -66,6 +68,8 @@ class _Export:
         left_out: list[str] = []
         first: _Span | None = None
         for span in self._spans():
+            if span.kind == _BLOCK_IN_ONE_WORD:
+                self._edits.append((span.start, span.start + len(span.kind), "FUNCTION_BLOCK"))
             if span.kind in _ENDS:
                 self._other_language(span)
                 continue

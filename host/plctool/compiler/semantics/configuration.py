@@ -38,6 +38,7 @@ from plctool.iec.types import BOOL, LTIME, TIME, StringType
 # ---- the properties of a TASK ----
 
 LOWEST_PRIORITY = 31
+_LOWEST_ELSEWHERE = 65_535  # of OpenPLC and Beremiz, where it is a UINT
 MAX_DURATION_US = 0x7FFF_FFFF
 MAX_SENSITIVITY = 0xFFFF
 MAX_EVENT_NAME = 63
@@ -121,11 +122,14 @@ class _Reader:
 
     def _priority(self, node: ast.Expr) -> None:
         priority = self._checker.integer(node)
-        if priority is not None and 0 <= priority <= LOWEST_PRIORITY:
-            self.task.priority = priority
-        elif priority is not None:
-            message = f"PRIORITY is 0 (highest) to {LOWEST_PRIORITY}, not {priority}"
+        if priority is None:
+            return
+        self.task.priority = min(priority, LOWEST_PRIORITY)
+        message = f"PRIORITY is 0 (highest) to {LOWEST_PRIORITY}, not {priority}"
+        if not 0 <= priority <= _LOWEST_ELSEWHERE:
             self._checker.error(node.pos, "range", message)
+        elif priority > LOWEST_PRIORITY:
+            self._checker.scope.warning(node.pos, "configuration", f"{message}; {LOWEST_PRIORITY} is taken")
 
     def _sensitivity(self, node: ast.Expr) -> None:
         number = self._checker.integer(node)
@@ -220,15 +224,21 @@ class _Builder:
         if not chosen:
             return
         if len(chosen) > 1:
-            decl = chosen[1].decl
-            self._world.diagnostics.error(
-                decl.source.pos(decl.pos), "configuration",
-                f"several programs: name one {DEFAULT_PROGRAMS[0]}, or write a CONFIGURATION that says what runs",
-            )  # fmt: skip
+            self._report_several(chosen[1].decl)
             return
         program = self._instance(chosen[0].decl.full_name)
         self._check_in_outs(program, [], chosen[0].decl.source.pos(chosen[0].decl.pos))
         self._application.tasks.append(Task(DEFAULT_TASK, TaskKind.CYCLIC, 1, DEFAULT_INTERVAL_US, [program.pou]))
+
+    def _report_several(self, decl: ast.PouDecl) -> None:
+        """A project of another system without a task may be a library, which runs nothing."""
+        pos, advice = decl.source.pos(decl.pos), "write a CONFIGURATION that says what runs"
+        if decl.source.original is None:
+            message = f"several programs: name one {DEFAULT_PROGRAMS[0]}, or {advice}"
+            self._world.diagnostics.error(pos, "configuration", message)
+            return
+        message = "several programs and no task, so nothing would run"
+        self._world.diagnostics.warning(pos, "no-program", f"{message}; {advice}, unless this is a library")
 
     def _instance(self, name: str) -> ProgramInfo:
         instance = self._world.names.instance(name.casefold())

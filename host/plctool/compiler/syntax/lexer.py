@@ -106,6 +106,11 @@ _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}"
 _DURATION = re.compile(rf"\d+(?:{slips.UNITS})", re.IGNORECASE)
 _WITH_COMMA = re.compile(r"\w#(?P<number>\d+),$")
 _MODIFIED = re.compile(r"\s+(METHOD|PROPERTY|FUNCTION_BLOCK|FUNCTION|CLASS|PROGRAM|INTERFACE)\s+(\w+)", re.IGNORECASE)
+_ONLY_C = re.compile(
+    r"\{\{|\{[^{}]*(?:\b(?:extern|static|void|char|printf|GetFbVar|SetFbVar)\b|\(\w+ ?\*+\)|::|^\s*#)", re.MULTILINE
+)
+"""The beginning of code in C that is not a block of statements written as in C."""
+
 _STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quotes
 _ACCESSOR = re.compile(r"\b(GET|SET)\s*\Z", re.IGNORECASE)
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
@@ -252,7 +257,9 @@ class Lexer:
 
     def _foreign(self, pos: int) -> None:
         message = "code in C cannot be compiled; put it into an EXTERNAL function"
-        if self.text[:pos].rstrip()[-4:].upper().endswith((")", "THEN", "ELSE", "DO")):
+        if not _ONLY_C.match(self.text, pos) and self.text[:pos].rstrip()[-4:].upper().endswith(
+            (")", "THEN", "ELSE", "DO")
+        ):
             message = "there are no { } around statements; write IF x THEN ... END_IF"
         elif accessor := _ACCESSOR.search(self.text[:pos]):
             word = accessor[1].upper()
