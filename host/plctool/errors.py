@@ -76,11 +76,27 @@ def with_article(name: object) -> str:
     return f"{'an' if _AN.match(str(name)) else 'a'} {name}"
 
 
-def did_you_mean(name: str, candidates: Iterable[str], likeness: float = 0.7) -> str:
-    """`; did you mean X?` for the candidate most like `name`, else nothing. `likeness`: at least, 1 is the same."""
+_SHORT = 4  # characters of a name that may differ in one of them only
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str:
+    """`; did you mean X?` for the candidate most like `name`, else nothing."""
     from difflib import get_close_matches
 
     # Of names that differ in case only the last in this order, whatever the order of the candidates.
-    by_key = {key: c for c in sorted(candidates) if (key := c.casefold()) != name.casefold()}
-    close = get_close_matches(name.casefold(), list(by_key), n=1, cutoff=likeness)
+    own = name.casefold()
+    by_key = {key: c for c in sorted(candidates) if (key := c.casefold()) != own and _may_be_meant(own, key)}
+    close = get_close_matches(own, list(by_key), n=1, cutoff=0.7)
     return f"; did you mean {by_key[close[0]]}?" if close else ""
+
+
+def _may_be_meant(name: str, candidate: str) -> bool:
+    """False if one of the names is short and they differ in more than one character or two that changed places."""
+    if min(len(name), len(candidate)) > _SHORT:
+        return True
+    one, other = name, candidate
+    while one and other and one[0] == other[0]:
+        one, other = one[1:], other[1:]
+    while one and other and one[-1] == other[-1]:
+        one, other = one[:-1], other[:-1]
+    return max(len(one), len(other)) <= 1 or (len(one) == 2 and one == other[::-1])

@@ -5,7 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from plcopen_support import errors, pou, project, st, started, variables
+from plcopen_support import errors, pou, project, st, started, variables, written
+
+from plctool.compiler import load_sources
+from plctool.compiler.front import check_sources
 
 
 def at(row: int, column: int = 0) -> str:
@@ -543,3 +546,34 @@ def test_an_error_in_a_box_of_structured_text_has_its_place(tmp_path: Path) -> N
     text = project(pou("Main", network(execute(2, "\nn := n + 'a';")), variables("localVars", "n:INT")))
     ((line, _),) = errors(tmp_path, text)
     assert "n := n + 'a'" in text.splitlines()[line - 1]
+
+
+def _diagram(tmp_path: Path, *elements: str, types: str = "", declared: str = "v:Vendor_Type") -> list[str]:
+    body = network(*elements)
+    text = project(pou("Main", body, variables("localVars", "n:INT", declared)), types)
+    return [message for _, message in errors(tmp_path, text)]
+
+
+TWICE = (taken(8, "n", "3.OUT"), taken(9, "n", "3.OUT", row=40))
+
+
+def test_a_diagram_with_a_variable_of_an_unknown_type_is_no_second_error(tmp_path: Path) -> None:
+    elements = (given(1, "v.speed"), given(2, "n"), block(3, "SUB", {"IN1": "1", "IN2": "2"}), *TWICE)
+    assert _diagram(tmp_path, *elements) == ["unknown type Vendor_Type"]
+
+
+def test_an_unknown_function_in_a_diagram_is_named(tmp_path: Path) -> None:
+    elements = (given(1, "n"), block(3, "VendorScale", {"x": "1"}), *TWICE)
+    assert _diagram(tmp_path, *elements, declared="v:INT") == ["unknown function VendorScale"]
+
+
+def test_a_diagram_whose_type_is_in_another_file_is_an_error_of_its_own(tmp_path: Path) -> None:
+    elements = (given(1, "v.speed"), given(2, "n"), block(3, "SUB", {"IN1": "1", "IN2": "2"}), *TWICE)
+    body = network(*elements)
+    xml = written(tmp_path, project(pou("Main", body, variables("localVars", "n:INT", "v:Vendor_Type"))))
+    other = tmp_path / "other.st"
+    other.write_text("TYPE Vendor_Type : STRUCT speed : INT; END_STRUCT END_TYPE\n")
+    found = check_sources(load_sources([xml, other])).diagnostics
+    assert [d.message.rpartition(": ")[2] for d in found if d.severity == "error"] == [
+        "the type of the result of SUB is not known"
+    ]

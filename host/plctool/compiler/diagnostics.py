@@ -6,15 +6,15 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from plctool.compiler.missing_names import Use, library_of, table
-from plctool.compiler.source import Source
+from plctool.compiler.source import Finding, Source
 from plctool.compiler.typed import Pos
 from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
-from plctool.errors import UsageError
+from plctool.errors import UsageError, counted
 from plctool.errors import did_you_mean as did_you_mean
 from plctool.iec.dialect import OWN
 
@@ -57,9 +57,10 @@ class Diagnostics:
         self._muted: dict[tuple[str, str], LineRanges] = {}
         self._found: dict[Diagnostic, None] = {}
         self.incomplete: set[str] = set()  # units, case-folded, that lack what has an unknown type or base
-        self.baseless: set[str] = set()  # those of them whose base is unknown
+        self.waiting: list[tuple[Pos, Finding]] = []  # until all names are known
         self.errors = 0
         self._counted = 0  # errors that are counted to the limit
+        self._unknown: set[str] = set()  # what was said of unknown names: said again it does not count
         self.limit = MAX_ERRORS
 
     def error(self, pos: Pos, code: str, message: str) -> None:
@@ -101,10 +102,23 @@ class Diagnostics:
         """Takes over what the reader of a file found. Diagrams do not count: all are named, and the rest is checked."""
         for found in source.findings:
             pos = Pos(source.path, found.line, found.column)
-            if found.severity == "warning":
+            if found.needs:
+                self.waiting.append((pos, found))
+            elif found.severity == "warning":
                 self.warning(pos, found.code, found.message)
             else:
                 self._add(pos, "error", found.code, found.message, counts=found.code not in _UNCOUNTED)
+
+    def settle(self, is_known: Callable[[str], bool]) -> None:
+        """Reports the findings that waited for a name: an unknown name is the error, else it is what was found."""
+        reported = {d.missing.casefold() for d in self._found if d.missing}
+        for pos, found in self.waiting:
+            if found.needs.casefold() in reported:
+                continue
+            if is_known(found.needs):
+                self._add(pos, "error", found.code, found.message, counts=found.code not in _UNCOUNTED)
+            else:
+                self.missing(pos, found.needs, f"unknown function {found.needs}")
 
     def at(self, source: Source) -> SourceDiagnostics:
         """Reports by offset in a source."""
@@ -121,7 +135,9 @@ class Diagnostics:
         self._found[diagnostic] = None
         if severity == "error":
             self.errors += 1
-            self._counted += counts and not missing
+            repeated = code == "unknown" and message in self._unknown
+            self._unknown.add(message)
+            self._counted += counts and not missing and not repeated
             if self._counted >= self.limit:
                 raise TooManyErrors
 
@@ -164,7 +180,8 @@ def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> 
     hidden = {id(d) for d in listed}
     if listed:  # what is never used may be used with what is missing, and would push the table out of sight
         hidden |= {id(d) for d in diagnostics if d.severity == "warning" and d.code == "unused"}
-    shown, counts = _few_of_each_kind([d for d in diagnostics if id(d) not in hidden])
+    single = _folded([d for d in diagnostics if id(d) not in hidden])
+    shown, counts = _few_of_each_kind(single)
     texts = [render(d, () if d.code in _UNCOUNTED else sources) for d in shown]
     texts += [
         f"{MAX_OF_KIND} of {count} warnings '{kind}' are shown; --json shows all."
@@ -172,9 +189,22 @@ def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> 
         if count > MAX_OF_KIND
     ]
     texts += missing_names_text(listed) if listed else []
-    if sum(d.severity == "error" and d.code not in _UNCOUNTED and not d.missing for d in diagnostics) >= MAX_ERRORS:
+    if sum(d.severity == "error" and d.code not in _UNCOUNTED and not d.missing for d in single) >= MAX_ERRORS:
         texts.append(f"There may be more than these {MAX_ERRORS} errors; correct some and check again.")
     return texts
+
+
+def _folded(diagnostics: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """One error for each unknown name, at its first place, with the number of the other places."""
+    uses = Counter(d.message for d in diagnostics if d.severity == "error" and d.code == "unknown")
+    found: list[Diagnostic] = []
+    for d in diagnostics:
+        count = uses.pop(d.message, 0) if d.severity == "error" and d.code == "unknown" else 1
+        if count > 1:
+            d = replace(d, message=f"{d.message} (and {counted(count - 1, 'more place')})")
+        if count:
+            found.append(d)
+    return found
 
 
 def _few_of_each_kind(diagnostics: Sequence[Diagnostic]) -> tuple[list[Diagnostic], Counter[str]]:

@@ -23,6 +23,7 @@ from plctool.compiler.semantics.configuration import configure
 from plctool.compiler.semantics.io_channels import IoChannels, device_variables
 from plctool.compiler.semantics.permitted import check_declarations
 from plctool.compiler.semantics.program import Program
+from plctool.compiler.semantics.rules.builtin import is_built_in
 from plctool.compiler.semantics.uncalled_blocks import report_uncalled_blocks
 from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
@@ -99,7 +100,12 @@ def _guarded(
     """The check, with an end to errors and to nesting."""
     try:
         try:
-            return _check(program, sources, tests, python)
+            typed = _check(program, sources, tests, python)
+            world = program.world
+            world.diagnostics.settle(
+                lambda name: is_built_in(name) or world.names.lookup(name.casefold(), library=False) is not None
+            )
+            return typed
         except NestingError as error:
             program.world.nested_too_deeply(error)
         except RecursionError:

@@ -52,7 +52,12 @@ class Entry:
     source: Source
     start: int
     end: int
-    is_function: bool
+    keyword: str  # FUNCTION, FUNCTION_BLOCK, TYPE or VAR_GLOBAL
+
+    @property
+    def is_function(self) -> bool:
+        """True for a function, which is called by this name."""
+        return self.keyword == "FUNCTION"
 
 
 class Library:
@@ -77,7 +82,7 @@ class Library:
                 [match["name"]] if match["name"] else _DECLARED_NAME.findall(_STRUCT.sub("", text[match.end() : end]))
             )
             for name in names:
-                self._entries[name.casefold()] = Entry(name, source, at, end, match["pou"] == "FUNCTION")
+                self._entries[name.casefold()] = Entry(name, source, at, end, keyword)
                 base, separator, suffix = name.rpartition("__")
                 if separator and base and suffix:
                     self._overloads.setdefault(base.casefold(), []).append(name)
@@ -87,9 +92,11 @@ class Library:
         """`SIN` is defined as SIN__REAL and SIN__LREAL: their names."""
         return self._overloads.get(key, [])
 
-    def names(self) -> list[str]:
-        """Everything there is, for suggestions."""
-        return [e.name for e in self._entries.values() if "__" not in e.name] + [k.upper() for k in self._overloads]
+    def names(self, *keywords: str) -> list[str]:
+        """Everything there is, or what is declared by one of these keywords."""
+        found = [e for e in self._entries.values() if not keywords or e.keyword in keywords]
+        functions = not keywords or "FUNCTION" in keywords
+        return [e.name for e in found if "__" not in e.name] + [k.upper() for k in self._overloads if functions]
 
     def defined_in(self, path: str) -> list[Entry]:
         """What a source defines, but for what is internal."""

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from plctool.errors import did_you_mean
+from plctool.errors import counted, did_you_mean
 
 _UNKNOWN = "no library known here"
 _SHOWN = 8  # names of a library that are listed; the rest is counted
@@ -102,16 +102,16 @@ def library_of(name: str) -> str:
     return next(found, "")
 
 
-def known_name_like(name: str, candidates: Iterable[str], likeness: float = 0.7) -> str:
+def known_name_like(name: str, candidates: Iterable[str]) -> str:
     """`; did you mean X?` for an unknown name; nothing for one that a library has, which is missing, not misspelt."""
-    return "" if library_of(name) else did_you_mean(name, candidates, likeness)
+    return "" if library_of(name) else did_you_mean(name, candidates)
 
 
 def table(uses: Sequence[Use]) -> list[str]:
     """One line for each library, with its names and how often they are used."""
     found = missing_names(uses)
     libraries = list(dict.fromkeys(m.library for m in found))
-    lines = [f"The program uses {len(found)} names that nothing declares, in {len(uses)} places:"]
+    lines = [f"The program uses {counted(len(found), 'name')} that nothing declares, in {len(uses)} places:"]
     for library in libraries:
         names = [m for m in found if m.library == library]
         shown = ", ".join(f"{m.name} ({m.count})" for m in names[:_SHOWN])

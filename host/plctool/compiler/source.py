@@ -20,13 +20,15 @@ from plctool.compiler.typed import Pos
 
 @dataclass(frozen=True)
 class Finding:
-    """What the reader of a file has to say about it. `line` and `column` count from 1."""
+    """What the reader of a file has to say about it. `line` and `column` count from 1. `needs`: the name of a type or
+    function that the file does not declare; if nothing else does, that is the error, not this one."""
 
     line: int
     column: int
     code: str
     message: str
     severity: Literal["error", "warning"] = "error"
+    needs: str = ""
 
 
 @dataclass(frozen=True)

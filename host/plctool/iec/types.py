@@ -334,6 +334,7 @@ class StructType(Type):
     interfaces: list[StructType] = field(default_factory=list)
     properties: list[str] = field(default_factory=list)  # what looks like a member but is not
     pack: int = MAX_ALIGN  # members are at multiples of this [bytes] or of what their type wants, whichever is less
+    of_unknown: bool = False  # extends or implements something that is not declared anywhere
 
     @property
     def root(self) -> StructType:
@@ -345,6 +346,10 @@ class StructType(Type):
         if other is self or other in self.interfaces:
             return True
         return self.base is not None and self.base.conforms(other)
+
+    def may_conform(self, other: Type) -> bool:
+        """As `conforms`; also True where an unknown base or interface may be the reason."""
+        return self.conforms(other) or self.of_unknown or (self.base is not None and self.base.may_conform(other))
 
     def lay_out(self, *, behind_base: bool = False) -> None:
         """Gives every field its offset. Call once, when all field types are known and laid out. `behind_base`: own

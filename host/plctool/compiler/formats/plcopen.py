@@ -260,7 +260,8 @@ class _Project:
                 try:
                     _translate(written, unit, body)
                 except NotTranslatedError as error:
-                    self._findings.add(error.at, "language", _REFUSED.format(f"{name} ({written.tag})", error))
+                    message = _REFUSED.format(f"{name} ({written.tag})", error)
+                    self._findings.add(error.at, "language", message, error.needs)
                     return Body()
                 except RecursionError:
                     self._findings.add(

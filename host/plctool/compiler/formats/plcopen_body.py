@@ -12,11 +12,12 @@ from plctool.compiler.formats.xml_tree import Element
 
 
 class NotTranslatedError(Exception):
-    """A diagram has no translation; `at` is the part of it that has none."""
+    """A diagram has no translation; `at` is the part of it that has none, `needs` as in Finding."""
 
-    def __init__(self, at: Place, why: str) -> None:
+    def __init__(self, at: Place, why: str, needs: str = "") -> None:
         super().__init__(why)
         self.at = at
+        self.needs = needs
 
 
 @dataclass

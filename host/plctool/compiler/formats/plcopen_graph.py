@@ -255,7 +255,8 @@ class Network:
             return
         later = self._reads(block)
         if not spec and (enable or later + len(named) > 1 or (later and _number(block))):
-            raise NotTranslatedError(block.at, f"the type of the result of {name} is not known")
+            needs = self._types.undeclared(block)
+            raise NotTranslatedError(block.at, f"the type of the result of {name} is not known", needs)
         if not spec:
             self._done[key] = call
             if not later and not named and self._may_act(name):

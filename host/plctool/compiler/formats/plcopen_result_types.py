@@ -71,6 +71,35 @@ class ResultTypes:
             return self._of_all(name, known)
         return self._declared(name, known) or self._converted(name)
 
+    def undeclared(self, block: Element, depth: int = 0) -> str:
+        """The type of an input, or of what leads there, that neither the file nor the library declares; else the
+        function itself, unless the library has it. "" if all are declared."""
+        inputs = [v for part in block.all("inputVariables") for v in part.all("variable")]
+        for item in inputs if depth <= 100 else ():
+            found = self._undeclared_input(item, depth + 1)
+            if found:
+                return found
+        name = block.get("typeName")
+        return "" if self._is_declared(name) else name
+
+    def _undeclared_input(self, item: Element, depth: int) -> str:
+        text = item.child("connectionPointIn", "expression")
+        specs = [text.text] if text is not None else []
+        for connection in item.every("connection"):
+            element = self._elements.get(connection.get("refLocalId"))
+            if element is not None and element.tag in ("inVariable", "inOutVariable"):
+                specs.append((element.child("expression") or element).text)
+            elif element is not None and element.tag == "block":
+                found = self.undeclared(element, depth)
+                if found:
+                    return found
+        first = (self._unit.types.get(re.split(r"[.\[]", spec)[0].casefold(), "") for spec in specs)
+        return next((spec for spec in first if spec and not self._is_declared(spec)), "")
+
+    def _is_declared(self, name: str) -> bool:
+        known = self._elementary(name) is not None or name.casefold() in self._unit.blocks
+        return known or not re.fullmatch(r"[\w.]+", name) or bool(declared(name))
+
     def _of_first(self, name: str, given: list[str | Untyped]) -> str:
         if not given or isinstance(given[0], Untyped):
             return ""

@@ -41,6 +41,7 @@ class Checker:
         self.coerce = world.coerce
         self.pos: Callable[[int], Pos] = scope.source.pos
         self.special_calls: SpecialCalls = special_calls or {}
+        self.owner: ast.Expr | None = None  # the last one that a dot follows
         self.loops = 0  # around the statement
         self.labels = Labels([])  # of the body
         self.around: list[list[ast.Stmt]] = []  # the statements it is one of, those around them ...

@@ -249,7 +249,7 @@ class Coercion:
             if (
                 isinstance(inner, StructType)
                 and not isinstance(e.type, InterfaceType)
-                and inner.conforms(target.target)
+                and inner.may_conform(target.target)
             ):
                 return replace(e, type=target)
         if isinstance(e.type, PointerType) and isinstance(target, PointerType) and same_type(e.type, target):
@@ -295,7 +295,7 @@ class Coercion:
                 message = f"{e.type} does not fit {target}; assign the instance itself, without ADR"
                 return self._error(e.pos, "type", message)
             return self._mismatch(e, target)
-        if not source.conforms(target.target):
+        if not source.may_conform(target.target):
             what = "extend" if isinstance(e.type, InterfaceType) else "implement"
             return self._error(e.pos, "type", f"{source} does not {what} {target}")
         if isinstance(e.type, InterfaceType):

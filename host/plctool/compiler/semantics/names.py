@@ -369,18 +369,37 @@ class Names:
             found += [f"{instance.name}.{n}" for n in written]
         return found
 
-    def visible_names(self) -> list[str]:
-        """Names of globals, functions and enumeration values, for suggestions."""
+    def value_names(self) -> list[str]:
+        """Names of variables and enumeration values, for suggestions."""
         values = [name for s in self._units.values() if isinstance(s, TypeSymbol) for name in enum_names(s)]
-        units = [s.decl.name for s in self._units.values()]
         named = [s.name for s in self._globals.values()]
-        named += self.list_names() + [instance.name for instance in self.planned.values()]
-        return units + named + values + self.imported.known + self.library.names()
+        return named + values + self.imported.known + self.library.names("VAR_GLOBAL")
+
+    def owner_names(self) -> list[str]:
+        """Names that others may follow after a dot, for suggestions: variables, lists, programs, types, namespaces."""
+        named = [s.name for s in self._globals.values()] + self.list_names()
+        return named + self.program_names() + self.type_names() + list(self.namespaces.values())
+
+    def program_names(self) -> list[str]:
+        """Names of the instances of programs, for suggestions."""
+        return [instance.name for instance in self.planned.values()]
 
     def type_names(self) -> list[str]:
-        """Names of types and function blocks, for suggestions."""
-        return [s.decl.name for s in self._units.values()] + self.imported.known + self.library.names()
+        """Names of types, function blocks and interfaces, for suggestions."""
+        types = [s.decl.name for s in self._units.values() if isinstance(s, TypeSymbol)]
+        return types + self.interface_names() + self.block_names() + self.library.names("TYPE")
+
+    def block_names(self) -> list[str]:
+        """Names of function blocks, for suggestions."""
+        return self._own_pous(ast.Unit.FUNCTION_BLOCK) + self.imported.known + self.library.names("FUNCTION_BLOCK")
+
+    def interface_names(self) -> list[str]:
+        """Names of interfaces, for suggestions."""
+        return self._own_pous(ast.Unit.INTERFACE) + self.imported.known
 
     def function_names(self) -> list[str]:
         """Names of functions, for suggestions."""
-        return [s.decl.name for s in self.functions()] + self.imported.known + self.library.names()
+        return self._own_pous(ast.Unit.FUNCTION) + self.imported.known + self.library.names("FUNCTION")
+
+    def _own_pous(self, keyword: ast.Unit) -> list[str]:
+        return [s.decl.name for s in self.pou_symbols() if s.keyword is keyword]

@@ -187,15 +187,11 @@ class Scope:
 
     def inherits_unknown(self, cls: ClassInfo | None) -> bool:
         """Whether a class may have members that are not known, because a base of it is not."""
-        while cls is not None and cls.name.casefold() not in self.globals.diagnostics.baseless:
-            cls = cls.base
-        return cls is not None
+        return cls is not None and cls.inherits_unknown
 
-    def lacks(self, unit: str, *, base: bool = False) -> None:
-        """Notes that a unit is incomplete: a variable has an unknown type, or its `base` is unknown."""
+    def lacks(self, unit: str) -> None:
+        """Notes that a unit is incomplete: a variable has an unknown type, or its base is unknown."""
         self.globals.diagnostics.incomplete.add(unit.casefold())
-        if base:
-            self.globals.diagnostics.baseless.add(unit.casefold())
 
     def warning(self, offset: int, code: str, message: str) -> None:
         """Reports a warning at an offset."""

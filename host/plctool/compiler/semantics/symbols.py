@@ -244,6 +244,17 @@ class ClassInfo:
     names: dict[str, Symbol] = field(default_factory=dict)
     instance_variables: dict[str, dict[str, VarSymbol]] = field(default_factory=dict)  # VAR_INST, by member
     number: int = 0
+    of_unknown: bool = False  # extends something that is not declared anywhere
+
+    @property
+    def inherits_unknown(self) -> bool:
+        """True if it may have members that are not known, because a block or interface that it extends is not."""
+        bases = self.all_interfaces() if self.is_interface else []
+        return (
+            self.of_unknown
+            or any(b.of_unknown for b in bases)
+            or (self.base is not None and self.base.inherits_unknown)
+        )
 
     @property
     def is_interface(self) -> bool:

@@ -78,6 +78,9 @@ class Classes:
             interface = self._interface_named(offset, name, scope)
             if interface is not None:
                 cls.interfaces.append(interface)
+                info.type.of_unknown = info.type.of_unknown or interface.inherits_unknown
+            else:
+                info.type.of_unknown = True
         info.type.interfaces = [i.type for i in cls.all_interfaces() if i.type is not None]
         self._add_members(cls)
         info.type.properties = sorted({m.decl.name for m in cls.members.values() if m.is_property})
@@ -104,13 +107,15 @@ class Classes:
         if isinstance(base, PouSymbol) and base.keyword is ast.Unit.INTERFACE:
             scope.error(offset, "inheritance", f"{name} is an interface; write IMPLEMENTS {name}")
         else:
-            scope.lacks(symbol.decl.full_name, base=True)
-            self._no_such(offset, name, scope, "function block", base is None)
+            scope.lacks(symbol.decl.full_name)
+            assert scope.cls is not None and scope.cls.type is not None
+            scope.cls.of_unknown = scope.cls.type.of_unknown = True
+            self._no_such(offset, name, scope, "function block", self._world.names.block_names(), base is None)
         return None
 
-    def _no_such(self, offset: int, name: str, scope: Scope, what: str, unknown: bool) -> None:
+    def _no_such(self, offset: int, name: str, scope: Scope, what: str, names: list[str], unknown: bool) -> None:
         if unknown:
-            hint = known_name_like(name, self._world.names.type_names())
+            hint = known_name_like(name, names)
             if hint:
                 scope.error(offset, "unknown", f"unknown {what} {name}{hint}")
             else:
@@ -233,10 +238,13 @@ class Classes:
         self._add_members(cls)
         for offset, name in _named(decl.bases):
             base = self._interface_named(offset, name, scope)
-            if base is not None and (base is cls or cls in base.all_interfaces()):
+            if base is None:
+                cls.of_unknown = target.of_unknown = True
+            elif base is cls or cls in base.all_interfaces():
                 scope.error(offset, "recursion", f"{decl.name} extends itself through {name}")
-            elif base is not None:
+            else:
                 cls.interfaces.append(base)
+                target.of_unknown = target.of_unknown or base.inherits_unknown
         target.interfaces = [i.type for i in cls.all_interfaces() if i.type is not None]
         return t
 
@@ -246,7 +254,7 @@ class Classes:
             return None
         if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.INTERFACE:
             return self._world.interfaces[self.interface(symbol).target]  # type: ignore[index]
-        self._no_such(offset, name, scope, "interface", symbol is None)
+        self._no_such(offset, name, scope, "interface", self._world.names.interface_names(), symbol is None)
         return None
 
     def signature(self, member: Member) -> FunctionInfo:

@@ -84,7 +84,7 @@ def check_class(world: World, cls: ClassInfo) -> None:
         inherited = cls.base.find(key) if cls.base is not None else None
         if inherited is not None and key not in INITIALISERS:
             _check_override(world, member, inherited)
-        elif ast.Modifier.OVERRIDE in member.decl.modifiers and not any(key in i.members for i in cls.all_interfaces()):
+        elif ast.Modifier.OVERRIDE in member.decl.modifiers and not _may_be_inherited(cls, key):
             names = cls.base.member_names() if cls.base is not None else []
             hint = did_you_mean(member.decl.name, names)
             _error(world, member, f"{member.name} overrides nothing{hint}")
@@ -98,6 +98,12 @@ def check_class(world: World, cls: ClassInfo) -> None:
         _check_interfaces(world, cls)
         if not cls.abstract and cls.base is not None:
             _check_complete(world, cls)
+
+
+def _may_be_inherited(cls: ClassInfo, key: str) -> bool:
+    """True if an interface has the member, or an unknown base or interface may have it."""
+    unknown = cls.inherits_unknown or (cls.type is not None and cls.type.of_unknown)
+    return unknown or any(key in i.members for i in cls.all_interfaces())
 
 
 def _check_exit(world: World, member: Member) -> None:
@@ -156,6 +162,8 @@ def _check_interfaces(world: World, cls: ClassInfo) -> None:
         missing = []
         for key, wanted in interface.members.items():
             member = cls.find(key)
+            if (member is None or member.owner.is_interface) and cls.inherits_unknown:
+                continue
             if member is None or member.owner.is_interface:
                 missing.append(_described(wanted))
             elif member.owner is cls or interface in cls.interfaces:

@@ -157,6 +157,8 @@ class InitialValues:
                 continue
             if field is None and self._property(name, value, t, properties, scope):
                 continue
+            if field is None and self._is_incomplete(t, scope):
+                continue
             if field is None or (block is not None and block.members[name.casefold()].role is Role.IN_OUT):
                 hint = did_you_mean(name, (f.name for f in t.fields))
                 scope.error(offset, "unknown", f"{t} has no member {name} to initialise{hint}")
@@ -167,6 +169,10 @@ class InitialValues:
             if given is not None:
                 members[field.name] = given
         return StructInit(members, arguments, properties)
+
+    def _is_incomplete(self, t: StructType, scope: Scope) -> bool:
+        """True if the type may have members and inputs that are not known, because of an error that was reported."""
+        return scope.is_incomplete(t.name) or scope.inherits_unknown(self._world.class_of(t))
 
     def _property(self, name: str, node: ast.Init, t: StructType, properties: dict[str, Expr], scope: Scope) -> bool:
         """`fb : MyFB := (Mode := 3)` for a property with a SET; False when there is none."""
@@ -193,6 +199,8 @@ class InitialValues:
             names = [name for name in inputs if name.casefold() not in (INIT_RETAINS, COPY_CODE)]
         found: list[tuple[int, str, ast.Init, bool]] = []
         for offset, name, value in node.members:
+            if not name and not names and self._is_incomplete(t, scope):
+                break
             if not name and not names:
                 scope.error(offset, "arguments", self._without_name(t))
                 break

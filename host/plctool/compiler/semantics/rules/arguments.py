@@ -380,7 +380,7 @@ def referenced_place(
         return None
     if takes_array(t, place.type):
         return place
-    if isinstance(place.type, StructType) and not output and place.type.conforms(t):
+    if isinstance(place.type, StructType) and not output and place.type.may_conform(t):
         return place
     if not same_type(place.type, t) and not (
         isinstance(place.type, SubrangeType) and place.type.base is t and not output

@@ -293,6 +293,11 @@ def built_in_call(c: Checker, name: str, node: ast.Call, expected: Type | None) 
     return function.rule(c, Applied(name, args, node, expected))
 
 
+def is_built_in(name: str) -> bool:
+    """True for a function that the compiler knows itself; conversions are not among them."""
+    return any(name.upper() in known for known in (_FUNCTIONS, _OF_VARIABLES, _PLACES, QUERIES))
+
+
 def _place(c: Checker, name: str, node: ast.Call) -> Expr:
     """`__POUNAME()`: the name of the unit around; `__POSITION()`: line and column, as a text."""
     if node.args:
@@ -304,9 +309,13 @@ def _place(c: Checker, name: str, node: ast.Call) -> Expr:
 
 
 def function_hint(c: Checker, name: str) -> str:
-    """`; did you mean ADD?` for an unknown function, else nothing: what the program has comes first."""
+    """`; did you mean ADD?` for what is called and unknown, else nothing: what the program has comes first."""
+    symbols = (c.scope.outer | c.scope.names).values()
+    instances = [s.name for s in symbols if isinstance(s, VarSymbol) and s.type in c.world.blocks]
+    members = [] if c.scope.cls is None else c.scope.cls.member_names()
     return (
         conversion_hint(c, name.upper())
+        or known_name_like(name, [*instances, *members, *c.world.names.program_names()])
         or known_name_like(name, c.world.names.function_names())
         or known_name_like(name, [*_FUNCTIONS, *_OF_VARIABLES])
     )

@@ -85,7 +85,6 @@ def _flag_symbol(cls: ClassInfo | None, action: str) -> VarSymbol | None:
 _OWN = ("THIS", "SUPER")
 _ADDRESS = re.compile(r"([IQMEA])([XBWDL]?\d+)", re.IGNORECASE)
 _GLOBAL_LIST = re.compile(r"G_?VL\w*|GLOBALS?|\w*_GVL", re.IGNORECASE)
-_LIKE_A_FUNCTION = 0.8  # a name that is not called
 _FEW = 3  # lists that are named
 _DATA_BLOCK = re.compile(r"DB\d+", re.IGNORECASE)
 _DURATION = re.compile(r"T_?(\d+(?:ms|us|ns|s|m|h|d))", re.IGNORECASE)
@@ -191,10 +190,10 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
     if c.world.io.is_device_without_name(node.name):
         message = f'unknown name {node.name}; write name = "{node.name}" into the table of the device'
         return c.error(node.pos, "unknown", f"{message}, which makes it a variable")
-    functions = set(c.world.names.function_names())
-    others = set(c.world.names.visible_names()) - functions
-    hint = known_name_like(node.name, ({_written(c, n) for n in c.scope.names} | others) - {""})
-    hint = hint or known_name_like(node.name, functions, _LIKE_A_FUNCTION)
+    names = c.world.names
+    others = names.owner_names() if c.owner is node else names.value_names()
+    local = {_written(key, symbol) for key, symbol in (c.scope.outer | c.scope.names).items()}
+    hint = known_name_like(node.name, (local | set(others)) - {""})
     if not hint and (address := _ADDRESS.fullmatch(node.name)):
         area = {"E": "I", "A": "Q"}.get(address[1].upper(), address[1])
         message = f"unknown name {node.name}; an address begins with %: %{area}{address[2]}"
@@ -221,9 +220,8 @@ def _is_declared_below(c: Checker, node: ast.Name, of_programs: list[str]) -> bo
     return any(pos > node.pos and name.casefold() == node.name.casefold() for pos, name in names)
 
 
-def _written(c: Checker, key: str) -> str:
-    symbol = c.scope.names.get(key)
-    return symbol.name if isinstance(symbol, VarSymbol | GlobalSymbol) else key
+def _written(key: str, symbol: object) -> str:
+    return symbol.name if isinstance(symbol, VarSymbol | GlobalSymbol | MemberSymbol) else key
 
 
 def constant_of_block(c: Checker, symbol: object, name: str) -> VarSymbol | None:
@@ -288,6 +286,7 @@ def member_value(c: Checker, node: ast.Member, expected: Type | None) -> Expr:
     named = action_flag(c, node) or qualified(c, node)
     if named is not None:
         return named
+    c.owner = node.base
     base = c.expr(node.base)
     if base.type is ERROR:
         return base
