@@ -40,6 +40,19 @@ def test_check_and_build_show_warnings_unless_they_are_turned_off(tool: Any) -> 
     assert tool("build", "main.st", *off).err == ""
 
 
+@pytest.mark.parametrize("command", ["check", "build", "test"])
+def test_a_warning_ends_with_the_name_that_turns_it_off_and_an_error_does_not(
+    tool: Any, scratch: Path, command: str
+) -> None:
+    done = tool(command, "main.st")
+    lines = (done.out + done.err).splitlines()
+    assert "main.st:4:5: warning: spare is never used [unused]" in lines
+    assert "main.st:8:1: warning: this statement is never reached [unreachable]" in lines
+    (scratch / "main.st").write_text("PROGRAM Main\nVAR n : INT; END_VAR\nn := TRUE;\nEND_PROGRAM\n")
+    done = tool(command, "main.st")
+    assert not [line for line in (done.out + done.err).splitlines() if line.endswith("]")]
+
+
 @pytest.mark.parametrize("command", ["check", "build"])
 def test_the_first_of_many_warnings_of_a_kind_are_shown_and_the_rest_is_counted(
     tool: Any, scratch: Path, command: str
@@ -59,7 +72,8 @@ def test_the_first_of_many_warnings_of_a_kind_are_shown_and_the_rest_is_counted(
 def test_werror_fails_on_a_warning(tool: Any, scratch: Path, command: str) -> None:
     done = tool(command, "main.st", "--werror")
     assert done.status == 2
-    assert "main.st:8:1: error: this statement is never reached (an error because of --werror)" in done.out + done.err
+    said = "main.st:8:1: error: this statement is never reached (an error because of --werror) [unreachable]"
+    assert said in done.out + done.err
     assert not (scratch / "app.cdl").exists()
     assert tool(command, "main.st", "--werror", "--no-warn", "unused,unreachable").status == 0
 

@@ -13,7 +13,7 @@ from typing import Literal
 from plctool.compiler.missing_names import Use, library_of, table
 from plctool.compiler.source import Finding, Source
 from plctool.compiler.typed import Pos
-from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
+from plctool.compiler.warnings import ALL_WARNINGS, WARNINGS, LineRanges, switched_off
 from plctool.errors import UsageError, counted
 from plctool.errors import did_you_mean as did_you_mean
 from plctool.iec.dialect import OWN
@@ -26,6 +26,7 @@ MAX_OF_LIBRARY = 2  # places of names of one known library that are shown each; 
 MAX_OF_KIND = 20  # warnings of one kind that are shown each; the rest is counted
 MAX_MESSAGE = 300  # characters; names may be of any length
 _UNCOUNTED = frozenset(("language",))  # errors that hide no others
+_BY_OPTION = " (an error because of --werror)"
 MAX_LINE = 160  # characters of a source line that are shown with a finding
 
 
@@ -81,7 +82,7 @@ class Diagnostics:
         if self.is_quiet(pos.file) or code in self.options.disabled or any(a <= pos.line < b for a, b in muted):
             return
         if self.options.as_errors:
-            self._add(pos, "error", code, f"{message} (an error because of --werror)")
+            self._add(pos, "error", code, f"{message}{_BY_OPTION}")
         else:
             self._add(pos, "warning", code, message)
 
@@ -163,9 +164,12 @@ class SourceDiagnostics:
 
 
 def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
-    """`file.st:12:7: error: message`, and below it the source line with a caret when the file is among `sources`."""
+    """`file.st:12:7: error: message`, and below it the source line with a caret when the file is among `sources`. A
+    warning ends with its name: `[integer-division]`."""
     d = diagnostic
-    head = f"{d.file}:{d.line}:{d.column}: {d.severity}: {d.message}"
+    is_warning = d.severity == "warning" or d.message.endswith(_BY_OPTION)
+    name = f" [{d.code}]" if is_warning and d.code in WARNINGS else ""
+    head = f"{d.file}:{d.line}:{d.column}: {d.severity}: {d.message}{name}"
     source = next((s for s in sources if s.path == d.file), None)
     if source is None or not source.text:  # "" of a file that is no text
         return head
