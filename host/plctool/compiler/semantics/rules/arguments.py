@@ -131,7 +131,7 @@ def _is_true(node: ast.Expr) -> bool:
 def bind(
     c: Checker, args: list[ast.Argument], names: list[tuple[str, Direction]], what: str, offset: int
 ) -> dict[int, ast.Argument] | None:
-    """Arguments by index of their parameter, without the empty ones (`PT := `); None after an error."""
+    """Arguments by index of their parameter, without the empty ones (`PT := `, `Q => `); None after an error."""
     if c.scope.is_incomplete(what):
         return None
     if not args:
@@ -172,7 +172,7 @@ def bind(
             c.error(argument.pos, "arguments", f"{argument.name} is given with {arrow}")
             return None
         bound[i] = argument
-    return {i: argument for i, argument in bound.items() if argument.value is not None or argument.output}
+    return {i: argument for i, argument in bound.items() if argument.value is not None}
 
 
 def typed_call(
