@@ -271,7 +271,7 @@ def test_area_reaches_to_the_last_address() -> None:
     [
         ("v AT %QX0.9 : BOOL;", "not an address"),
         ("v AT %IX0.0 : INT;", "is a bit"),
-        ("v AT %IW0 : DINT;", "has 32 bits"),
+        ("v AT %IX2.0 : ARRAY[0..7] OF BOOL;", "is a bit, ARRAY[0..7] OF BOOL is not; write %IB2"),
         ("v AT %IB1 : ARRAY[0..1] OF DINT;", "multiple of 4"),
         ("v AT %IB70000 : BYTE;", "too far"),
     ],

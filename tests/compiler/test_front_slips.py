@@ -160,7 +160,6 @@ def test_a_slip_in_a_body(body: str, said: list[str]) -> None:
             "c @ %IX0.0 : BOOL;",
             "@ has no place in a program; a variable at an address is written name AT %IX0.0 : BOOL;",
         ),
-        ("c AT %ID0 : INT;", "INT has 16 bits, %ID0 32; write %IW and a number"),
         ("INT c[10];", "an array is declared c : ARRAY[0..9] OF INT;"),
         ("c : ARRAY[1..3][1..3] OF INT;", "an array of two dimensions is declared ARRAY[1..3, 1..3]"),
         ("c : INT RETAIN;", "variables of this kind are declared in VAR RETAIN ... END_VAR"),

@@ -106,6 +106,7 @@ def test_return_ends_a_unit() -> None:
         ("MAX(i, j).1 := b;", "1: the left side of := needs a variable"),
         ("i S= b;", "1: S= needs a BOOL variable, not INT"),
         ("b S= i;", "6: INT does not fit BOOL; write INT_TO_BOOL(...), or compare it: <> 0"),
+        ("b S= i R= b;", "6: R= needs a BOOL variable, not INT"),
         ("i X= b;", "3: X has no place here; an assignment is written :=, S= or R="),
         ("i REF= j;", "1: the left side of REF= is a REFERENCE TO, not INT"),
         ("nothing := 1;", "1: unknown name nothing"),

@@ -15,6 +15,7 @@ from plctool.errors import UsageError
 
 WARNINGS = {
     "access": "a VAR of a function block is read from outside",
+    "address": "a variable has another size than the letter of its address says, as in AT %ML0 : DWORD",
     "always": "a comparison gives the same for every value of its type",
     "assignment": "an assignment is used as a value, as in IF (a := 1) THEN",
     "bits": "a BYTE, WORD, DWORD or LWORD is taken for an unsigned number where a REAL is needed",

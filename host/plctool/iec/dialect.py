@@ -32,7 +32,7 @@ OWN = Dialect("")
 DIALECTS = {
     dialect.name: dialect
     for dialect in (
-        Dialect("iec", errors=frozenset(("enum",))),
+        Dialect("iec", errors=frozenset(("address", "enum"))),
         Dialect("codesys", limits_each_turn=True, reals_wrap=True, computes_in_32_bits=True),
         Dialect("twincat", limits_each_turn=True, reals_wrap=True, computes_in_32_bits=True),
     )

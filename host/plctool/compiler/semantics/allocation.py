@@ -44,6 +44,7 @@ class Allocation:
 # ---- addresses ----
 
 _LETTERS = {8: "B", 16: "W", 32: "D", 64: "L"}
+_AREA_AND_SIZE = "%IQMXBWDL"  # before the number of an address
 _NO_SUCH_BIT = re.compile(r"%[IQM]X?\d+\.([89]|[1-9]\d+)", re.IGNORECASE)
 MAX_ADDRESS = 0xFFFF  # the last byte an address such as %IB65535 reaches
 
@@ -79,15 +80,30 @@ def module_address(location: ast.DirectAddress | None) -> ModuleAddress | None:
 
 def misfit(t: Type, text: str, width: int) -> str:
     """Why a variable cannot be at an address of that width in bits (0: a single one); "" when it can."""
+    return not_a_place(t, text, width) or other_size(t, text, width)
+
+
+def not_a_place(t: Type, text: str, width: int) -> str:
+    """Why a bit cannot be at an address for bytes, or bytes at one for a bit; "" when it fits."""
     base = elementary(t)
     if width == 0 and base_of(t) is not BOOL:
         letter = "" if base is None else _LETTERS.get(base.bits, "")
-        return f"{text} is a bit, {t} is not" + (f"; write {text[:2]}{letter} and a number" if letter else "")
+        byte = f"B{text.strip(_AREA_AND_SIZE).partition('.')[0]}"
+        where = f"{text[:2]}{f'{letter} and a number' if letter else byte}"
+        return f"{text} is a bit, {t} is not; write {where}"
     if width not in (0, 8) and base is BOOL:
         return f"a BOOL is at a bit such as {text[:2]}X0.3, {text} has {width}"
-    if width and base is not None and base.bits != width:
-        return f"{t} has {base.bits} bits, {text} {width}; write {text[:2]}{_LETTERS[base.bits]} and a number"
     return ""
+
+
+def other_size(t: Type, text: str, width: int, offset: int = -1) -> str:
+    """What is to be said of a number at an address of another size; "" of one that fits. `offset`: the byte of it, if
+    that is known."""
+    base = elementary(t)
+    if not width or base is None or base.bits == width or base is BOOL:
+        return ""
+    number = f"{offset * 8 // base.bits}" if offset >= 0 and offset * 8 % base.bits == 0 else " and a number"
+    return f"{t} has {base.bits} bits, {text} {width}; write {text[:2]}{_LETTERS[base.bits]}{number}"
 
 
 def located(
@@ -97,7 +113,7 @@ def located(
     address = _read_address(location, scope)
     if address is None:
         return None
-    problem = misfit(t, location.text, address.width)
+    problem = not_a_place(t, location.text, address.width)
     if not problem and address.offset % t.align:
         problem = f"{t} needs an address that is a multiple of {t.align} bytes"
     elif address.offset + t.size > MAX_ADDRESS + 1:
@@ -105,6 +121,9 @@ def located(
     if problem:
         scope.error(location.pos, "location", problem)
         return None
+    other = other_size(t, location.text, address.width, address.offset)
+    if other and address.width != 8:  # %MB4 counts bytes, whatever is there
+        scope.warning(location.pos, "address", f"{other}, which is the same place")
     bit = address.bit if address.width == 0 else None
     return Variable(name, t, Storage.AREA, scope.pos(offset), address.area, address.offset, init, bit=bit)
 

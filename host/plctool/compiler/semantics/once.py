@@ -34,7 +34,7 @@ def kept_value(c: Checker, e: Expr, t: Type) -> tuple[Expr, Expr]:
     """A value that is needed twice, as one of `t`: the first time, and then."""
     if isinstance(e, Const) or c.scope.pou is None:
         return e, e
-    place = _hidden(c, t, e.pos)
+    place = hidden_place(c, t, e.pos)
     return AssignedValue(Assign(place, e, e.pos), t, e.pos), Load(place, t, e.pos)
 
 
@@ -43,12 +43,13 @@ def kept_place(c: Checker, place: Place) -> tuple[list[Assign], Place]:
     if c.scope.pou is None or not any(isinstance(part, Load | Call | DerefPlace) for part in walk(place)):
         return [], place
     pointer = PointerType(place.type)
-    kept = _hidden(c, pointer, place.pos)
+    kept = hidden_place(c, pointer, place.pos)
     address = AddressOf(place, pointer, place.pos)
     return [Assign(kept, address, place.pos)], DerefPlace(Load(kept, pointer, place.pos), place.type, place.pos)
 
 
-def _hidden(c: Checker, t: Type, pos: Pos) -> Place:
+def hidden_place(c: Checker, t: Type, pos: Pos) -> Place:
+    """A variable of the unit that the source does not name."""
     assert c.scope.pou is not None
     variable = Variable(f"%kept{len(c.scope.pou.locals)}", t, Storage.LOCAL, pos)
     c.scope.pou.locals.append(variable)

@@ -46,6 +46,9 @@ _IN_INTERFACE = {
 _OF_TESTS = (Kind.TEST, Kind.SETUP, Kind.TEARDOWN)
 _BLOCKS = (Kind.PROGRAM, Kind.FUNCTION_BLOCK, Kind.CLASS)
 
+_OF_INTERFACE = "what an INTERFACE declares is PUBLIC and to be implemented"
+
+_WITHOUT_EFFECT = frozenset((Modifier.FINAL, Modifier.INTERNAL, Modifier.PROTECTED))  # in an INTERFACE
 KEEPING = frozenset((Modifier.RETAIN, Modifier.NON_RETAIN, Modifier.PERSISTENT))
 _CONSTANT = frozenset((Modifier.CONSTANT,))
 _NONE = frozenset[Modifier]()
@@ -172,7 +175,11 @@ class _Check:
 
     def _modifiers(self, decl: ast.PouDecl, kind: Kind) -> None:
         given = decl.modifiers - {Modifier.CLASS}
-        for word in sorted(given - MODIFIERS[kind]):
+        without = given & _WITHOUT_EFFECT if kind in _IN_INTERFACE.values() else set()
+        for word in sorted(without):
+            self._warning(decl.pos, f"{_OF_INTERFACE}, so {word} has no effect here; leave it out")
+        decl.modifiers -= without
+        for word in sorted(given - without - MODIFIERS[kind]):
             self._error(decl.pos, _wrong_modifier(kind, word))
         access = sorted(given & ACCESS)
         if len(access) > 1:
@@ -244,7 +251,7 @@ def _wrong_section(kind: Kind, keyword: Section) -> str:
 
 def _wrong_modifier(kind: Kind, word: str) -> str:
     if kind in _IN_INTERFACE.values():
-        return f"what an INTERFACE declares is PUBLIC and to be implemented; leave out {word}"
+        return f"{_OF_INTERFACE}; leave out {word}"
     allowed = sorted(MODIFIERS[kind])
     return f"{with_article(kind)} cannot be {word}; it may be {listed(allowed, 'or')}"
 

@@ -162,15 +162,24 @@ class Binary:
 
 @dataclass(slots=True, eq=False)
 class Assigned:
-    """`(target := value)`: the target after the assignment."""
+    """`(target := value)`: the target after the assignment. `bare`: it is a whole condition, without parentheses."""
 
     pos: int
     target: Expr
     value: Expr
+    bare: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class TypeArgument:
+    """A type that is no name, as the argument of a call: `__NEW(POINTER TO INT)`."""
+
+    pos: int
+    spec: TypeSpec
 
 
 Value = Literal | Name | EnumValue | DirectAddress | Member | BitAccess | Index | Deref | Call
-Expr = Value | Unary | Binary | Assigned
+Expr = Value | Unary | Binary | Assigned | TypeArgument
 
 # ---- initial values ------------------------------------------------------------------------------------------------
 
@@ -579,12 +588,14 @@ class Assigning(StrEnum):
 
 @dataclass(slots=True, eq=False)
 class Assign:
-    """`targets[0] := targets[1] := ... := value`. `pos` is that of the operator."""
+    """`targets[0] := targets[1] := ... := value`. `pos` is that of the operator. `others`: the further targets of
+    `a S= b R= value`, each with its operator."""
 
     pos: int
     targets: list[Expr]
     op: Assigning
     value: Expr
+    others: list[tuple[Assigning, Expr]] = field(default_factory=list)
 
 
 @dataclass(slots=True, eq=False)
@@ -681,9 +692,9 @@ class Jump:
 
 @dataclass(slots=True, eq=False)
 class Catch:
-    """`__CATCH(var)` with its statements."""
+    """`__CATCH(var)` with its statements; `var` may be missing."""
 
-    var: Expr
+    var: Expr | None
     body: list[Stmt]
 
 

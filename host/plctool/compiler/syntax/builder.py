@@ -450,15 +450,30 @@ class Builder:
             return [target, *value[0]], value[1]
         return [target], value
 
-    def assign_with(self, target: ast.Expr, op: Token, _equals: Token, value: ast.Expr) -> ast.Assign | None:
-        name = op.text.upper()
-        if name not in ("S", "R", "REF"):
-            message = f"{op.text} has no place here; an assignment is written :=, S= or R="
-            if isinstance(target, ast.Name) and target.name.upper() in ELEMENTARY:
-                message = f"variables are declared in VAR ... END_VAR before the statements: {op.text} : {target.name};"
-            self.report(op.pos, "syntax", message)
+    def assign_with(self, target: ast.Expr, op: Token, _equals: Token, value: Any) -> ast.Assign | None:
+        sign = self._assigning(target, op)
+        others, value = value if type(value) is tuple else ([], value)
+        if sign is None or any(other is None for other, _ in others):
             return None
-        return ast.Assign(op.pos, [target], ast.Assigning(name + "="), value)
+        if others and ast.Assigning.REFERENCE in (sign, *(other for other, _ in others)):
+            self.report(op.pos, "syntax", "REF= stands alone; write a statement for each reference")
+            return None
+        return ast.Assign(op.pos, [target], sign, value, others)
+
+    def set_chain(self, target: ast.Expr, op: Token, _equals: Token, value: Any) -> tuple[list[Any], ast.Expr]:
+        others, value = value if type(value) is tuple else ([], value)
+        return [(self._assigning(target, op), target), *others], value
+
+    def _assigning(self, target: ast.Expr, op: Token) -> ast.Assigning | None:
+        """The sign that begins with a name; None after an error."""
+        name = op.text.upper()
+        if name in ("S", "R", "REF"):
+            return ast.Assigning(name + "=")
+        message = f"{op.text} has no place here; an assignment is written :=, S= or R="
+        if isinstance(target, ast.Name) and target.name.upper() in ELEMENTARY:
+            message = f"variables are declared in VAR ... END_VAR before the statements: {op.text} : {target.name};"
+        self.report(op.pos, "syntax", message)
+        return None
 
     def attempt(self, target: ast.Expr, op: Token, value: ast.Expr) -> ast.Assign:
         return ast.Assign(op.pos, [target], ast.Assigning(op.text), value)
@@ -518,7 +533,7 @@ class Builder:
     ) -> ast.Try:
         return ast.Try(keyword.pos, body, catch, last)
 
-    def catch(self, var: ast.Expr, body: list[ast.Stmt]) -> ast.Catch:
+    def catch(self, var: ast.Expr | None, body: list[ast.Stmt]) -> ast.Catch:
         return ast.Catch(var, body)
 
     def return_stmt(self, keyword: Token, condition: ast.Expr | None) -> ast.Return:
@@ -542,6 +557,11 @@ class Builder:
         assigned = ast.Assigned(last.pos, last, source)
         for place in reversed(others):
             assigned = ast.Assigned(place.pos, place, assigned)
+        return assigned
+
+    def assigned_condition(self, target: ast.Expr, value: Any) -> ast.Assigned:
+        assigned = self.assigned(target, value)
+        assigned.bare = True
         return assigned
 
     def number(self, token: Token) -> ast.Literal:
@@ -622,6 +642,9 @@ class Builder:
 
     def positional(self, value: ast.Expr) -> ast.Argument:
         return ast.Argument(value.pos, None, value)
+
+    def type_argument(self, spec: ast.TypeSpec) -> ast.Argument:
+        return ast.Argument(spec.pos, None, ast.TypeArgument(spec.pos, spec))
 
     def input(self, name: Token, value: ast.Expr | None = None) -> ast.Argument:
         return ast.Argument(name.pos, name.text, value)

@@ -228,7 +228,6 @@ _HINTS = (
           "an input that is a reference is given with :=, as others are: {name} := {value}", "", "body"),
     _Hint(r"\bARRAY\s*\[\s*(?P<count>\d+)\s*\]", _count),
     _Hint(r":=\s*(?P<here>\{(?P<values>[^{};']*)\}\s*)", _list, "here"),
-    _Hint(r"\b(?:IF|ELSIF|WHILE|UNTIL)\b[^;]*?(?P<here>:=)", "a comparison is written =; := assigns", "here"),
     _Hint(r"[^'\s(,=](?P<here>'(?='))", slips.QUOTE, "here"),
     _Hint(r"\\(?P<here>'[ \t]*)", slips.QUOTE, "here", ends=True),
     _Hint(r"'[^'\n]*'(?P<here>[A-Za-z][^'\n]*)'", slips.QUOTE, "here", ends=True),

@@ -28,6 +28,7 @@ from plctool.compiler.typed import (
     StructInit,
     VarPlace,
     array_runs,
+    overlay,
     struct_members,
 )
 from plctool.iec.types import MAX_SIZE, ArrayType, ReferenceType, StringType, StructType, Type
@@ -226,18 +227,31 @@ class InitialValues:
         return input_value(c, node, t, name)
 
 
-def with_arguments(decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
-    """Type and initial value with what is written in brackets after the type of an array: `F[(1), (2)]`."""
-    spec, init = decl.type, decl.init
-    given: ast.Init | None = None
+def with_arguments(decl: ast.VarDecl) -> tuple[ast.TypeSpec, list[ast.Init]]:
+    """Type and initial values: what is written in brackets after the type of an array, `F[(1), (2)]`, comes first."""
+    spec = decl.type
+    given: list[ast.Init] = []
     if isinstance(spec, ast.ArraySpec) and isinstance(spec.element, ast.NamedType):
         element = spec.element
         if element.inits is not None:
-            given = ast.ArrayInit(element.inits.pos, [_of_instance(item) for item in element.inits.items])
+            given.append(ast.ArrayInit(element.inits.pos, [_of_instance(item) for item in element.inits.items]))
             spec = ast.ArraySpec(spec.pos, spec.bounds, ast.NamedType(element.pos, element.name))
-    if given is not None and init is not None:
-        scope.error(init.pos, "duplicate", "there are two initial values; write the second one into the first")
-    return spec, given or init
+    return spec, given if decl.init is None else [*given, decl.init]
+
+
+def combined(t: Type, first: Initial, second: Initial) -> Initial:
+    """Both initial values, element by element of an array; where both say something, the second one."""
+    if not isinstance(t, ArrayType):
+        return overlay(t, second, first)
+    runs: list[tuple[int, Initial | None]] = []
+    ones, others = list(array_runs(t, first)), list(array_runs(t, second))
+    while ones and others:
+        (count, one), (other_count, other) = ones[0], others[0]
+        taken = min(count, other_count)
+        runs.append((taken, overlay(t.element, other, one) if one and other else other or one))
+        ones[:1] = [(count - taken, one)] if count > taken else []
+        others[:1] = [(other_count - taken, other)] if other_count > taken else []
+    return ArrayInit(runs)
 
 
 def _of_instance(item: ast.Init | ast.Repeat) -> ast.Init | ast.Repeat:

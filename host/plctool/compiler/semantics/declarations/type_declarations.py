@@ -15,7 +15,7 @@ from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.allocation import is_open
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.declarations.initial_values import InitialValues, with_arguments
+from plctool.compiler.semantics.declarations.initial_values import InitialValues, combined, with_arguments
 from plctool.compiler.semantics.declarations.number_types import enumeration, subrange, values_of
 from plctool.compiler.semantics.generics import is_group
 from plctool.compiler.semantics.instances import require_instances
@@ -92,17 +92,18 @@ class TypeDeclarations:
     ) -> tuple[Type, Initial | None]:
         overrides = overrides or decl.location is not None
         self._check_extras(decl, may, scope)
-        spec, init = with_arguments(decl, scope)
+        spec, inits = with_arguments(decl)
         if isinstance(spec, ast.ArraySpec) and None in spec.bounds and May.BE_OPEN_ARRAY in may:
             return self._open_array(spec, scope), None
         t, default = self.type_of(spec, scope)
         if decl.edge and t is not BOOL and t is not ERROR:
             scope.error(spec.pos, "type", f"{decl.edge} is for a BOOL, not for {t}")
-        if init is None or t is ERROR:
+        values = [] if t is ERROR else [self._initials.initial(init, t, scope) for init in inits]
+        if not values or values[0] is None:
             return t, default
-        given = self._initials.initial(init, t, scope)
-        if given is None:
-            return t, default
+        given = values[0]
+        if len(values) > 1 and values[1] is not None:
+            given = combined(t, given, values[1])
         if default is None and not overrides and given == ScalarInit(0) and str(given.value) != "-0.0":
             return t, None
         return t, overlay(t, given, default)

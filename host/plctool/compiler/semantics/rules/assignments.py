@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from plctool.compiler.semantics.checker import Checker, checks, checks_statement
-from plctool.compiler.semantics.conversions import error_value
+from plctool.compiler.semantics.conversions import elementary, error_value
 from plctool.compiler.semantics.once import calls, kept_value
 from plctool.compiler.semantics.rules.arguments import has_enable, input_value, parameter_names
 from plctool.compiler.semantics.rules.builtin import attempt
@@ -55,6 +55,8 @@ def assigned_value(c: Checker, node: ast.Assigned, expected: Type | None) -> Exp
     pos = c.pos(node.pos)
     if isinstance(expected, StructType) and isinstance(node.target, ast.Name) and expected.member(node.target.name):
         return c.error(node.pos, "type", "values by name are for declarations and calls; assign the members one by one")
+    if node.bare and (t := c.expr(node.target).type) is not ERROR and elementary(t) is not BOOL:
+        return c.error(node.pos, "type", "a comparison is written =; := assigns")
     assignment = _assign_one(c, node.target, node.value, pos)
     if not isinstance(assignment, Assign):
         if assignment is not None:
@@ -113,14 +115,29 @@ def _assign_reference(c: Checker, node: ast.Assign) -> list[Statement]:
 
 
 def _set_or_reset(c: Checker, node: ast.Assign) -> list[Statement]:
-    """`x S= condition` sets x and never resets it."""
-    place = changeable_place(c, node.targets[0], f"the left side of {node.op}", "be assigned to")
-    condition = c.condition(node.value)
-    if place is None or condition.type is ERROR:
-        return []
-    if place.type is not BOOL:
-        c.error(node.targets[0].pos, "type", f"{node.op} needs a BOOL variable, not {place.type}")
-        return []
+    """`x S= condition` sets x and never resets it; in `x S= y R= condition` each target heeds the condition."""
     pos = c.pos(node.pos)
-    change = Assign(place, Const(int(node.op is ast.Assigning.SET), BOOL, pos), pos)
-    return [If([(condition, [change])], [], pos)]
+    targets = [(node.op, node.targets[0]), *node.others]
+    changes = [_changed(c, op, target, pos) for op, target in reversed(targets)]
+    condition = c.condition(node.value)
+    found = [change for change in changes if change is not None]
+    if condition.type is ERROR or len(found) < len(changes):
+        return []
+    return [If([(condition, list(found))], [], pos)]
+
+
+def _changed(c: Checker, op: ast.Assigning, target: ast.Expr, pos: Pos) -> Assign | None:
+    """What S= or R= does where the condition is TRUE; None after an error."""
+    place = changeable_place(c, target, f"the left side of {op}", "be assigned to")
+    if place is None:
+        return None
+    if place.type is not BOOL:
+        c.error(target.pos, "type", f"{op} needs a BOOL variable, not {place.type}")
+        return None
+    return Assign(place, Const(int(op is ast.Assigning.SET), BOOL, pos), pos)
+
+
+@checks(ast.TypeArgument)
+def type_argument(c: Checker, node: ast.TypeArgument, expected: Type | None) -> Expr:
+    """A type where a value is wanted; what takes a type does not ask for its value."""
+    return c.error(node.pos, "type", "this is a type, but a value is needed here")

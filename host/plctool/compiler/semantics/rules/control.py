@@ -14,6 +14,7 @@ from plctool.compiler.semantics.conversions import elementary, is_untyped, whole
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.labels import Labels
 from plctool.compiler.semantics.loop_bounds import known_values, passed_bounds
+from plctool.compiler.semantics.once import hidden_place
 from plctool.compiler.semantics.pitfalls import has_exit
 from plctool.compiler.semantics.rules.jumps import note_loops, report_leaving, report_repeated
 from plctool.compiler.semantics.rules.places import changeable_place
@@ -421,17 +422,20 @@ def try_statement(c: Checker, node: ast.Try) -> list[Statement]:
         message = "this __TRY has no __CATCH; write __CATCH(exc), exc : __SYSTEM.ExceptionCode, and what to do then"
         c.error(node.pos, "statement", message)
     body = check_body(c, node.body)
-    exception = None if node.catch is None else _exception(c, node.catch.var)
+    exception = None if node.catch is None else _exception(c, node.catch.var, node.pos)
     caught = [] if node.catch is None else check_body(c, node.catch.body)
     return [Try(body, exception, caught, _last(c, node.last or []), pos)]
 
 
-def _exception(c: Checker, node: ast.Expr) -> Place | None:
-    """The variable that takes the number of an exception."""
-    place = changeable_place(c, node, "__CATCH", "take the number of an exception")
+def _exception(c: Checker, node: ast.Expr | None, offset: int) -> Place | None:
+    """The variable that takes the number of an exception; without one in the source, one of its own."""
     wanted = c.world.names.unit("exceptioncode", library=True)
     assert isinstance(wanted, TypeSymbol)
-    if place is None or place.type is c.world.declared.type_of(wanted):
+    t = c.world.declared.type_of(wanted)
+    if node is None:
+        return hidden_place(c, t, c.pos(offset))
+    place = changeable_place(c, node, "__CATCH", "take the number of an exception")
+    if place is None or place.type is t:
         return place
     c.error(node.pos, "type", f"__CATCH needs a variable of __SYSTEM.ExceptionCode, not of {place.type}")
     return None
