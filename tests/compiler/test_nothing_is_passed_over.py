@@ -4,6 +4,7 @@ unit, every qualifier of a section, every modifier of a unit, every attribute, p
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -330,6 +331,28 @@ def test_an_attribute_that_changes_nothing_says_nothing(name: str) -> None:
 def test_a_misspelt_attribute_is_a_warning(written: str, meant: str) -> None:
     said = f"{{attribute '{written}'}} has no effect here: did you mean '{meant}'?"
     assert effects(written, "enumeration") == [("warning", said)]
+
+
+@pytest.mark.parametrize("name", ["call_on_start", "run_after_init2", "execute_on_stop"])
+def test_an_unknown_attribute_about_when_something_runs_is_a_warning(name: str) -> None:
+    ((severity, message),) = effects(name, "FUNCTION")
+    assert severity == "warning" and message.startswith(f"{{attribute '{name}'}} has no effect here: call it")
+
+
+def test_a_symbol_that_all_may_read_and_write_is_as_it_is_here() -> None:
+    for value, said in (("readwrite", 0), ("ReadWrite", 0), ("read", 1), ("none", 1), ("write", 1)):
+        text = f"VAR_GLOBAL\n{{attribute 'symbol' := '{value}'}}\na : INT;\nEND_VAR\n{MAIN}"
+        assert sum("'symbol'" in d.message for d in check(text).diagnostics) == said, value
+
+
+def test_the_documentation_lists_every_attribute() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "language.md").read_text()
+    section = page.partition("\n## Attributes\n")[2].partition("\n## ")[0]
+    rows = [line for line in section.splitlines() if line.startswith("| ")][1:]
+    listed = [set(re.findall(r"`([^`]+)`", line.split("|")[2])) for line in rows]
+    assert listed[0] == set(attributes.HEEDED)
+    assert listed[1] == set(attributes.UNHEEDED) | {"call_on_start"}
+    assert listed[2] == set(attributes.SILENT)
 
 
 def test_every_attribute_the_compiler_reads_is_in_the_tables() -> None:

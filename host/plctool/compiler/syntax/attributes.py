@@ -21,7 +21,7 @@ Repeated = dict[int, list[tuple[int, str, str]]]
 HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
     "pack_mode": frozenset(("STRUCT",)),
-    "pool": frozenset(("STRUCT", "FUNCTION_BLOCK")),
+    "pool": frozenset(("STRUCT", "FUNCTION_BLOCK", "TYPE", "enumeration")),
     "strict": frozenset(("enumeration",)),
     "to_string": frozenset(("enumeration",)),
     "call_after_init": frozenset(("FUNCTION_BLOCK", "METHOD")),
@@ -46,10 +46,12 @@ REFUSED = {
 """What leaves a unit without its code where it is not heeded."""
 
 _LAYOUT = "members are at multiples of their size, or of 8 bytes"
+_ALL_SYMBOLS = "plctool reads and writes every variable by name; a password limits who may write"
 _CALL_IT = "call it in the first cycle, or do its work in FB_Init"
 UNHEEDED = {
     "call_after_global_init_slot": _CALL_IT,
     "call_before_global_exit_slot": "write FB_Exit",
+    "contextname": "inputs and outputs are those of the task whose programs use them",
     "global_init_slot": "variables get their initial values in the order of their declarations",
     "init_namespace": "give the string itself as the initial value",
     "initialize_on_call": "assign the inputs in the call",
@@ -63,14 +65,18 @@ UNHEEDED = {
     "no_check": "--checks chooses which checks are compiled in",
     "no_virtual_actions": "actions of a derived block override those of its base",
     "c++_compatible": _LAYOUT,
+    "parameterstringof": "give the string itself as an argument",
     "relative_offset": _LAYOUT,
     "subsequent": "write a STRUCT, whose members follow each other",
     "tccallafteroutputupdate": "inputs are read before the programs and outputs are written after them",
+    "symbol": _ALL_SYMBOLS,
+    "tccontextid": "inputs and outputs are those of the task whose programs use them",
     "tccontextname": "inputs and outputs are those of the task whose programs use them",
     "tcinitonreset": "every variable but RETAIN and PERSISTENT is initialised at a reset",
     "tcinitsymbol": "give the initial value in the declaration",
     "tclinkto": "write AT %I* or %Q*, and the address in VAR_CONFIG",
     "tcnodeid": "write AT %I* or %Q*, and the address in VAR_CONFIG",
+    "tcnosymbol": _ALL_SYMBOLS,
     "tcpersistent": "write VAR PERSISTENT",
     "tcretain": "write VAR RETAIN",
     "tcignorepersistent": "every PERSISTENT variable is restored",
@@ -84,21 +90,23 @@ UNHEEDED = {
 SILENT = frozenset((
     "analysis", "analysis:report-multiple-instance-calls", "blobinit", "blobinitconst", "call_after_online_change_slot",
     "call_on_type_change", "conditionalshow", "conditionalshow_all_locals", "const_non_replaced", "const_replaced",
-    "contextname", "dataflow", "displaymode", "doc", "enable_dynamic_creation", "estimated-stack-usage", "expandfully",
+    "dataflow", "displaymode", "doc", "enable_dynamic_creation", "estimated-stack-usage", "expandfully",
     "generate_implicit_init_function", "global_init_on_onlchange", "guid", "hide", "hide_all_locals", "hide_subitems",
     "icon", "implicit", "init_on_onlchange", "io_function_block", "io_function_block_mapping", "libraryplaceholder",
     "library_license", "licensed", "linkalways", "max", "min", "monitoring", "monitoring_instead", "naming",
     "nameprefix", "namespace", "no_assign_warning", "no_copy", "no_explicit_call",
-    "no_instance_in_retain", "no_override", "object_name", "obsolete", "parameterstringof",
+    "no_instance_in_retain", "no_override", "object_name", "obsolete",
     "pin_presentation_order_inputs", "pin_presentation_order_outputs", "pingroup", "processvalue", "pytmc",
-    "reflection", "signature_flag", "symbol", "sysobject", "tc2gvlvarnames",
-    "tccontextid", "tcdisplayscale", "tcdisplaytypeguid", "tcencapsulate", "tcnosymbol",
+    "reflection", "signature_flag", "sysobject", "tc2gvlvarnames",
+    "tcdisplayscale", "tcdisplaytypeguid", "tcencapsulate",
     "tctypesystem", "unit", "usage", "warning",
 ))  # fmt: skip
 """What changes nothing that a program does."""
 
 _NO_INIT = ("noinit", "no-init", "no_init")  # goes with instance-path: the initial value is the path
 
+_READ_WRITE = "readwrite"  # {attribute 'symbol'} says what is so here
+_WHEN_CALLED = re.compile(r"(call|run|execute)_(on|at|after|before|in)_\w+")
 _TEXT_PRAGMA = re.compile(r"\{\s*(error|warning)\s+'([^']*)'\s*\}", re.IGNORECASE)
 _IN_C = re.compile(r"\{\s*external\b[^{}]*\}", re.IGNORECASE)
 _FLAG = re.compile(r"\{\s*flag\b[^{}]*\bnoinit\b[^{}]*\}", re.IGNORECASE)
@@ -136,7 +144,7 @@ def _check(name: str, place: str, offset: int, given: Mapping[str, str], reports
         reports.error(offset, "attribute", f"{REFUSED[name]}{where}")
     elif name in HEEDED:
         reports.warning(offset, "no-effect", _no_effect(name, f"it is written before {_listed(name)}"))
-    elif name in UNHEEDED and not (name in _NO_INIT and "instance-path" in given):
+    elif name in UNHEEDED and not _is_so_here(name, given):
         reports.warning(offset, "no-effect", _no_effect(name, UNHEEDED[name]))
     elif name in OF_THE_LIBRARY:
         reports.warning(offset, "no-effect", _no_effect(name, "it is for the standard library"))
@@ -144,6 +152,15 @@ def _check(name: str, place: str, offset: int, given: Mapping[str, str], reports
         meant = get_close_matches(name, [*HEEDED, *UNHEEDED], n=1, cutoff=0.8)
         if meant:
             reports.warning(offset, "no-effect", _no_effect(name, f"did you mean '{meant[0]}'?"))
+        elif _WHEN_CALLED.fullmatch(name):
+            reports.warning(offset, "no-effect", _no_effect(name, _CALL_IT))
+
+
+def _is_so_here(name: str, given: Mapping[str, str]) -> bool:
+    """True if an attribute asks for what is done without it."""
+    if name == "symbol":
+        return given[name].strip().lower() == _READ_WRITE
+    return name in _NO_INIT and "instance-path" in given
 
 
 def _listed(name: str) -> str:
