@@ -40,6 +40,7 @@ WARNINGS = {
     "not": "NOT inverts a number that is compared, as in NOT a = 5",
     "overlap": "two variables with AT share memory, and neither is a bit of the other",
     "pointer": "a pointer becomes a pointer to something else",
+    "pool": "__NEW needs memory for a type without {attribute 'pool'}: how much is reserved",
     "pragma": "what {warning 'text'} says",
     "precision": "digits are lost: a large number becomes REAL, a duration or time is finer than its type",
     "recursion": "a call through a pointer or an interface may lead back to its caller",

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from plctool.compiler.semantics.construction import Construction, Destruction
-from plctool.compiler.semantics.conversions import whole
+from plctool.compiler.semantics.conversions import same_type, whole
 from plctool.compiler.semantics.symbols import PouSymbol
 from plctool.compiler.semantics.world import Pool, World
 from plctool.compiler.typed import (
@@ -36,6 +36,7 @@ from plctool.compiler.typed import (
     PouKind,
     Statement,
     Storage,
+    StructInit,
     Try,
     Unary,
     UnaryOp,
@@ -43,44 +44,79 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.typed_nodes import callees, walk
-from plctool.iec.types import BOOL, BYTE, DINT, ArrayType, PointerType, RawPointerType, StructType, Type
+from plctool.iec.types import BOOL, BYTE, DINT, MAX_SIZE, ArrayType, PointerType, RawPointerType, StructType, Type
 
 MAX_ELEMENTS = 65535
+DEFAULT_ELEMENTS = 8  # of a type without {attribute 'pool'}
+DEFAULT_ROWS = 4  # as many times n for the largest __NEW(T, n)
+DEFAULT_OF_VARIABLE = 64  # where n is not constant
 
 
-def pool_of(world: World, t: StructType, count: int, pos: Pos) -> Pool:
-    """The pool of a type, declared at `pos`."""
+def pool_of(world: World, t: Type, pos: Pos) -> Pool:
+    """The pool of a type, which __NEW at `pos` needs."""
     pool = world.pools.get(t)
     if pool is None:
-        create = _function(f"__NEW({t.name})", RawPointerType(t), pos, ("n", DINT))
-        elements = Variable(f"__pool.{t.name}", ArrayType(t, ((0, count - 1),)), Storage.AREA, pos)
-        state = Variable(f"__pool.{t.name}.state", ArrayType(DINT, ((0, count - 1),)), Storage.AREA, pos)
-        pool = world.pools[t] = Pool(t, count, elements, state, create)
-        for variable in (elements, state):
-            world.allocation.add(variable)
+        elements = Variable(f"__pool.{t}", ArrayType(t, ((0, 0),)), Storage.AREA, pos)
+        state = Variable(f"__pool.{t}.state", ArrayType(DINT, ((0, 0),)), Storage.AREA, pos)
+        pool = world.pools[t] = Pool(t, pos, elements, state)
         for name in _LIBRARY:
             _library(world, name)
         closer_of(world, t, pos)
     return pool
 
 
-def closer_of(world: World, t: StructType, pos: Pos) -> Pou:
+def creator_of(pool: Pool, start: Variable | None, inputs: list[tuple[str, Type]], pos: Pos) -> Pou:
+    """The function that takes elements, which are copies of `start`, and gives their FB_Init these inputs."""
+    names = tuple(name.casefold() for name, _ in inputs)
+    if (start, names) not in pool.creators:
+        shown = str(pool.type) if start is None else start.name.removeprefix("default of ")
+        name = f"__NEW({', '.join([shown, *names])})"
+        pool.creators[start, names] = _function(name, RawPointerType(pool.type), pos, ("n", DINT), *inputs)
+    return pool.creators[start, names]
+
+
+def closer_of(world: World, t: Type, pos: Pos) -> Pou:
     """The function that ends what __NEW made of a type or of those derived from it: whether it was that."""
     closer = world.closers.get(t)
     if closer is None:
-        closer = world.closers[t] = _function(f"__DELETE({t.name})", BOOL, pos, ("p", RawPointerType(BYTE)))
+        closer = world.closers[t] = _function(f"__DELETE({t})", BOOL, pos, ("p", RawPointerType(BYTE)))
     return closer
 
 
+def _conforms(t: Type, wanted: Type) -> bool:
+    return same_type(t, wanted) or (isinstance(t, StructType) and t.conforms(wanted))
+
+
+def _reserve(world: World, pool: Pool) -> None:
+    """Gives a pool its memory; says how much it is where no attribute says it."""
+    size = pool.count * pool.type.size
+    if size > MAX_SIZE:
+        message = f"a pool of {pool.count} {pool.type} with {pool.type.size} bytes each is too large"
+        world.diagnostics.error(pool.pos, "size", message)
+        return
+    if not pool.declared:
+        own = isinstance(pool.type, StructType)
+        where = "before its declaration" if own else f"before a TYPE that is {pool.type}, and give __NEW that type"
+        room = f"{pool.type} has no pool, so there is room for {pool.count} of them ({size} bytes)"
+        message = f"{room}; for another number write {{attribute 'pool' := '{pool.count}'}} {where}"
+        world.diagnostics.warning(pool.pos, "pool", message)
+    for variable, t in ((pool.elements, pool.type), (pool.state, DINT)):
+        variable.type = ArrayType(t, ((0, pool.count - 1),))
+        world.allocation.add(variable)
+
+
 def write_pools(world: World) -> None:
-    """Writes the functions of all pools."""
+    """Gives all pools their memory and writes their functions."""
+    creators: list[Pou] = []
     for pool in world.pools.values():
-        _Writer(world, pool.create).create(pool)
-        world.pous.append(pool.create)
+        _reserve(world, pool)
+        for (start, _), creator in pool.creators.items():
+            _Writer(world, creator).create(pool, start)
+            creators.append(creator)
     for t, closer in world.closers.items():
-        _Writer(world, closer).close([pool for of, pool in world.pools.items() if of.conforms(t)])
-        world.pous.append(closer)
-    for pou in [*(pool.create for pool in world.pools.values()), *world.closers.values()]:
+        _Writer(world, closer).close([pool for of, pool in world.pools.items() if _conforms(of, t)])
+    world.pous += [*creators, *world.closers.values()]
+    for pou in [*creators, *world.closers.values()]:
         for node in walk(pou.body):
             for callee in callees(node):
                 world.calls.add(pou, callee, pou.pos)
@@ -113,17 +149,20 @@ class _Writer:
     world: World
     pou: Pou
 
-    def create(self, pool: Pool) -> None:
-        """Takes elements, gives them their initial values and calls FB_Init; those taken are free again when that
-        raises."""
+    def create(self, pool: Pool, start: Variable | None) -> None:
+        """Takes elements, gives them their initial values, or that of `start`, and calls FB_Init; those taken are free
+        again when that raises."""
         pos, number = self.pou.pos, self.pou.parameters[0].variable
         first, element = self._local("first", DINT), self._local("element", DINT)
         taken = self._call("POOL_TAKE__", DINT, self._state(pool), _number(pool.count, pos), _load(number))
         place = self._element(pool, _load(element))
         construction = Construction(self.world, self.pou, Const(1, BOOL, pos))
-        special = construction.place(place, None, pos, None, pool.type.name)
+        given = {p.variable.name.casefold(): _load(p.variable) for p in self.pou.parameters[1:]}
+        initial = StructInit({}, dict(given)) if given else None
+        special = construction.place(place, initial, pos, None, str(pool.type))
         last = Binary(BinaryOp.ADD, _load(first), self._less_one(_load(number)), DINT, pos)
-        fresh: Statement = self._loop(element, _load(first), last, [Initialise(place, pos), *special])
+        filled = Initialise(place, pos) if start is None else Assign(place, _load(start), pos)
+        fresh: Statement = self._loop(element, _load(first), last, [filled, *special])
         opened = self._do("POOL_OPEN__", BOOL, self._state(pool), _load(first), _load(number))
         assert self.pou.result is not None
         address = AddressOf(self._element(pool, _load(first)), self.pou.result.type, pos)

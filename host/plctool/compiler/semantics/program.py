@@ -52,6 +52,7 @@ class Program:
         world.declared = Declared(
             type_of=self.types.type_of_symbol,
             type_named=self.types.named_type,
+            type_written=lambda spec, scope: self.types.type_of(spec, scope)[0],
             variable=self.variables.global_variable,
             function=self._functions.function,
             member=self._classes.signature,

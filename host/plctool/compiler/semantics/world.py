@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.library import Library
@@ -35,7 +35,7 @@ from plctool.compiler.semantics.symbols import (
 )
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Call, Const, Expr, Pou, ScalarInit, Storage, StructInit, Variable
+from plctool.compiler.typed import Call, Const, Expr, Initial, Pos, Pou, ScalarInit, Storage, StructInit, Variable
 from plctool.iec.dialect import OWN
 from plctool.iec.types import WCHAR, EnumType, InterfaceType, StructType, Type
 
@@ -77,6 +77,7 @@ class Declared:
 
     type_of: Callable[[TypeSymbol], Type]
     type_named: Callable[[int, str, Scope], Type]  # ERROR after an error
+    type_written: Callable[[ast.TypeSpec, Scope], Type]
     variable: Callable[[GlobalSymbol], VarSymbol]
     function: Callable[[PouSymbol, dict[str, Type]], FunctionInfo | None]  # None while it is being declared
     member: Callable[[Member], FunctionInfo]
@@ -88,15 +89,25 @@ class Declared:
 # ---- what __NEW takes ----
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Pool:
-    """The elements of a type for __NEW, with the state of each of them. `create`: takes and initialises them."""
+    """The elements of a type for __NEW, with the state of each of them. `pos` is where it is needed first; `declared`:
+    how many elements the attribute of the type says, 0 without one, `asked`: the default for what calls of __NEW need.
+    `creators` take and initialise elements; by what those start with, unless the type says it, and by the inputs of
+    FB_Init, case-folded, that they get."""
 
-    type: StructType
-    count: int
+    type: Type
+    pos: Pos
     elements: Variable
     state: Variable
-    create: Pou
+    declared: int = 0
+    asked: int = 0
+    creators: dict[tuple[Variable | None, tuple[str, ...]], Pou] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """How many elements there are; final when all bodies are checked."""
+        return self.declared or self.asked
 
 
 # ---- the check of one program ----
@@ -126,10 +137,10 @@ class World:
         self.shared: dict[tuple[str, str, int, frozenset[tuple[str, Type]]], Variable] = {}
         self.enumeration_texts: dict[EnumType, PouSymbol] = {}  # what gives the names of values
         self._texts: dict[tuple[int | float | str, Type], Variable] = {}
-        self._parameter_defaults: dict[VarSymbol, Variable] = {}
+        self._defaults_in_memory: dict[VarSymbol | TypeSymbol, Variable] = {}
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
-        self.pools: dict[StructType, Pool] = {}
-        self.closers: dict[StructType, Pou] = {}  # what ends the elements that a POINTER TO the type leads to
+        self.pools: dict[Type, Pool] = {}
+        self.closers: dict[Type, Pou] = {}  # what ends the elements that a POINTER TO the type leads to
         self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
         self.pous: list[Pou] = []
         self.loops: list[tuple[Pou, Loop]] = []  # of the program, each with the unit it stands in
@@ -154,11 +165,24 @@ class World:
     def default_of(self, symbol: VarSymbol, pou: Pou) -> Variable:
         """What a parameter of `pou` that is a structure or an array holds when a call leaves it out: a constant in
         memory."""
-        variable = self._parameter_defaults.get(symbol)
+        return self._default(symbol, f"{pou.name}.{symbol.name}", symbol.type, symbol.pos, symbol.default)
+
+    def start_of(self, symbol: TypeSymbol) -> Variable | None:
+        """What a variable of a declared type starts with, if another name of it starts otherwise: a constant in
+        memory."""
+        t, decl = self.declared.type_of(symbol), symbol.decl
+        own = isinstance(t, StructType) and t.name == symbol.full_name
+        if own or symbol.default is None:
+            return None
+        return self._default(symbol, symbol.full_name, t, decl.source.pos(decl.pos), symbol.default)
+
+    def _default(
+        self, symbol: VarSymbol | TypeSymbol, name: str, t: Type, pos: Pos, initial: Initial | None
+    ) -> Variable:
+        variable = self._defaults_in_memory.get(symbol)
         if variable is None:
-            name = f"default of {pou.name}.{symbol.name}"
-            variable = Variable(name, symbol.type, Storage.AREA, symbol.pos, initial=symbol.default, constant=True)
-            self._parameter_defaults[symbol] = variable
+            variable = Variable(f"default of {name}", t, Storage.AREA, pos, initial=initial, constant=True)
+            self._defaults_in_memory[symbol] = variable
             self.allocation.add(variable)
         return variable
 

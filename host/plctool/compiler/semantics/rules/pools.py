@@ -8,80 +8,140 @@ from __future__ import annotations
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import error_value
 from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, initialisers, require_instances
-from plctool.compiler.semantics.pools import MAX_ELEMENTS, closer_of, pool_of
+from plctool.compiler.semantics.pools import (
+    DEFAULT_ELEMENTS,
+    DEFAULT_OF_VARIABLE,
+    DEFAULT_ROWS,
+    MAX_ELEMENTS,
+    closer_of,
+    creator_of,
+    pool_of,
+)
+from plctool.compiler.semantics.rules.arguments import input_value
 from plctool.compiler.semantics.rules.members import dotted_name
 from plctool.compiler.semantics.rules.places import changeable_place
-from plctool.compiler.semantics.symbols import ERROR, PouSymbol, TypeSymbol
+from plctool.compiler.semantics.symbols import ERROR, TypeSymbol, Unit, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Assign, Call, Const, Direction, Expr, If, Load, Raise, Statement, Unary, UnaryOp
+from plctool.compiler.typed import Assign, Call, Const, Direction, Expr, If, Load, Pos, Raise, Statement, Unary, UnaryOp
 from plctool.core import lib
-from plctool.iec.types import BOOL, DINT, MAX_SIZE, InterfaceType, PointerType, ReferenceType, StructType, Type
+from plctool.iec.types import (
+    BOOL,
+    DINT,
+    InterfaceType,
+    OpenArrayType,
+    PointerType,
+    ReferenceType,
+    StructType,
+    Type,
+)
 
 NEW, DELETE = "__NEW", "__DELETE"
 
 
 def new(c: Checker, node: ast.Call) -> Expr:
-    """`__NEW(T)`, `__NEW(T, n)`: the address of an element, or of the first of n in a row; 0 when there are none."""
+    """`__NEW(T)`, `__NEW(T, n)`, `__NEW(T(inputs), n)`: the address of an element, or of the first of n in a row; 0 if
+    there is none."""
     args = [a.value for a in node.args if a.value is not None and a.name is None]
     if len(args) != len(node.args) or not 1 <= len(args) <= 2:
         return c.error(node.pos, "arguments", "__NEW takes a type, and how many of it: __NEW(T) or __NEW(T, 5)")
-    if isinstance(args[0], ast.Call):
-        return c.error(args[0].pos, "arguments", "__NEW gives FB_Init no inputs; set them in a method after it")
-    name = args[0].name if isinstance(args[0], ast.Name) else dotted_name(c, args[0])
-    symbol = None if name is None else c.scope.unit(name)
-    t = ERROR if name is None else c.world.declared.type_named(args[0].pos, name, c.scope)
-    if name is None:
-        return c.error(args[0].pos, "type", "the first argument of __NEW is the name of a type")
+    given = args[0].args if isinstance(args[0], ast.Call) else []
+    named = args[0].callee if isinstance(args[0], ast.Call) else args[0]
+    t, symbol = _type(c, named)
+    declared = None if t is ERROR else _declared(c, symbol, named.pos)
     number = Const(1, DINT, c.pos(node.pos)) if len(args) == 1 else c.value(args[1], DINT)
-    count = 0 if t is ERROR else _pool_size(c, symbol, t, name, args[0].pos)
-    if ERROR in (t, number.type) or not count:
+    if t is ERROR or number.type is ERROR or declared is None or not _may_be_made(c, t, named.pos):
         return error_value(c.pos(node.pos))
-    assert isinstance(symbol, PouSymbol | TypeSymbol)
-    assert isinstance(t, StructType)
-    pool = pool_of(c.world, t, count, symbol.decl.source.pos(symbol.decl.pos))
-    c.world.calls.add(c.scope.pou, pool.create, c.pos(node.pos))
-    assert pool.create.result is not None
-    return Call(pool.create, [number], pool.create.result.type, c.pos(node.pos))
+    inputs = _inputs(c, t, given, named.pos)
+    if inputs is None:
+        return error_value(c.pos(node.pos))
+    pool = pool_of(c.world, t, c.pos(named.pos))
+    pool.declared = max(pool.declared, declared)
+    pool.asked = max(pool.asked, _asked(number))
+    start = c.world.start_of(symbol) if isinstance(symbol, TypeSymbol) else None
+    creator = creator_of(pool, start, [(symbol.name, symbol.type) for symbol, _ in inputs], c.pos(named.pos))
+    c.world.calls.add(c.scope.pou, creator, c.pos(node.pos))
+    assert creator.result is not None
+    return Call(creator, [number, *(e for _, e in inputs)], creator.result.type, c.pos(node.pos))
 
 
-def _pool_size(c: Checker, symbol: object, t: Type, name: str, offset: int) -> int:
-    """How many elements {attribute 'pool'} of a type is for; 0 after an error."""
-    if isinstance(t, InterfaceType):
-        c.error(offset, "type", f"{name} is an interface; __NEW needs a function block that implements it")
-        return 0
-    if not isinstance(t, StructType) or not isinstance(symbol, PouSymbol | TypeSymbol):
-        message = f"__NEW makes function blocks and STRUCTs, not {t}; declare a STRUCT with it"
-        c.error(offset, "type", f"{message}, with {{attribute 'pool' := '8'}} before it for room for 8 of them")
-        return 0
-    require_instances(c.world, t, c.scope, offset)
-    needed = _needed_input(c, t)
-    if needed:
-        message = f"FB_Init of {t.name} needs {needed}, which __NEW cannot give"
-        c.error(offset, "arguments", f"{message}; give it an initial value, and set it in a method")
-        return 0
-    text = symbol.decl.attributes.get("pool")
-    if text is None:
-        message = f"{name} has no pool to take memory from; write {{attribute 'pool' := '8'}} before its declaration"
-        c.error(offset, "attribute", f"{message} for room for 8 of them, as nothing is allocated while a program runs")
+def _asked(number: Expr) -> int:
+    """How many elements a pool without an attribute has for one __NEW."""
+    if not isinstance(number, Const) or not isinstance(number.value, int):
+        return DEFAULT_OF_VARIABLE
+    return min(max(DEFAULT_ELEMENTS, DEFAULT_ROWS * number.value if number.value > 1 else 0), MAX_ELEMENTS)
+
+
+def _type(c: Checker, node: ast.Expr) -> tuple[Type, Unit | None]:
+    """The type that __NEW makes, and its declaration if it has one."""
+    if isinstance(node, ast.TypeArgument):
+        return c.world.declared.type_written(node.spec, c.scope), None
+    name = node.name if isinstance(node, ast.Name) else dotted_name(c, node)
+    if name is None:
+        c.error(node.pos, "type", "the first argument of __NEW is the name of a type")
+        return ERROR, None
+    return c.world.declared.type_named(node.pos, name, c.scope), c.scope.unit(name)
+
+
+def _declared(c: Checker, symbol: Unit | None, offset: int) -> int | None:
+    """How many elements the attribute of a type has room for: 0 without one, None after an error."""
+    text = None if symbol is None else symbol.decl.attributes.get("pool")
+    if symbol is None or text is None:
         return 0
     size = text.strip().lstrip("0")
     if not (size.isascii() and size.isdigit() and len(size) <= len(str(MAX_ELEMENTS))) or int(size) > MAX_ELEMENTS:
-        c.error(offset, "attribute", f"the pool of {name} has 1 to {MAX_ELEMENTS} elements, not '{text}'")
-        return 0
-    if int(size) * t.size > MAX_SIZE:
-        c.error(offset, "size", f"a pool of {size} {name} with {t.size} bytes each is too large")
-        return 0
+        message = f"the pool of {symbol.decl.name} has 1 to {MAX_ELEMENTS} elements, not '{text}'"
+        c.error(offset, "attribute", message)
+        return None
     return int(size)
 
 
-def _needed_input(c: Checker, t: StructType) -> str:
-    """An input of FB_Init that a declaration has to give; "" when there is none."""
-    for member in initialisers(c.world, t):
+def _may_be_made(c: Checker, t: Type, offset: int) -> bool:
+    """False after an error: no variable of the type can stand alone."""
+    if isinstance(t, InterfaceType):
+        c.error(offset, "type", f"{t} is an interface; __NEW needs a function block that implements it")
+    elif isinstance(t, ReferenceType | OpenArrayType):
+        c.error(offset, "type", f"__NEW cannot make {t}; give it the type of a variable")
+    else:
+        require_instances(c.world, t, c.scope, offset)
+        return True
+    return False
+
+
+def _inputs(c: Checker, t: Type, given: list[ast.Argument], offset: int) -> list[tuple[VarSymbol, Expr]] | None:
+    """The inputs of FB_Init in `__NEW(T(limit := 5))`, by name or in their order; None after an error."""
+    known = _initialiser_inputs(c, t)
+    found: list[tuple[VarSymbol, Expr]] = []
+    for number, argument in enumerate(given):
+        named = [s for s in known if s.name.casefold() == (argument.name or "").casefold()]
+        symbol = next(iter(named if argument.name else known[number : number + 1]), None)
+        if symbol is None or argument.output:
+            listed = ", ".join(s.name for s in known)
+            hint = f"it has {listed}" if listed else "it has none; assign what it shall have after __NEW"
+            c.error(argument.pos, "arguments", f"FB_Init of {t} has no input {argument.name or number + 1}; {hint}")
+            return None
+        if any(s is symbol for s, _ in found):
+            c.error(argument.pos, "arguments", f"{symbol.name} is given twice")
+            return None
+        if argument.value is not None:
+            e = input_value(c, argument.value, symbol.type, symbol.name)
+            if e.type is ERROR:
+                return None
+            found.append((symbol, e))
+    missing = next((s for s in known if s.default is None and not s.given and all(s is not f for f, _ in found)), None)
+    if missing is not None:
+        c.error(offset, "arguments", f"FB_Init of {t} needs {missing.name}; write __NEW({t}({missing.name} := ...))")
+        return None
+    return found
+
+
+def _initialiser_inputs(c: Checker, t: Type) -> list[VarSymbol]:
+    """The inputs of FB_Init, those of the base first; of one name, that of the derived block."""
+    found: dict[str, VarSymbol] = {}
+    for member in initialisers(c.world, t) if isinstance(t, StructType) else ():
         for symbol, direction in c.world.declared.member(member).parameters:
-            own = direction is Direction.INPUT and symbol.name.casefold() not in (INIT_RETAINS, COPY_CODE)
-            if own and symbol.default is None and not symbol.given:
-                return symbol.name
-    return ""
+            if direction is Direction.INPUT and symbol.name.casefold() not in (INIT_RETAINS, COPY_CODE):
+                found[symbol.name.casefold()] = symbol
+    return list(found.values())
 
 
 def delete(c: Checker, node: ast.Call) -> list[Statement]:
@@ -90,16 +150,23 @@ def delete(c: Checker, node: ast.Call) -> list[Statement]:
     if len(node.args) != 1 or len(args) != 1:
         c.error(node.pos, "arguments", "__DELETE takes 1 argument: a pointer that __NEW gave")
         return []
-    place, pos = changeable_place(c, args[0], "__DELETE", "be set to 0"), c.pos(node.pos)
+    pos = c.pos(node.pos)
+    if isinstance(args[0], ast.Name) and args[0].name.upper() == "THIS":
+        own = c.expr(args[0])
+        return _ended(c, own, own.type.target, pos) if isinstance(own.type, PointerType) else []
+    place = changeable_place(c, args[0], "__DELETE", "be set to 0")
     t = None if place is None else place.type
     if place is None or t is ERROR:
         return []
-    if not isinstance(t, PointerType) or isinstance(t, ReferenceType) or not isinstance(t.target, StructType):
-        message = f"__DELETE needs a POINTER TO the function block or STRUCT that __NEW made, not {t}"
-        c.error(args[0].pos, "type", message)
+    if not isinstance(t, PointerType) or isinstance(t, ReferenceType):
+        c.error(args[0].pos, "type", f"__DELETE needs a POINTER TO what __NEW made, not {t}")
         return []
-    closer = closer_of(c.world, t.target, pos)
+    return [*_ended(c, Load(place, t, pos), t.target, pos), Assign(place, Const(0, t, pos), pos)]
+
+
+def _ended(c: Checker, address: Expr, t: Type, pos: Pos) -> list[Statement]:
+    """Ends what is at an address; an access violation if __NEW did not make it."""
+    closer = closer_of(c.world, t, pos)
     c.world.calls.add(c.scope.pou, closer, pos)
-    ended = Call(closer, [Load(place, t, pos)], BOOL, pos)
-    wrong = If([(Unary(UnaryOp.NOT, ended, BOOL, pos), [Raise(int(lib.RTSEXCPT_ACCESS_VIOLATION), pos)])], [], pos)
-    return [wrong, Assign(place, Const(0, t, pos), pos)]
+    ended = Call(closer, [address], BOOL, pos)
+    return [If([(Unary(UnaryOp.NOT, ended, BOOL, pos), [Raise(int(lib.RTSEXCPT_ACCESS_VIOLATION), pos)])], [], pos)]
