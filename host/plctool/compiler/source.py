@@ -9,6 +9,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,6 +17,9 @@ from pathlib import PurePath
 from typing import Literal
 
 from plctool.compiler.typed import Pos
+
+_OF_OPENPLC = re.compile(r"^\s*CONFIGURATION\s+Config0\s+RESOURCE\s+Res0\s+ON\s+PLC\b", re.MULTILINE)
+_PLCOPEN, _CODESYS = "http://www.plcopen.org/xml/tc6", "http://www.3s-software.com/"
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,13 @@ class Source:
             starts.append(at + 1)
             at = find("\n", at + 1)
         return starts
+
+    @cached_property
+    def is_of_openplc(self) -> bool:
+        """True for what OpenPLC Editor and Beremiz write, whose compiler is matiec: their XML, and the text that they
+        make of it."""
+        text = self.text if self.original is None else self.original
+        return bool(_OF_OPENPLC.search(text)) or (_PLCOPEN in text and _CODESYS not in text)
 
     @cached_property
     def _offsets(self) -> list[int]:

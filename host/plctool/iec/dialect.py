@@ -16,7 +16,8 @@ class Dialect:
 
     `errors`: warnings that are errors; `limits_each_turn`: FOR evaluates its end and step in each turn; `reals_wrap`:
     REAL and LREAL to BYTE .. LWORD as `Rounding.AWAY` says; `computes_in_32_bits`: arithmetic of integers below 32 bits
-    has the result of 32 bits, which an assignment or a conversion cuts.
+    has the result of 32 bits, which an assignment or a conversion cuts; `writes_locals`: a VAR of a function block may
+    be written from outside, with a warning.
     """
 
     name: str
@@ -24,6 +25,7 @@ class Dialect:
     limits_each_turn: bool = False
     reals_wrap: bool = False
     computes_in_32_bits: bool = False
+    writes_locals: bool = False
 
 
 OWN = Dialect("")
@@ -35,6 +37,7 @@ DIALECTS = {
         Dialect("iec", errors=frozenset(("address", "enum"))),
         Dialect("codesys", limits_each_turn=True, reals_wrap=True, computes_in_32_bits=True),
         Dialect("twincat", limits_each_turn=True, reals_wrap=True, computes_in_32_bits=True),
+        Dialect("openplc", writes_locals=True),
     )
 }
 

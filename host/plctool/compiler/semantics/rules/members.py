@@ -152,6 +152,7 @@ def may_see(c: Checker, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:
     here = c.scope.cls
     if plain and cls is not None and (here is None or not here.derives(cls)):
         message = f"{symbol.name} is a VAR of {cls.name} for its own use; make it VAR_OUTPUT to read it outside"
+        message = f"{message}, VAR_INPUT to write it"
         c.warning(node.name_pos, "access", message)
     return (
         cls is None

@@ -84,6 +84,11 @@ def _symbol_read_only(c: Checker, symbol: object) -> str | None:
     return None
 
 
+def _takes_locals(c: Checker) -> bool:
+    """True where the VAR of a block may be written from outside, as matiec has it."""
+    return c.dialect.writes_locals or c.scope.source.is_of_openplc
+
+
 def _member_read_only(c: Checker, node: ast.Member) -> str | None:
     if c.scope.writes_inside:
         return _read_only(c, node.base)
@@ -107,6 +112,8 @@ def _member_read_only(c: Checker, node: ast.Member) -> str | None:
         member = block.members.get(node.name.casefold())
         if member is not None and member.role is Role.LOCAL and not member.constant and is_inside(c, member, block):
             return _read_only(c, node.base)
+        if member is not None and member.role is Role.LOCAL and not member.access and _takes_locals(c):
+            return _read_only(c, node.base)  # a warning when it is looked at (may_see)
         if member is not None and member.role is not Role.INPUT and member.access is not ast.Modifier.PUBLIC:
             article = "an" if member.role in (Role.OUTPUT, Role.IN_OUT) else "a"
             return f"{node.name} is {article} {member.role.value} of {base.type}"
