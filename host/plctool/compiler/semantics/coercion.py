@@ -222,10 +222,9 @@ class Coercion:
 
     def _other_enum(self, e: Expr, source: EnumType, target: EnumType) -> Expr:
         """A value of another enumeration: its number."""
-        if source.strict or target.strict:
-            strict = target if target.strict else source
-            return self._error(e.pos, "type", f"{source} does not fit {target}, because {strict} is 'strict'")
-        self._warn(e.pos, "enum", f"a value of {source} becomes one of {target} by its number")
+        strict = next((t for t in (target, source) if t.strict), None)
+        hint = "" if strict is None else f", though {strict} is 'strict'"
+        self._warn(e.pos, "enum", f"a value of {source} becomes one of {target} by its number{hint}")
         return convert(e, target)
 
     def _string(self, e: Expr, target: StringType) -> Expr:

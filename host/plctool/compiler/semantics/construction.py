@@ -230,6 +230,8 @@ class Construction:
                 args.append(Const(0, BOOL, pos))
             elif key in arguments:
                 args.append(arguments[key])
+            elif isinstance(symbol.default, ComputedInit):
+                args.append(symbol.default.value)
             elif isinstance(symbol.default, ScalarInit):
                 args.append(Const(symbol.default.value, symbol.type, pos))
             elif symbol.given and isinstance(symbol.type, StructType | ArrayType):

@@ -15,6 +15,7 @@ from plctool.compiler.typed import (
     Binary,
     BinaryOp,
     BitPlace,
+    Call,
     Const,
     Convert,
     DerefPlace,
@@ -29,6 +30,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import walk
 from plctool.iec.common_types import NUMBERS, common_scalar
 from plctool.iec.types import (
     BOOL,
@@ -86,6 +88,14 @@ def elementary(t: Type) -> Elementary | None:
 def is_referred(e: Expr) -> bool:
     """Whether this is what a REFERENCE TO refers to."""
     return isinstance(e, Load) and isinstance(e.place, DerefPlace) and isinstance(e.place.pointer.type, ReferenceType)
+
+
+def is_global(e: Expr) -> bool:
+    """True if a value is made of constants and global variables, without a call, so that it is the same anywhere."""
+    return all(
+        node.var.storage is Storage.AREA if isinstance(node, VarPlace) else not isinstance(node, Call | SelfPlace)
+        for node in walk(e)
+    )
 
 
 def error_value(pos: Pos) -> Const:

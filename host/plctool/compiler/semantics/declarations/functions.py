@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+from plctool.compiler.semantics.conversions import is_global
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
 from plctool.compiler.semantics.declarations.unit_variables import ROLES, UnitVariables, new_pou
 from plctool.compiler.semantics.generics import (
@@ -160,8 +161,9 @@ class Functions:
                 t, default = self._parameter_type(line.type, scope)
             else:
                 t, default = self._types.declared_type(line, scope, May.BE_OPEN_ARRAY)
-            if isinstance(default, ComputedInit):
-                scope.error(line.pos, "constant", "the default of a parameter has to be constant")
+            if isinstance(default, ComputedInit) and not is_global(default.value):
+                message = "the default of a parameter is made of constants and global variables"
+                scope.error(line.pos, "constant", f"{message}; assign anything else in the body")
             by_reference = direction is not Direction.INPUT or self._passes_reference(line, info.attributes, t)
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=default)

@@ -30,6 +30,7 @@ from plctool.compiler.typed import (
     BinaryOp,
     BitPlace,
     Call,
+    ComputedInit,
     Const,
     Convert,
     DerefPlace,
@@ -241,6 +242,9 @@ def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tu
 
 def _default_value(c: Checker, pou: Pou, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:
     pos, t = c.pos(offset), symbol.type
+    if isinstance(symbol.default, ComputedInit):
+        given = symbol.default.value
+        return given.place if parameter.by_reference and isinstance(given, Load) else given
     if isinstance(t, StructType | ArrayType) and t not in c.world.blocks:
         variable = c.world.default_of(symbol, pou)
         place = VarPlace(variable, t, pos)

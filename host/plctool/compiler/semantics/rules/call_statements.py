@@ -19,6 +19,7 @@ from plctool.compiler.semantics.rules.arguments import (
     named_function,
     packed,
     parameter_names,
+    refer,
     referenced_place,
     split_enable,
     too_short,
@@ -49,7 +50,7 @@ from plctool.compiler.typed import (
     Variable,
 )
 from plctool.compiler.typed_nodes import is_unaligned, walk
-from plctool.iec.types import BOOL, StructType
+from plctool.iec.types import BOOL, ReferenceType, StructType
 
 # ---- instances and programs ----
 
@@ -305,6 +306,8 @@ def _action_call(c: Checker, node: ast.Call) -> list[Statement]:
     for a in node.args:
         if a.name is None:
             c.error(a.pos, "arguments", f"{callee.name} is an action; write the name of the input, name := value")
+        elif (given := _in_out_of_action(c, callee, a)) is not None:
+            before.extend(given)
         elif a.value is not None:
             own: ast.Expr = ast.Member(a.pos, callee.base, a.name, a.pos)
             if a.negated:
@@ -313,6 +316,30 @@ def _action_call(c: Checker, node: ast.Call) -> list[Statement]:
             statements = c.statement(ast.Assign(a.pos, [target], ast.Assigning.VALUE, value))
             (after if a.output else before).extend(statements)
     return [*before, *_function_statement(c, ast.Call(node.pos, callee, [])), *after]
+
+
+def _in_out_of_action(c: Checker, callee: ast.Member, argument: ast.Argument) -> list[Statement] | None:
+    """`fb.Action(io := x)` lets the instance refer to x from now on, as a call of the block does; None for what is not
+    a VAR_IN_OUT."""
+    action = bound_member(c, callee, called=True)
+    instance = None if action is None else action.place
+    t = instance.type if isinstance(instance, Place) else None
+    block = c.world.blocks.get(t) if isinstance(t, StructType) else None
+    symbol = None if block is None else block.members.get((argument.name or "").casefold())
+    if block is None or symbol is None or symbol.role is not Role.IN_OUT or symbol.variable is None:
+        return None
+    assert isinstance(instance, Place)
+    variable = symbol.variable
+    place = _block_in_out(c, variable, argument, block, ast.Call(argument.pos, callee, []))
+    if place is None:
+        return []
+    address, pos = ReferenceType(variable.type), c.pos(argument.pos)
+    slot = MemberPlace(instance, variable.offset, address, pos)
+    bounds = [
+        Assign(MemberPlace(instance, bound.offset, bound.type, pos), value, pos)
+        for bound, value in handed_bounds(variable, place, pos)
+    ]
+    return [Assign(slot, refer(place, address), pos), *bounds]
 
 
 def enabled(
