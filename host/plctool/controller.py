@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self, overload
+from typing import Any, Never, Self, overload
 
 from plctool.core import lib
 from plctool.debug.kept_changes import KeptChanges, kept_changes
@@ -317,11 +317,13 @@ class Controller(ABC):
         contents = self._read(table, list(symbols.values()))
         return Reading(symbols, dict(zip(symbols, contents.values, strict=True)), contents.consistent)
 
-    def write(self, values: Mapping[str, Any]) -> None:
+    def write(self, values: Mapping[str, Any], *rest: Never) -> None:
         """Sets variables, at once if they fit a message; strings such as 'T#80ms' are understood. Writing one bit keeps
         the others of its byte. Raises UsageError, and writes nothing, when a value does not fit or is a
         constant; DeviceError when a pointer leads to no variable."""
-        if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
+        if rest and isinstance(values, str):
+            raise UsageError(f"write takes a dict of names and values: write({{{values!r}: {rest[0]!r}}}).")
+        if rest or not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
             raise UsageError(f'This takes names with values, such as {{"Main.speed": 5}}, not {values!r}.')
         table = self.symbols()
         named = [(table.resolve(name), value) for name, value in values.items()]

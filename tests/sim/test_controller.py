@@ -150,6 +150,8 @@ def test_a_real_is_a_float_also_where_it_is_no_number(plc: Controller, value: fl
         (lambda plc: plc.read_all("Main.n"), "takes a list of names"),
         (lambda plc: plc.read_all([1]), "takes a list of names"),
         (lambda plc: plc.write("Main.n"), "takes names with values"),
+        (lambda plc: plc.write("Main.n", 5), r"write takes a dict of names and values: write\(\{'Main.n': 5\}\)"),
+        (lambda plc: plc.write({"Main.n": 5}, 6), "takes names with values"),
         (lambda plc: plc.write({1: 2}), "takes names with values"),
     ],
 )
