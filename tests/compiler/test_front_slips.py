@@ -206,6 +206,24 @@ def test_a_slip_in_a_declaration(line: str, said: str) -> None:
             ["2:8: the type of the result follows the name: METHOD M : INT"],
         ),
         (
+            f"{BLOCK}METHOD PUBLIC B.Start : BOOL\nStart := TRUE;\nEND_METHOD\n",
+            [
+                "3:15: a METHOD stands in its FUNCTION_BLOCK, or right after it without its name: METHOD PUBLIC Start",
+            ],
+        ),
+        (
+            f"{BLOCK}METHOD B.Stop\nEND_METHOD\n",
+            ["3:8: a METHOD stands in its FUNCTION_BLOCK, or right after it without its name: METHOD Stop"],
+        ),
+        (
+            f"{BLOCK}ACTION B.Act :\nEND_ACTION\n",
+            ["3:8: an ACTION stands in its FUNCTION_BLOCK, or right after it without its name: ACTION Act"],
+        ),
+        (
+            f"{BLOCK}PROPERTY B.Speed : INT\nEND_PROPERTY\n",
+            ["3:10: a PROPERTY stands in its FUNCTION_BLOCK, or right after it without its name: PROPERTY Speed"],
+        ),
+        (
             "FUNCTION_BLOCK B\nVIRTUAL METHOD M\nEND_METHOD\nEND_FUNCTION_BLOCK\n",
             ["2:1: every method can be overridden; leave VIRTUAL out"],
         ),

@@ -87,6 +87,12 @@ def _stepped(match: re.Match[str]) -> str:
     return f"there is no {sign}{sign}; write {name} := {name} {sign} 1"
 
 
+def _member(match: re.Match[str]) -> str:
+    kind, head = match["kind"].upper(), " ".join(match["head"].split())
+    article = "an" if kind[0] in "AEIO" else "a"
+    return f"{article} {kind} stands in its FUNCTION_BLOCK, or right after it without its name: {head} {match['name']}"
+
+
 def _located(match: re.Match[str]) -> str:
     return f"AT comes after the name: {match['name']} AT {match['place']} : {match['type'].strip()};"
 
@@ -94,6 +100,11 @@ def _located(match: re.Match[str]) -> str:
 _HINTS = (
     _Hint(rf"^\s*PROGRAM\s+{_NAME}\s+(?P<here>WITH\s+{_NAME}\s*:\s*{_NAME})", _TASKS, "here",
           ends=True),
+    _Hint(rf"^\s*(?P<head>(?P<kind>METHOD|PROPERTY|ACTION)\b(?:\s+(?:PUBLIC|PRIVATE|PROTECTED|INTERNAL|FINAL|ABSTRACT))*)"
+          rf"\s+(?P<here>{_NAME}\.(?P<name>{_NAME})[^;\n]*\s*)", _member, "here", ends=True),
+    _Hint(rf"(?:^|;)[ \t]*(?P<here>WITH\s+(?P<name>{_VALUE})[^;\n]*?\bDO\b\s*)",
+          "there is no WITH; write the name in front of each member: {name}.x := ...", "here", "body"),
+    _Hint(r"(?:^|;)[ \t]*(?P<here>END_WITH\b\s*)", "there is no WITH; leave out END_WITH", "here", "body"),
     _Hint(rf"^\s*TEST\s+(?P<here>(?P<name>{_NAME}))", "the name of a test is a text: TEST '{name}'", "here"),
     _Hint(r"(?:^|;)[ \t]*(?P<here>(?:TRY|CATCH|FINALLY|END_?TRY)\b(?!\s*(?:[-+:.,\[(^]|\d))[^;]*)", _TRY, "here",
           "body"),
