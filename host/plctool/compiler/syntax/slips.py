@@ -155,11 +155,6 @@ REFUSED = {
 }
 """Words that begin what this compiler leaves out."""
 
-_VARINFO = "nothing but ADR and SIZEOF is known of a variable while a program runs"
-
-REFUSED_TYPES = {"__SYSTEM.VAR_INFO": _VARINFO}
-"""Types of other systems that this one has not, and why."""
-
 REFUSED_CALLS = {
     "BITADR": "a bit has no address of its own here; use the variable itself, or ADR and a bit number",
     "INDEXOF": "a POU has no number here; call it by its name",
@@ -167,7 +162,6 @@ REFUSED_CALLS = {
         ("__XADD", "__COMPARE_AND_SWAP", "TEST_AND_SET", "TESTANDSET", "SYSCPUTESTANDSET"),
         "there is no reading and writing in one step that other tasks cannot interrupt; let one task alone write it",
     ),
-    "__VARINFO": _VARINFO,
     "INI": "an instance gets its initial values when the program starts; assign them one by one",
 }
 """Functions of other systems that this one has not, and why."""

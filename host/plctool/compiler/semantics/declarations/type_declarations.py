@@ -23,7 +23,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbol, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.syntax.slips import REFUSED_TYPES, TYPES
+from plctool.compiler.syntax.slips import TYPES
 from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, Storage, StructInit, Variable, overlay
 from plctool.iec.types import (
     BOOL,
@@ -199,7 +199,6 @@ class TypeDeclarations:
             upper = spec.name.upper()
             hint = known_name_like(spec.name, [*ELEMENTARY, *_STRINGS, *self._world.names.type_names()])
             hint = f"; write {TYPES[upper]}" if upper in TYPES else hint
-            hint = f"; {REFUSED_TYPES[upper]}" if upper in REFUSED_TYPES else hint
             hint = scope.choices(spec.name) or hint
             if upper == "ENUM":
                 hint = "; an enumeration is written Name : (First, Second);"

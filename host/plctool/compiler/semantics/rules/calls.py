@@ -16,6 +16,7 @@ from plctool.compiler.semantics.rules.intrinsics import overloaded_form
 from plctool.compiler.semantics.rules.library_calls import call_symbol, call_text_function, overload_call
 from plctool.compiler.semantics.rules.members import Bound, bound_member, dotted_name, instance_member, usable
 from plctool.compiler.semantics.rules.pools import DELETE, NEW, new
+from plctool.compiler.semantics.rules.varinfo import VARINFO, varinfo
 from plctool.compiler.semantics.symbols import (
     ERROR,
     BlockInfo,
@@ -177,6 +178,8 @@ def call(c: Checker, node: ast.Call, expected: Type | None) -> Expr:
         return query(c, node)
     if isinstance(callee, ast.Name) and callee.name.upper() == NEW:
         return new(c, node)
+    if isinstance(callee, ast.Name) and callee.name.upper() == VARINFO:
+        return varinfo(c, node)
     if isinstance(callee, ast.Name) and callee.name.upper() == DELETE:
         return c.error(node.pos, "statement", "__DELETE is a statement and has no value")
     bound = bound_member(c, callee, called=True)
