@@ -165,7 +165,7 @@ def test_a_slip_in_a_body(body: str, said: list[str]) -> None:
         ("c : INT RETAIN;", "variables of this kind are declared in VAR RETAIN ... END_VAR"),
         ("c : REF INT;", "a pointer is declared POINTER TO INT, a reference REFERENCE TO INT"),
         ("c : PTR TO INT;", "a pointer is declared POINTER TO INT, a reference REFERENCE TO INT"),
-        ("c : INT := d; d : INT;", "d is declared below; move that line up"),
+        ("c : INT := d; END_VAR VAR d : INT;", "d is declared below; move that line up"),
         ("c : STRING 20;", "the length of a STRING is written STRING[20]"),
     ],
 )

@@ -38,6 +38,7 @@ WARNINGS = {
     "no-effect": "an attribute, pragma or qualifier changes nothing here, though it does in other systems",
     "no-program": "there is no PROGRAM, or none has a task, so nothing would run",
     "not": "NOT inverts a number that is compared, as in NOT a = 5",
+    "order": "an initial value reads a variable that is declared below it, so systems disagree about it",
     "overlap": "two variables with AT share memory, and neither is a bit of the other",
     "pointer": "a pointer becomes a pointer to something else",
     "pool": "__NEW needs memory for a type without {attribute 'pool'}: how much is reserved",

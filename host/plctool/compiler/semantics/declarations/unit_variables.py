@@ -104,6 +104,30 @@ def _names_used(line: ast.VarDecl) -> set[str]:
     return {name.name.casefold() for name in ast.every(ast.Name, line)}
 
 
+def _initialised_in_order(block: ast.VarBlock, scope: Scope) -> ast.VarBlock:
+    """The declarations of a VAR, each after those that its initial value reads; a warning for one that is moved."""
+    if block.keyword not in (Section.VAR, Section.VAR_TEMP) or all(line.init is None for line in block.decls):
+        return block
+    declared_in = {name.casefold(): line for line in block.decls for _, name in line.names}
+    ordered: list[ast.VarDecl] = []
+    waiting: list[tuple[ast.VarDecl, set[str]]] = []
+    for line in block.decls:
+        used = _names_used(line) if line.init is not None else set()
+        later = {n for n in used if n in declared_in and declared_in[n] not in ordered and scope.lookup(n) is None}
+        if later:
+            waiting.append((line, later))
+            continue
+        ordered.append(line)
+        while ready := [pair for pair in waiting if all(declared_in[n] in ordered for n in pair[1])]:
+            moved, read = ready[0]
+            waiting.remove(ready[0])
+            ordered.append(moved)
+            names = f"{moved.names[0][1]} starts with {declared_in[min(read)].names[0][1]}"
+            message = f"{names}, which is declared below and is initialised first here; move that line up"
+            scope.warning(moved.pos, "order", message)
+    return replace(block, decls=[*ordered, *(line for line, _ in waiting)]) if ordered != block.decls else block
+
+
 def _seen_by_actions(block: ast.VarBlock, decl: ast.PouDecl) -> bool:
     """Whether an ACTION of the unit uses a name that the block declares."""
     names = {name.casefold() for line in block.decls for _, name in line.names}
@@ -139,7 +163,8 @@ class UnitVariables:
     def declare_alike(self, decl: ast.PouDecl, pou: Pou, scope: Scope) -> Iterator[ast.VarBlock]:
         """Declares constants, VAR_EXTERNAL, VAR_STAT and VAR_TEMP; gives the other sections, each in its turn."""
         self._declare_constants(decl, scope)
-        for block in decl.blocks:
+        for written in decl.blocks:
+            block = _initialised_in_order(written, scope)
             if _holds_constants(block):
                 continue
             if block.keyword is Section.VAR_EXTERNAL:
