@@ -35,9 +35,37 @@ from plctool.compiler.semantics.symbols import (
 )
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Call, Const, Expr, Initial, Pos, Pou, ScalarInit, Storage, StructInit, Variable
+from plctool.compiler.typed import (
+    Assign,
+    Call,
+    Const,
+    DerefPlace,
+    Direction,
+    Expr,
+    Initial,
+    Load,
+    MemberPlace,
+    Parameter,
+    Pos,
+    Pou,
+    PouKind,
+    ScalarInit,
+    Storage,
+    StructInit,
+    Variable,
+    VarPlace,
+)
 from plctool.iec.dialect import OWN
-from plctool.iec.types import WCHAR, EnumType, InterfaceType, StructType, Type
+from plctool.iec.types import (
+    CLASS_NUMBER,
+    UDINT,
+    WCHAR,
+    EnumType,
+    InterfaceType,
+    RawPointerType,
+    StructType,
+    Type,
+)
 
 # ---- bodies that wait for their check ----
 
@@ -136,6 +164,7 @@ class World:
         self.defaults: dict[str, StructInit] = {}
         self.shared: dict[tuple[str, str, int, frozenset[tuple[str, Type]]], Variable] = {}
         self.enumeration_texts: dict[EnumType, PouSymbol] = {}  # what gives the names of values
+        self._copiers: dict[StructType, Pou] = {}
         self._texts: dict[tuple[int | float | str, Type], Variable] = {}
         self._defaults_in_memory: dict[VarSymbol | TypeSymbol, Variable] = {}
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
@@ -185,6 +214,27 @@ class World:
             self._defaults_in_memory[symbol] = variable
             self.allocation.add(variable)
         return variable
+
+    def copier_of(self, t: StructType, number: int) -> Pou:
+        """The function that makes an instance of a block of the part that it has of a derived one."""
+        known = self._copiers.get(t)
+        if known is not None:
+            return known
+        pos, field = Pos("", 1, 1), t.member(CLASS_NUMBER)
+        assert field is not None
+        given = Variable("given", RawPointerType(t), Storage.LOCAL, pos)
+        pou = self._copiers[t] = Pou(f"__COPY({t})", PouKind.FUNCTION, pos)
+        pou.result = Variable(pou.name, t, Storage.LOCAL, pos)
+        pou.locals.append(pou.result)
+        pou.parameters.append(Parameter(given, Direction.INPUT))
+        whole = VarPlace(pou.result, t, pos)
+        source = DerefPlace(Load(VarPlace(given, given.type, pos), given.type, pos), t, pos)
+        pou.body = [
+            Assign(whole, Load(source, t, pos), pos),
+            Assign(MemberPlace(whole, field.offset, UDINT, pos), Const(number, UDINT, pos), pos),
+        ]
+        self.pous.append(pou)
+        return pou
 
     def at_address(self, node: ast.DirectAddress, scope: Scope) -> VarSymbol | None:
         """What a statement means by an address such as %IW2; None after an error."""

@@ -22,7 +22,7 @@ from plctool.compiler.semantics.conversions import (
 )
 from plctool.compiler.semantics.generics import accepts, group_name, handed, handed_bounds, is_group, total_size
 from plctool.compiler.semantics.rules.members import bound_member, dotted_name
-from plctool.compiler.semantics.rules.places import changeable_place, may_copy
+from plctool.compiler.semantics.rules.places import changeable_place, copied
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, Member, PouSymbol, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -296,7 +296,7 @@ def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
             return c.error(node.pos, "arguments", f"the input {name} is given with :=, not with =")
         e = c.expr(node, t)
         e = e if takes_array(t, e.type) else c.coerce(e, t)
-        return e if may_copy(c, e, node.pos) else error_value(c.pos(node.pos))
+        return copied(c, e, node.pos)
     place = referenced_place(c, node, t.target, name, output=False)
     if place is None:
         return error_value(c.pos(node.pos))

@@ -14,7 +14,7 @@ from plctool.compiler.semantics.rules.arguments import has_enable, input_value, 
 from plctool.compiler.semantics.rules.builtin import attempt
 from plctool.compiler.semantics.rules.call_statements import enabled
 from plctool.compiler.semantics.rules.calls import assign_property, assigned_property
-from plctool.compiler.semantics.rules.places import changeable_place, may_copy
+from plctool.compiler.semantics.rules.places import changeable_place, copied
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Assign, AssignedValue, Const, DerefPlace, Expr, If, Load, Pos, Statement
@@ -86,9 +86,8 @@ def _assign_one(
     if isinstance(place.type, OpenArrayType):
         c.error(target.pos, "type", "an ARRAY[*] cannot be assigned as a whole; assign its elements in a loop")
         return None
-    if not may_copy(c, value, target.pos, place):
-        return None
-    return Assign(place, value, pos)
+    value = copied(c, value, target.pos, place)
+    return None if value.type is ERROR else Assign(place, value, pos)
 
 
 def _assign_reference(c: Checker, node: ast.Assign) -> list[Statement]:

@@ -10,8 +10,8 @@ from plctool.compiler.semantics.conversions import is_exact, is_temporary, place
 from plctool.compiler.semantics.rules.members import Bound, bound_member, dotted_name, is_inside, space_of
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import AddressOf, DerefPlace, Expr, Load, Place, SelfPlace
-from plctool.iec.types import StructType
+from plctool.compiler.typed import AddressOf, Call, DerefPlace, Expr, Load, Place, SelfPlace
+from plctool.iec.types import RawPointerType, StructType
 
 
 def named_place(c: Checker, node: ast.Expr, use: str) -> Place | None:
@@ -47,17 +47,21 @@ def changeable_place(c: Checker, node: ast.Expr, what: str, use: str) -> Place |
     return named_place(c, node, what)
 
 
-def may_copy(c: Checker, value: Expr, offset: int, target: Place | None = None) -> bool:
-    """Whether a value may be copied to a place, or into a new variable. Of a function block only where both are of just
-    this block, not of one derived from it, whose number would be copied as well. Reports it when not."""
+def copied(c: Checker, value: Expr, offset: int, target: Place | None = None) -> Expr:
+    """A value that is copied to a place, or into a new variable. Of an instance that may be of a derived block, only
+    the part of its base is copied; it may not be written over one, whose number would be lost: that is an error."""
     block = c.world.blocks.get(value.type) if isinstance(value.type, StructType) else None
     if block is None or block.cls is None or not block.cls.number:
-        return True
-    if is_exact(place_of(value)) and (target is None or is_exact(target)):
-        return True
-    message = f"what is reached through a pointer, reference or VAR_IN_OUT may be of a block derived from {block.type}"
-    c.error(offset, "type", f"{message}, so it cannot be copied as a whole")
-    return False
+        return value
+    if target is not None and not is_exact(target):
+        what = "what is reached through a pointer, reference or VAR_IN_OUT may be of a block derived from"
+        return c.error(offset, "type", f"{what} {block.type}, so it cannot be overwritten as a whole")
+    place = place_of(value)
+    if is_exact(place):
+        return value
+    copier, pos = c.world.copier_of(block.type, block.cls.number), c.pos(offset)
+    c.world.calls.add(c.scope.pou, copier, pos)
+    return Call(copier, [AddressOf(place, RawPointerType(block.type), pos)], block.type, pos)
 
 
 def _read_only(c: Checker, node: ast.Expr) -> str | None:
