@@ -11,6 +11,9 @@
 
 #include "CmpErrors.h"
 #include "CmpStd.h"
+#ifndef RTS_CFFI
+#include "rts_config.h"
+#endif
 
 /* Hooks in the order of start-up; manual 3.1.1. Each CH_EXIT_x undoes CH_INIT_x; they are in reverse order. */
 typedef enum {
@@ -105,8 +108,39 @@ extern const PF_HOOK_FUNCTION cmp_hooks[];
 extern const CMP_NAME cmp_names[];
 extern const RTS_SIZE cmp_component_count;
 
-/* Runs all CH_INIT_* hooks. On an error the ones that ran are undone by their CH_EXIT_* and the error is returned. */
+/* Runs all CH_INIT_* hooks. On an error the ones that ran are undone by their CH_EXIT_* and the error is returned. With
+ * CM_LEAVES_OUT not of a component that only programs need: that one is undone, and its hooks are not called any more. */
 RTS_RESULT CMInit(void);
+
+/* The first component that failed to start, in the last CMInit. */
+typedef struct {
+    const char *name; /* NULL: none */
+    RTS_UI32 id;      /* CMPID_* */
+    RTS_RESULT error;
+} CMP_FAILURE;
+
+#if CM_LEAVES_OUT
+/* The components in [cmp_programs_first, cmp_programs_end) of the list are only there for programs. */
+extern const RTS_SIZE cmp_programs_first, cmp_programs_end;
+extern bool cmp_left_out[];
+
+const CMP_FAILURE *CMGetFailure(void);
+
+/* True if a component was left out, so that no program may run. */
+bool CMHasLeftOut(void);
+
+/* Returns ERR_NOMEMORY, for a table of registrations that is full; `setting` is the macro that makes it larger, which the
+ * log names if the component fails. */
+RTS_RESULT CMNoRoomIn(const char *setting);
+#define CMNoRoom(setting) CMNoRoomIn(": raise " #setting)
+#else
+static inline bool CMHasLeftOut(void)
+{
+    return false;
+}
+
+#define CMNoRoom(setting) ERR_NOMEMORY
+#endif
 
 /* Runs all CH_EXIT_* hooks in reverse order. */
 RTS_RESULT CMExit(void);

@@ -65,27 +65,40 @@ const CMP_NAME cmp_names[] = {
 };
 #undef X
 
+#if CM_LEAVES_OUT
+enum {
+#define X(component) CMP_INDEX_##component,
+#include "CmpOrder.h"
+#undef X
+};
+
+const RTS_SIZE cmp_programs_first = CMP_INDEX_CmpIecTask + 1;
+const RTS_SIZE cmp_programs_end = CMP_INDEX_CmpAppEmbedded;
+bool cmp_left_out[RTS_COUNT(cmp_hooks)];
+#endif
+
 /* ---- what they register in ---- */
 
+/* clang-format off */
 #define CMP_ONE(component) +1
 
 enum {
     CMP_EXT_TABLE_ROOM = CM_OWN_EXT_TABLES
 #ifdef PORT_SYSTEM
-        PORT_SYSTEM(CMP_ONE)
+    PORT_SYSTEM(CMP_ONE)
 #endif
 #ifdef PORT_COMPONENTS
-            PORT_COMPONENTS(CMP_ONE)
+    PORT_COMPONENTS(CMP_ONE)
 #endif
-                CMP_ONE(CmpIecTask)
+    CMP_ONE(CmpIecTask)
 #if HAS_CmpRetain
-                    CMP_ONE(CmpRetain)
+    CMP_ONE(CmpRetain)
 #endif
 #if HAS_CmpMath
-                        CMP_ONE(CmpMath)
+    CMP_ONE(CmpMath)
 #endif
 #if HAS_IoDrvModbus
-                            CMP_ONE(IoDrvModbus)
+    CMP_ONE(IoDrvModbus)
 #endif
 };
 
@@ -94,33 +107,36 @@ const RTS_SIZE cmp_ext_table_room = CMP_EXT_TABLE_ROOM;
 
 #if HAS_COMMUNICATION
 enum {
-    SRV_GROUP_ROOM = SRV_OWN_GROUPS CMP_ONE(CmpAppSrv) CMP_ONE(CmpDevice)
+    SRV_GROUP_ROOM = SRV_OWN_GROUPS
+    CMP_ONE(CmpAppSrv)
+    CMP_ONE(CmpDevice)
 #if SRV_OTHER_CLIENTS
-        CMP_ONE(CmpDevice) /* settings */
+    CMP_ONE(CmpDevice) /* settings */
 #endif
 #if HAS_CmpLogSrv
     CMP_ONE(CmpLogSrv)
 #endif
 #if HAS_CmpMonitor2
-        CMP_ONE(CmpMonitor2)
+    CMP_ONE(CmpMonitor2)
 #endif
 #if HAS_CmpIoMgrSrv
-            CMP_ONE(CmpIoMgrSrv)
+    CMP_ONE(CmpIoMgrSrv)
 #endif
 #if HAS_CmpUserMgr
-                CMP_ONE(CmpUserMgr)
+    CMP_ONE(CmpUserMgr)
 #endif
 #if HAS_CmpPlcShell
-                    CMP_ONE(CmpPlcShell)
+    CMP_ONE(CmpPlcShell)
 #endif
 #if HAS_CmpFileTransfer
-                        CMP_ONE(CmpFileTransfer)
+    CMP_ONE(CmpFileTransfer)
 #endif
 };
 
 SRV_GROUP srv_groups[SRV_GROUP_ROOM];
 const RTS_SIZE srv_group_room = SRV_GROUP_ROOM;
 #endif
+/* clang-format on */
 
 #ifdef HAS_CmpPlcShell
 extern const struct BLK_COUNTERS BlkDrvComCounters, BlkDrvCanCounters, BlkDrvTcpCounters, BlkDrvUdpCounters;

@@ -111,7 +111,8 @@ typedef struct {
     RTS_UI8 serial_length;
     RTS_UI8 oem_length;
     RTS_UI8 driver_type; /* BLK_DRV_TYPE_* */
-    RTS_UI8 reserved[9];
+    RTS_UI8 left_out;    /* own: 1 if a component failed to start, so that no program runs (CM_LEAVES_OUT) */
+    RTS_UI8 reserved[8];
 } NS_REPLY_0400;
 
 /* Then the parent's address, node and device name. */

@@ -252,6 +252,13 @@
 #define RTS_STARTS_ONCE 0
 #endif
 
+/* 1: a component that only programs need (CmpOrder.h: between CmpIecTask and CmpAppEmbedded) and that fails to start is left
+ * out: the device communicates, runs no program, and says so in log and scan; 300 bytes of flash. 0: any failure ends the
+ * start-up. */
+#ifndef CM_LEAVES_OUT
+#define CM_LEAVES_OUT 1
+#endif
+
 /* Tables of external functions beyond those that CmpList.h counts: one of each component in PORT_SYSTEM and
  * PORT_COMPONENTS, and all of the runtime's own components. Two words each. */
 #ifndef CM_OWN_EXT_TABLES

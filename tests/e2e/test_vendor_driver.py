@@ -11,6 +11,8 @@ import pytest
 
 import plctool
 from plctool.compiler import compile_sources
+from plctool.errors import DeviceError
+from plctool.link.services import AppState
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.waiting import eventually
 
@@ -48,6 +50,9 @@ def test_driver_of_a_vendor_runs_in_plcrt(tmp_path: Path, monkeypatch: pytest.Mo
         (tmp_path / name).write_text((BLANK / name).read_text())
     for command in re.findall(r"^\$ (sed .*)$", text, re.MULTILINE):
         subprocess.run(command, shell=True, cwd=tmp_path, check=True, timeout=60)
+    driver = tmp_path / "IoDrvAcmeAdc.c"
+    fails = 'case CH_INIT2:\n        if (getenv("ACME_FAILS") != NULL)\n            return ERR_FAILED;\n'
+    driver.write_text("#include <stdlib.h>\n" + driver.read_text().replace("case CH_INIT2:\n", fails))
     (option,) = re.findall(r"-Dplcrt_drivers=(?=\S*IoDrvAcmeAdc\.c)", text)
     build = tmp_path / "build"
     setup = ["setup", "-Dhost=false", f"{option}{tmp_path / 'IoDrvAcmeAdc.c'}", str(build), str(ROOT)]
@@ -65,3 +70,22 @@ def test_driver_of_a_vendor_runs_in_plcrt(tmp_path: Path, monkeypatch: pytest.Mo
         plc.flash(program / "main.cdl")
         eventually(lambda: plc.read("Main.out", "Main.ok") == {"Main.out": 1, "Main.ok": True})
         assert plc.io_device("Analog").driver == "IoDrvAcmeAdc"
+    stays_without_program_when_the_driver_fails(tmp_path / "flash", program / "main.cdl", monkeypatch)
+
+
+def stays_without_program_when_the_driver_fails(flash: Path, image: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ACME_FAILS", "1")
+    with Plcrt(flash) as plcrt:
+        link = f"serial:{plcrt.port}"
+        (node,) = plctool.device.scan(link, gateway=False)
+        assert node.left_out
+        with plctool.connect(link, gateway=False) as plc:
+            assert plc.status().state is AppState.NONE
+            texts = [entry.text for entry in plc.log()]
+            assert "Start of IoDrvAcmeAdc failed" in texts
+            for refused in (lambda: plc.flash(image), lambda: plc.shell("reload")):
+                with pytest.raises(DeviceError, match="a component of its firmware failed to start"):
+                    refused()
+    monkeypatch.delenv("ACME_FAILS")
+    with Plcrt(flash) as plcrt, plctool.connect(f"serial:{plcrt.port}", gateway=False) as plc:
+        eventually(lambda: plc.read("Main.ok") is True)  # the program was kept

@@ -117,6 +117,14 @@ class SocketSerial:
         except OSError as error:
             raise LinkError(f"QEMU is gone ({error}).", "link-lost") from error
 
+    def receive_raw(self, size: int) -> bytes:
+        """Waits for the next bytes that the board sends, whatever they are."""
+        self._socket.settimeout(START_TIMEOUT)
+        data = b""
+        while len(data) < size and (more := self._socket.recv(size - len(data))):
+            data += more
+        return data
+
     def receive(self, timeout: float) -> bytes | None:
         end = time.monotonic() + timeout
         while not self._packets:

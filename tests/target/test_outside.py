@@ -21,14 +21,17 @@ from plctool.cli.main import main as plctool
 from plctool.compiler import compile_sources
 from plctool.core import lib
 from plctool.debug.symbols import symbol_path
-from plctool.device import Plc
+from plctool.device import Plc, scan
+from plctool.errors import DeviceError
 from plctool.link.connection import Connection
+from plctool.link.services import AppState
 from plctool.testing.waiting import eventually
 
 PORT = ROOT / "firmware/port/baremetal"
 TARGET = "cortex-m3"
 pytestmark = pytest.mark.skipif(MACHINE != "mps2-an385", reason="the pages show this board")
 
+LAST_WORDS = b"\r\nStart of SysAcme failed: 0x00000028\r\n"
 DEVICE = """
 name = "MPS2 AN385"
 [[module]]
@@ -151,6 +154,52 @@ def test_a_driver_from_the_blank_one_has_a_device(product: Callable[[str], Path]
         eventually(lambda: plc.read("Main.level") == 7)
         assert plc.read("Analog.ok") is True
         assert plc.io_devices()[0].state == "ok"
+
+
+SECOND_TABLE = """
+static const CMP_EXT_FUNCTION more[1];
+RTS_RESULT acme_Hook(CMP_HOOK hook)
+{
+    RTS_RESULT result = ERR_OK;
+
+    for (int i = 0; hook == CH_INIT3 && i < 4 && result == ERR_OK; i++)
+        result = CMRegisterExternal(more, 1);
+    return result;
+}
+"""
+
+
+def test_a_component_that_finds_no_room_is_named_by_scan_and_log(product: Callable[[str], Path]) -> None:
+    folder = product("io")
+    (folder / "acme.c").write_text('#include "acme.h"\n' + SECOND_TABLE)
+    (folder / "acme.h").write_text(
+        '#include "CmpItf.h"\nenum { CMPID_acme = 0x8002 };\nRTS_RESULT acme_Hook(CMP_HOOK);\n'
+    )
+    merge(folder / "cmp_list.c", '#include "acme.h"\n#define PORT_COMPONENTS(X) X(acme)')
+    built = compile_text(program("VAR n : DINT; END_VAR", "n := n + 1;"), TARGET, folder)
+    with Board(MACHINE, make(folder), folder) as board:
+        (node,) = scan(f"serial:{board.port}", gateway=False)
+        assert node.left_out
+        with Plc(Connection(board.line())) as plc:
+            assert plc.status().state is AppState.NONE
+            assert "Start of acme failed: raise CM_OWN_EXT_TABLES" in [entry.text for entry in plc.log()]
+            with pytest.raises(DeviceError, match="a component of its firmware failed to start"):
+                plc.flash(built.path)
+
+
+def test_a_start_up_that_cannot_go_on_has_last_words_on_the_serial_line(product: Callable[[str], Path]) -> None:
+    folder = product("full")
+    (folder / "acme.c").write_text(
+        '#include "acme.h"\nRTS_RESULT SysAcme_Hook(CMP_HOOK hook)\n'
+        "{\n    return hook == CH_INIT2 ? ERR_DEVICE : ERR_OK;\n}\n"
+    )
+    (folder / "acme.h").write_text(
+        '#include "CmpItf.h"\nenum { CMPID_SysAcme = 0x8003 };\nRTS_RESULT SysAcme_Hook(CMP_HOOK);\n'
+    )
+    merge(folder / "cmp_list.c", '#include "acme.h"\n#define PORT_SYSTEM(X) X(SysAcme)')
+    with Board(MACHINE, make(folder), folder) as board:
+        words = board.line().receive_raw(len(LAST_WORDS) * 3)
+        assert words.count(LAST_WORDS) >= 2  # it tries again
 
 
 def test_a_component_takes_part_in_the_cycle_of_the_minimal_configuration(product: Callable[[str], Path]) -> None:

@@ -30,6 +30,9 @@
 #define LOG_MAX_ENTRIES 64
 #define LOG_TEXT_SIZE 160
 #define CM_OWN_EXT_TABLES 8
+#ifndef CM_LEAVES_OUT
+#define CM_LEAVES_OUT 0 /* a test that lacks a component shall fail */
+#endif
 #define CHECKSUM_TABLE_ENTRIES 256
 #define EVENT_MAX_CALLBACKS 16
 #define SCHED_MAX_EXTERNAL_EVENTS 16

@@ -144,7 +144,9 @@ static void run_boot_project(void)
 void AppBoot(void)
 {
     AppCommitOpen();
-    if (AppCommitResult() != ERR_OK)
+    if (CMHasLeftOut())
+        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "No program is run");
+    else if (AppCommitResult() != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, AppCommitResult(), "Commit record cannot be read");
     if (AppCommitGet()->active == SLOT_NONE)
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "No boot project");

@@ -46,6 +46,8 @@ RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
     RTS_UI32 slot;
 
     AppDownloadAbort();
+    if (CMHasLeftOut())
+        return ERR_NOTINITIALIZED;
     if (AppCommitResult() != ERR_OK && AppGetSlot() == SLOT_NONE)
         return ERR_DEVICE; /* what is worth keeping is not known */
     slot = AppCommitOtherSlot(slot_to_keep());

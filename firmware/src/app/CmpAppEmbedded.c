@@ -62,6 +62,8 @@ RTS_RESULT AppSingleCycle(void)
 
 RTS_RESULT AppReload(void)
 {
+    if (CMHasLeftOut())
+        return ERR_NOTINITIALIZED;
     if (AppCommitGet()->active == SLOT_NONE)
         return ERR_APP_NOT_LOADED;
     (void)AppStopApplication();

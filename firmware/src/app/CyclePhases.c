@@ -25,7 +25,7 @@ RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run)
     CYCLE_ENTRY **end = &cycle_phases[when];
 
     if (CYCLE_MAX_PHASES == 0 || phases.count == PLACES)
-        return ERR_NOMEMORY;
+        return CMNoRoom(CYCLE_OWN_PHASES);
     while (*end != NULL)
         end = &(*end)->next;
     *end = &phases.row[phases.count++];

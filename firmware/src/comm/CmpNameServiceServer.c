@@ -58,6 +58,7 @@ static RTS_UI8 *put_body(NS_REPLY_0400 *reply, const SYS_TARGET *target, bool is
         return names.place;
     reply->serial_length = (RTS_UI8)serial;
     reply->driver_type = driver_type;
+    reply->left_out = CMHasLeftOut();
     memcpy(names.place, target->serial_number, serial); /* the NUL is there */
     return names.place + serial + 1;
 }

@@ -85,7 +85,7 @@ RTS_RESULT SrvRegisterGroup(RTS_UI16 group, const SRV_SERVICE *services, RTS_SIZ
             return ERR_OK;
         }
     }
-    return ERR_NOMEMORY;
+    return CMNoRoom(SRV_OWN_GROUPS);
 }
 
 static const SRV_GROUP *find_group(RTS_UI16 group)
@@ -93,7 +93,7 @@ static const SRV_GROUP *find_group(RTS_UI16 group)
     const SRV_GROUP *place;
 
     for (place = srv_groups; place < srv_groups + srv_group_room; place++)
-        if (place->group == group)
+        if (place->group == group && place->services != NULL)
             return place;
     return NULL;
 }

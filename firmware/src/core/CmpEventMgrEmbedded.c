@@ -33,7 +33,7 @@ RTS_RESULT EventRegisterCallback(RTS_UI32 provider, RTS_UI32 event, PF_EVENT_CAL
     LISTENER **last;
 
     if (listener == NULL)
-        return ERR_NOMEMORY;
+        return CMNoRoom(EVENT_MAX_CALLBACKS);
     listener->next = NULL;
     listener->provider = provider;
     listener->event = event;

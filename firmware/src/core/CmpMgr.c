@@ -10,6 +10,80 @@
 #include "CmpLog.h"
 #include "rts_config.h"
 
+#if CM_LEAVES_OUT
+
+static struct {
+    CMP_FAILURE first;
+    const char *setting; /* what the log says of a full table */
+} failure;
+
+const CMP_FAILURE *CMGetFailure(void)
+{
+    return &failure.first;
+}
+
+bool CMHasLeftOut(void)
+{
+    return failure.first.name != NULL;
+}
+
+RTS_RESULT CMNoRoomIn(const char *setting)
+{
+    failure.setting = setting;
+    return ERR_NOMEMORY;
+}
+
+static void forget_failures(void)
+{
+    CMP_CLEAR(failure);
+    if (!RTS_STARTS_ONCE)
+        memset(cmp_left_out, 0, cmp_component_count * sizeof cmp_left_out[0]);
+}
+
+/* The log entry says what to write if a table was full. */
+static void note_failure(RTS_SIZE component, RTS_RESULT error)
+{
+    const CMP_NAME *name = &cmp_names[component];
+
+    if (failure.first.name == NULL)
+        failure.first = (CMP_FAILURE){name->name, name->id, error};
+    if (error != ERR_NOMEMORY || failure.setting == NULL)
+        failure.setting = "";
+    LogAdd(CMPID_CmpMgr, LOG_ERROR, error, "Start of %s failed%s", name->name, failure.setting);
+}
+
+/* Leaves a component out whose hook failed, if the device can do without. */
+static RTS_RESULT leave_out(RTS_SIZE component, CMP_HOOK hook, RTS_RESULT error)
+{
+    note_failure(component, error);
+    if (component < cmp_programs_first || component >= cmp_programs_end)
+        return error;
+    cmp_left_out[component] = true;
+    while (hook-- > CH_INIT_SYSTEM)
+        (void)cmp_hooks[component]((CMP_HOOK)(CH_EXIT_SYSTEM - hook));
+    return ERR_OK;
+}
+
+static RTS_RESULT call(RTS_SIZE component, CMP_HOOK hook)
+{
+    RTS_RESULT result = cmp_left_out[component] ? (RTS_RESULT)ERR_OK : cmp_hooks[component](hook);
+
+    return result == ERR_OK || hook > CH_INIT_FINISHED ? result : leave_out(component, hook, result);
+}
+
+#else
+
+static void forget_failures(void)
+{
+}
+
+static RTS_RESULT call(RTS_SIZE component, CMP_HOOK hook)
+{
+    return cmp_hooks[component](hook);
+}
+
+#endif
+
 /*
  * Start-up is a row of calls: each hook before CH_INIT_FINISHED for each component, the components of a hook in the
  * order of the list. Shutdown is the same row backwards, with the hooks that undo.
@@ -21,14 +95,14 @@ static RTS_SIZE row_length(void)
 
 static RTS_RESULT do_call(RTS_SIZE place)
 {
-    return cmp_hooks[place % cmp_component_count]((CMP_HOOK)(place / cmp_component_count));
+    return call(place % cmp_component_count, (CMP_HOOK)(place / cmp_component_count));
 }
 
 /* Undoes the first `count` calls of the row, the last one first. */
 static void undo(RTS_SIZE count)
 {
     while (count-- > 0)
-        (void)cmp_hooks[count % cmp_component_count]((CMP_HOOK)(CH_EXIT_SYSTEM - count / cmp_component_count));
+        (void)call(count % cmp_component_count, (CMP_HOOK)(CH_EXIT_SYSTEM - count / cmp_component_count));
 }
 
 RTS_STATIC_ASSERT((int)CH_EXIT_SYSTEM - (int)CH_INIT_COMM == (int)CH_EXIT_COMM, exit_hooks_mirror_init_hooks);
@@ -40,12 +114,14 @@ RTS_RESULT CMInit(void)
 
     if (!RTS_STARTS_ONCE)
         memset(cmp_ext_tables, 0, cmp_ext_table_room * sizeof cmp_ext_tables[0]);
+    forget_failures();
     for (done = 0; done < row_length() && result == ERR_OK; done++)
         result = do_call(done);
     if (result != ERR_OK) {
         done--; /* the one that failed has undone what it did itself */
-        LogAdd(CMPID_CmpMgr, LOG_ERROR, result, "Start-up failed in %s, step %u",
-               cmp_names[done % cmp_component_count].name, (unsigned)(done / cmp_component_count));
+        if (!CM_LEAVES_OUT)
+            LogAdd(CMPID_CmpMgr, LOG_ERROR, result, "Start-up failed in %s, step %u",
+                   cmp_names[done % cmp_component_count].name, (unsigned)(done / cmp_component_count));
     } else {
         result = CMCallHook(CH_INIT_FINISHED);
     }
@@ -66,7 +142,7 @@ RTS_RESULT CMCallHook(CMP_HOOK hook)
     RTS_SIZE i;
 
     for (i = 0; i < cmp_component_count; i++) {
-        RTS_RESULT result = cmp_hooks[i](hook);
+        RTS_RESULT result = call(i, hook);
         if (first == ERR_OK)
             first = result;
     }
@@ -96,7 +172,7 @@ RTS_RESULT CMRegisterExternal(const CMP_EXT_FUNCTION *table, RTS_SIZE count)
             return ERR_OK;
         }
     }
-    return ERR_NOMEMORY;
+    return CMNoRoom(CM_OWN_EXT_TABLES);
 }
 
 const CMP_EXT_FUNCTION *CMFindExternal(const char *name)

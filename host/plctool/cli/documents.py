@@ -711,6 +711,7 @@ def _scan(link: Link, gateway: bool | None, tool: str, long: bool) -> list[Docum
             "version": node.version,
             "serial_number": node.serial_number,
             **({"place": node.place} if node.place else {}),
+            **({"problem": "a component failed to start: see plctool log"} if node.left_out else {}),
             **(_runs_on(link, node, gateway, tool) if long else {}),
         }
         for node in nodes_on(link, gateway=gateway, tool=tool)

@@ -19,6 +19,7 @@ _ADVICE = {
     lib.ERR_INVALID_STATE: "it stopped with an exception, reset it first",
     lib.ERR_CALL_AGAIN: "it runs, stop it first",
     lib.ERR_EXCEPTION: "it stopped with an exception, which status shows",
+    lib.ERR_NOTINITIALIZED: "a component of its firmware failed to start, which 'plctool log' names",
     lib.ERR_APP_NOT_LOADED: "there is no application, flash one first",
     lib.ERR_NOMEMORY: "it is too large for the device",
     lib.ERR_BUFFERSIZE: "it is too large for the device",

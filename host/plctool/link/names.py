@@ -26,6 +26,7 @@ class Node:
     version: str
     serial_number: str = ""
     place: str = ""  # host and port of the device, on a link to several
+    left_out: bool = False  # a component of its firmware failed to start, and no program runs
 
     @property
     def address_text(self) -> str:
@@ -59,7 +60,8 @@ def _decode_0400(payload: bytes, address: bytes) -> Node | None:
         return None
     names, end = strings
     serial = payload[end : end + head.serial_length].decode("ascii", "replace")
-    return Node(address, *names, head.target_type, head.target_id, version_text(head.target_version), serial)
+    version = version_text(head.target_version)
+    return Node(address, *names, head.target_type, head.target_id, version, serial, left_out=head.left_out == 1)
 
 
 def _decode_older(payload: bytes, address: bytes) -> Node | None:

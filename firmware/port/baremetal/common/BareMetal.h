@@ -75,9 +75,17 @@ void ResetHandler(void);
 
 /* ---- reset ---- */
 
-typedef enum { RESET_POWER_ON, RESET_PIN, RESET_SOFTWARE, RESET_FATAL, RESET_WATCHDOG, RESET_CAUSE_COUNT } RESET_CAUSE;
+typedef enum {
+    RESET_POWER_ON,
+    RESET_PIN,
+    RESET_SOFTWARE,
+    RESET_START, /* the start-up failed (CM_LEAVES_OUT); says nothing against the program */
+    RESET_FATAL,
+    RESET_WATCHDOG,
+    RESET_CAUSE_COUNT
+} RESET_CAUSE;
 
-/* Why the controller started, and for the last two where it was. In RAM that no start-up clears. */
+/* Why the controller started, and for the last two where it was, for RESET_START which component failed. In RAM that no start-up clears. */
 typedef struct {
     RTS_UI32 magic;
     RTS_UI32 cause; /* RESET_CAUSE */

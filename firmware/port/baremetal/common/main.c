@@ -3,10 +3,12 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#include "CMUtils.h"
 #include "CmpItf.h"
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
 #include "BareMetal.h"
+#include "SysCom.h"
 #include "SysTime.h"
 
 /* The communication loop may be kept from running for so long, by tasks that leave it no time. */
@@ -14,10 +16,12 @@ enum { MAIN_WATCHDOG_MS = 20000 };
 
 static void log_reset_cause(void)
 {
-    static const char *const names[RESET_CAUSE_COUNT] = {"power on", "reset pin", "software", "fault of the runtime",
-                                                         "hardware watchdog"};
+    static const char *const names[RESET_CAUSE_COUNT] = {
+        "power on", "reset pin", "software", "", "fault of the runtime", "hardware watchdog"};
     const RESET_RECORD *record = ResetGet();
-    if (record->cause < RESET_FATAL)
+    if (CM_LEAVES_OUT && record->cause == RESET_START)
+        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_FAILED, "Reset: start of %s failed", CMGetComponentName(record->pc));
+    else if (record->cause < RESET_FATAL)
         LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", names[record->cause]);
     else
         LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%X, " CPU_FAULT_STATUS " 0x%X",
@@ -46,12 +50,36 @@ static void idle(void)
     CpuRestore(mask);
 }
 
+/* Names the component that ended the start-up on the first serial line, for a terminal, and in the record of the reset. */
+#if CM_LEAVES_OUT
+static void fail(void)
+{
+    enum { LAST_WORDS_MS = 1000 }; /* that they leave, and that a person can read them */
+    const CMP_FAILURE *failure = CMGetFailure();
+    RTS_UI32 start_ms = SysTimeGetMs();
+    char text[64];
+    RTS_SIZE size =
+        CMUtlsnprintf(text, sizeof text, "\r\nStart of %s failed: 0x%X\r\n", failure->name, (unsigned)failure->error);
+
+    if (SysComGetCount() > 0 && SysComOpen(0) == ERR_OK)
+        (void)SysComWrite(0, (const RTS_UI8 *)text, (RTS_UI32)size);
+    while (SysTimeGetMs() - start_ms < LAST_WORDS_MS)
+        BoardWatchdogKick();
+    ResetNow(RESET_START, failure->id);
+}
+#else
+static void fail(void)
+{
+    ResetNow(RESET_SOFTWARE, 0);
+}
+#endif
+
 /* Not a part of ResetHandler, which paints the stack right below its own frame. */
 RTS_NOINLINE int main(void)
 {
     BoardWatchdogStart(MAIN_WATCHDOG_MS);
     if (CMInit() != ERR_OK)
-        ResetNow(RESET_FATAL, 0);
+        fail();
     log_reset_cause();
     for (;;) {
         kick_watchdog();

@@ -9,6 +9,7 @@
 
 #define RTS_CONFIG_NAME "minimal"
 #define APP_CRASH_TEXT_SIZE 1
+#define CM_LEAVES_OUT 0
 #define APP_MAX_TASKS 2
 #define APP_MAX_IMPORTS 16
 #define EVENT_MAX_CALLBACKS 0

@@ -9,6 +9,7 @@
 
 #define RTS_CONFIG_NAME "standard"
 #define APP_CRASH_TEXT_SIZE 1
+#define CM_LEAVES_OUT 0
 #define APP_MAX_TASKS 3
 #define NETSERVER_MESSAGE_SIZE 944 /* two full blocks */
 #define EVENT_MAX_CALLBACKS 0
