@@ -13,7 +13,7 @@
 #include "IoConfig.h"
 #include "rts_config.h"
 
-/* All from main, but for `get_held`. */
+/* All from main, but for `get_kept`. */
 typedef struct {
     bool (*has_driver)(const char *name);
     /* Gives a checked configuration to the drivers, while no task runs; it stays valid until unload. `context`: the areas.
@@ -21,11 +21,13 @@ typedef struct {
     RTS_RESULT(*load)
     (const IO_CONFIG *config, const CDL_TASK *tasks, RTS_UI32 task_count, const IEC_CONTEXT *context,
      APP_REFUSAL *refusal);
+    /* A reset: the variables have their initial values again, while no task runs. */
+    void (*reset)(void);
     /* There is no application any more; also when load failed. */
     void (*unload)(void);
-    /* Sets the bits of those outputs that hold their value in the safe state, in a mask of `size` bytes from byte `first`
-     * on. Also from a task that failed. */
-    void (*get_held)(RTS_UI32 first, RTS_UI8 *mask, RTS_UI32 size);
+    /* Sets the bits of those outputs that stay as they are in the safe state, in a mask of `size` bytes from byte `first` on:
+     * those that a channel takes to a device, which gets what is safe by itself. Also from a task that failed. */
+    void (*get_kept)(RTS_UI32 first, RTS_UI8 *mask, RTS_UI32 size);
 } APP_IO;
 
 #if IO_MAX_CONNECTORS > 0

@@ -46,6 +46,8 @@ void IecCycleCreate(const CDL_TASK *records, RTS_UI32 count, const IEC_CONTEXT *
 /* Cycles may start from now on, and no more from now on. */
 void IecCycleStart(void);
 void IecCycleStop(void);
+/* Between both; from any context. While they may not, outputs are in the safe state, or become so. */
+bool IecCycleMayStart(void);
 /* The moment that IecTaskBetweenCycles waits for does not come: no task runs any more. */
 void IecCycleCallOff(void);
 /* All but the overruns. ERR_INVALIDID when there is no such task. */

@@ -116,6 +116,10 @@ typedef struct {
     RTS_RESULT(*IoDrvWriteParameter)
     (const IoConfigConnector *connector, RTS_UI32 id, const void *data, RTS_UI32 bits, RTS_UI32 bit_offset);
 
+    /* From main, while no task runs: a reset has given all variables their initial values. A driver whose inputs are what
+     * others have written, such as the registers of a server, forgets that, or a reset would not be one. Below 100 us. */
+    void (*IoDrvReset)(void);
+
     /* From main, for the log, when a connector has CF_CONNECTOR_BUS_ERROR: why, such as "it closes the connection". Without
      * it: "it does not answer". Below 100 us. */
     void (*IoDrvExplainLoss)(const IoConfigConnector *connector, char *text, RTS_SIZE size);

@@ -3,6 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#include "IecCycle.h"
 #include "io_driver.h"
 
 /* Two buses with a device each and parameters of all kinds. */
@@ -125,6 +126,7 @@ static void outputs_come_in_the_order_of_the_device(void)
     outputs = AppGetAreaAddress(APP_AREA_OUTPUT, 0, 2);
     outputs[0] = 0x22;
     outputs[1] = 0x11;
+    IecCycleStart();
     IoMgrCopyOutputLE(&word, memory);
     CHECK(memory[0] == 0x22 && memory[1] == 0x11);
     IoMgrCopyOutputBE(&word, memory);
@@ -134,6 +136,32 @@ static void outputs_come_in_the_order_of_the_device(void)
     outputs[0] = 0;
     IoMgrCopyOutputBE(&bit, memory);
     CHECK(memory[0] == 0x02 && memory[1] == 0x11);
+    IecCycleStop();
+}
+
+static void in_the_safe_state_outputs_are_what_the_configuration_says(void)
+{
+    IoConfigChannelMap safe = word;
+    RTS_UI8 memory[2] = {0x77, 0x77};
+
+    begin_tree();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    memset(AppGetAreaAddress(APP_AREA_OUTPUT, 0, 2), 0x22, 2);
+    safe.flags = IO_HOLD;
+    IoMgrCopyOutputs(&safe, 1, memory);
+    CHECK(memory[0] == 0x77 && memory[1] == 0x77);
+    safe.flags = IO_VALUE;
+    safe.value = 0xABCD;
+    IoMgrCopyOutputLE(&safe, memory);
+    CHECK(memory[0] == 0xCD && memory[1] == 0xAB);
+    IoMgrCopyOutputBE(&safe, memory);
+    CHECK(memory[0] == 0xAB && memory[1] == 0xCD);
+    safe.flags |= IO_CHANNEL_BIG_ENDIAN;
+    IoMgrCopyOutputs(&safe, 1, memory);
+    CHECK(memory[0] == 0xAB && memory[1] == 0xCD);
+    safe.flags = IO_ZERO;
+    IoMgrCopyOutputLE(&safe, memory);
+    CHECK(memory[0] == 0 && memory[1] == 0);
 }
 
 /* Each byte takes some values; what is accepted runs, and writes nothing but its areas. */
@@ -176,6 +204,7 @@ int main(void)
     RUN(what_the_configuration_says_can_be_read_from_outside);
     RUN(the_order_of_bytes_is_that_of_the_device);
     RUN(outputs_come_in_the_order_of_the_device);
+    RUN(in_the_safe_state_outputs_are_what_the_configuration_says);
     RUN(each_byte_may_be_damaged);
     return test_result();
 }

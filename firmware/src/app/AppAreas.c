@@ -49,23 +49,23 @@ void AppAreasClear(void)
 
 #if IO_MAX_CONNECTORS > 0
 /* Part by part, so that the mask is small. Without lock, since the manager looks at all channels for each. */
-static void clear_what_is_not_held(void)
+static void clear_what_is_not_kept(void)
 {
     RTS_UI8 *outputs = (RTS_UI8 *)areas.all.output;
-    RTS_UI8 held[32];
+    RTS_UI8 kept[32];
     RTS_UI32 at;
     RTS_UI32 i;
 
     for (at = 0; at < APP_OUTPUT_SIZE; at += i) {
-        RTS_UI32 size = APP_OUTPUT_SIZE - at < sizeof held ? APP_OUTPUT_SIZE - at : sizeof held;
-        memset(held, 0, sizeof held);
-        AppIoGet()->get_held(at, held, size);
+        RTS_UI32 size = APP_OUTPUT_SIZE - at < sizeof kept ? APP_OUTPUT_SIZE - at : sizeof kept;
+        memset(kept, 0, sizeof kept);
+        AppIoGet()->get_kept(at, kept, size);
         for (i = 0; i < size; i++)
-            outputs[at + i] &= held[i];
+            outputs[at + i] &= kept[i];
     }
 }
 #else
-#define clear_what_is_not_held() ((void)0)
+#define clear_what_is_not_kept() ((void)0)
 #endif
 
 /* A task that copies its outputs back meanwhile is before or after; none does when no cycle may start any more. */
@@ -77,7 +77,7 @@ void AppAreasClearOutputs(void)
         memset(areas.all.output, 0, sizeof areas.all.output);
     SysLockLeave(lock);
     if (AppIoGet() != NULL)
-        clear_what_is_not_held();
+        clear_what_is_not_kept();
 }
 
 RTS_UI8 *AppAreasGet(RTS_UI32 area)

@@ -229,9 +229,14 @@ static void run_global_exit(void)
 
 RTS_RESULT AppReinitialise(bool cold)
 {
+    RTS_RESULT result;
+
     run_global_exit();
     RetainCapture(cold);
-    return initialise(cold || app.pending == INIT_COLD);
+    result = initialise(cold || app.pending == INIT_COLD);
+    if (AppIoGet() != NULL)
+        AppIoGet()->reset();
+    return result;
 }
 
 void AppUnload(void)

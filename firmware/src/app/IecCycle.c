@@ -408,6 +408,11 @@ void IecCycleStart(void)
     SysAtomicStore(&tasks.running, 1);
 }
 
+bool IecCycleMayStart(void)
+{
+    return SysAtomicLoad(&tasks.running) != 0;
+}
+
 void IecCycleStop(void)
 {
     SysAtomicStore(&tasks.running, 0);

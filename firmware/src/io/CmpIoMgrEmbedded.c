@@ -216,7 +216,17 @@ static bool has_driver(const char *name)
     return find_driver_for(name) != NULL;
 }
 
-static const APP_IO app_io = {has_driver, load, unload, IoCycleGetHeld};
+static void reset(void)
+{
+    IO_DRIVER *driver;
+
+    for (driver = manager.drivers; driver != NULL; driver = driver->next) {
+        if (driver->functions->IoDrvReset != NULL)
+            driver->functions->IoDrvReset();
+    }
+}
+
+static const APP_IO app_io = {has_driver, load, reset, unload, IoCycleGetKept};
 
 /* ---- main ---- */
 

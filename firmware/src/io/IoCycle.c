@@ -150,7 +150,7 @@ static void substitute(const IoConfigConnectorMap *map, const IoConfigConnectorM
         for (; count > 0; count--, channel++) {
             RTS_UI32 what = channel->flags & IO_CHANNEL_ON_STOP;
             if (what != IO_HOLD)
-                IoTablesSetChannel(IO_MAP_INPUTS, channel, what == IO_VALUE ? channel->value : 0);
+                IoTablesSetInput(channel, what == IO_VALUE ? channel->value : 0);
         }
     }
     SysLockLeave(lock);
@@ -351,47 +351,36 @@ typedef struct {
     RTS_UI32 first; /* byte */
     RTS_UI32 size;
     RTS_UI8 *mask;
-} HELD;
+} KEPT;
 
-static void note_held(const IoConfigChannelMap *channel, void *arg)
+static void note_kept(const IoConfigChannelMap *channel, void *arg)
 {
-    const HELD *held = arg;
+    const KEPT *kept = arg;
     RTS_UI32 bit = channel->area_bit;
     RTS_UI32 end = bit + channel->bits;
 
-    if ((channel->flags & IO_CHANNEL_ON_STOP) != IO_HOLD || end <= 8 * held->first ||
-        bit >= 8 * (held->first + held->size))
+    if (end <= 8 * kept->first || bit >= 8 * (kept->first + kept->size))
         return;
     for (; bit < end; bit++) {
-        RTS_UI32 byte = (bit >> 3) - held->first;
-        if (byte < held->size)
-            held->mask[byte] |= (RTS_UI8)(1u << (bit & 7));
+        RTS_UI32 byte = (bit >> 3) - kept->first;
+        if (byte < kept->size)
+            kept->mask[byte] |= (RTS_UI8)(1u << (bit & 7));
     }
 }
 
-void IoCycleGetHeld(RTS_UI32 first, RTS_UI8 *mask, RTS_UI32 size)
+void IoCycleGetKept(RTS_UI32 first, RTS_UI8 *mask, RTS_UI32 size)
 {
-    HELD held = {first, size, mask};
+    KEPT kept = {first, size, mask};
 
     if (state.is_loaded)
-        for_each_output(note_held, &held);
+        for_each_output(note_kept, &kept);
 }
 
-static void set_value(const IoConfigChannelMap *channel, void *arg)
-{
-    RTS_UNUSED(arg);
-    if ((channel->flags & IO_CHANNEL_ON_STOP) == IO_VALUE)
-        IoTablesSetChannel(IO_MAP_OUTPUTS, channel, channel->value);
-}
-
-/* The shared outputs are as they have to be, but for channels with a value. */
+/* No cycle may start: so what drivers copy (IoMgrCopyOutputLE) is safe. */
 static void make_safe(void)
 {
-    RTS_UI32 lock = SysLockEnter();
     IO_DRIVER *driver;
 
-    for_each_output(set_value, NULL);
-    SysLockLeave(lock);
     for (driver = state.drivers; driver != NULL; driver = driver->next) {
         if (driver->functions->IoDrvWriteOutputs == NULL || !enter_or_note(driver, PENDING_SAFE_STATE))
             continue;

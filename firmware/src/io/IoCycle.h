@@ -25,6 +25,6 @@ void IoCycleDiagnose(void);
 /* ---- from main or a task that failed ---- */
 
 /* For AppIo.h. */
-void IoCycleGetHeld(RTS_UI32 first, RTS_UI8 *mask, RTS_UI32 size);
+void IoCycleGetKept(RTS_UI32 first, RTS_UI8 *mask, RTS_UI32 size);
 
 #endif

@@ -467,6 +467,15 @@ static RTS_RESULT scan_modules(const IoConfigConnector *connector, RTS_UI32 inde
     return client != NULL ? ModbusScan(client, index, module, SysTimeGetNs()) : (RTS_RESULT)ERR_NOT_SUPPORTED;
 }
 
+/* Registers have the initial values of their variables again, until a client writes. */
+static void reset(void)
+{
+    for (RTS_UI32 i = 0; i < setup.server_count; i++) {
+        setup.servers[i].server.written = 0;
+        setup.servers[i].noted.noted_data = 1;
+    }
+}
+
 /* ---- why a device is lost ---- */
 
 static bool is_on_tcp(const MODBUS_DEVICE *device)
@@ -517,6 +526,7 @@ static const ICmpIoDrv functions = {
     .IoDrvWriteOutputs = write_outputs,
     .IoDrvScanModules = scan_modules,
     .IoDrvReadParameter = read_parameter,
+    .IoDrvReset = reset,
     .IoDrvExplainLoss = explain_loss,
 };
 

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "CmpChecksum.h"
+#include "IecCycle.h"
 #include "IoTables.h"
 
 static const IO_CONFIG no_config;
@@ -245,8 +246,38 @@ static RTS_INLINE void copy_input(const IoConfigChannelMap *channel, const void 
     copy(channel, tables.areas[APP_AREA_INPUT], channel->area_bit, memory, channel->parameter_bit, turned);
 }
 
+/* Gives a channel a number of 32 bits, extended by zeros, or its lowest bits; `turned`: the highest byte first. */
+static RTS_NOINLINE void set(const IoConfigChannelMap *channel, RTS_UI8 *to, RTS_UI32 at, RTS_UI32 value, bool turned)
+{
+    RTS_UI32 size = channel->bits >> 3;
+    RTS_UI8 byte = (RTS_UI8)value;
+    RTS_UI32 i;
+
+    if (channel->bits < 8) {
+        copy_bits(to, at, &byte, 0, channel->bits);
+        return;
+    }
+    to += at >> 3;
+    for (i = 0; i < size; i++, value >>= 8)
+        to[turned ? size - 1 - i : i] = (RTS_UI8)value;
+}
+
+/* In the safe state a device gets what the configuration says, and the variables stay as they are. */
+static RTS_NOINLINE void copy_safe(const IoConfigChannelMap *channel, void *memory, RTS_UI32 turned)
+{
+    RTS_UI32 what = channel->flags & IO_CHANNEL_ON_STOP;
+
+    if (what != IO_HOLD)
+        set(channel, memory, channel->parameter_bit, what == IO_VALUE ? channel->value : 0,
+            (channel->flags & IO_CHANNEL_BIG_ENDIAN) != turned);
+}
+
 static RTS_INLINE void copy_output(const IoConfigChannelMap *channel, void *memory, RTS_UI32 turned)
 {
+    if (!IecCycleMayStart()) {
+        copy_safe(channel, memory, turned);
+        return;
+    }
     copy(channel, memory, channel->parameter_bit, tables.areas[APP_AREA_OUTPUT], channel->area_bit, turned);
 }
 
@@ -290,26 +321,20 @@ void IoMgrCopyInputs(const IoConfigChannelMap *channel, RTS_UI32 count, const vo
 void IoMgrCopyOutputs(const IoConfigChannelMap *channel, RTS_UI32 count, void *memory)
 {
     const RTS_UI8 *area = tables.areas[APP_AREA_OUTPUT];
+    bool is_safe = !IecCycleMayStart();
 
     if (count == 0)
         return;
     do {
-        copy(channel, memory, channel->parameter_bit, area, channel->area_bit, 0);
+        if (is_safe)
+            copy_safe(channel, memory, 0);
+        else
+            copy(channel, memory, channel->parameter_bit, area, channel->area_bit, 0);
         channel++;
     } while (--count > 0);
 }
 
-void IoTablesSetChannel(RTS_UI32 type, const IoConfigChannelMap *channel, RTS_UI32 value)
+void IoTablesSetInput(const IoConfigChannelMap *channel, RTS_UI32 value)
 {
-    RTS_UI8 *area = tables.areas[APP_AREA_INPUT + type];
-    RTS_UI32 at = channel->area_bit;
-    RTS_UI32 bits;
-
-    if (channel->bits < 8) {
-        RTS_UI8 byte = (RTS_UI8)value;
-        copy_bits(area, at, &byte, 0, channel->bits);
-        return;
-    }
-    for (bits = channel->bits; bits > 0; bits -= 8, at += 8, value >>= 8)
-        area[at >> 3] = (RTS_UI8)value;
+    set(channel, tables.areas[APP_AREA_INPUT], channel->area_bit, value, false);
 }

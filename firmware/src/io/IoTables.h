@@ -20,7 +20,7 @@ const IoConfigTaskMap *IoTablesGetTaskMaps(void);
 /* Where an IO_DEVICE_STATE of the program is. */
 IO_DEVICE_STATE *IoTablesGetState(RTS_UI32 offset);
 
-/* Gives a channel of the inputs (type IO_MAP_*) or outputs a value. Within SysLock. */
-void IoTablesSetChannel(RTS_UI32 type, const IoConfigChannelMap *channel, RTS_UI32 value);
+/* Gives a channel of the inputs a value. Within SysLock. */
+void IoTablesSetInput(const IoConfigChannelMap *channel, RTS_UI32 value);
 
 #endif

@@ -26,10 +26,14 @@ def channel_of(
     bits: int | None = None,
     type: Type | None = None,
     parameter: int = 0,
+    holds: bool = False,
 ) -> Channel | None:
-    """A channel from `NAME = "variable"` or `NAME = { var = ... }`; None after a mistake."""
+    """A channel from `NAME = "variable"` or `NAME = { var = ... }`; None after a mistake. `holds`: an output, too, holds
+    its value unless it says otherwise."""
     if isinstance(entry.value, Table):
-        channel = read_channel(entry.value, entry.key, output=output, bits=bits, type=type, parameter=parameter)
+        channel = read_channel(
+            entry.value, entry.key, output=output, bits=bits, type=type, parameter=parameter, holds=holds
+        )
         entry.value.close()
         return channel
     name, target = entry.key, entry.value
@@ -39,24 +43,32 @@ def channel_of(
         return None
     if not is_target(target, entry.pos, mistakes, output=output):
         return None
-    return Channel(name, target, entry.pos, output, parameter, bits=bits, type=type, substitute=_default(output))
+    default = _default(output and not holds)
+    return Channel(name, target, entry.pos, output, parameter, bits=bits, type=type, substitute=default)
 
 
 def read_channel(
-    table: Table, name: str, *, output: bool, bits: int | None = None, type: Type | None = None, parameter: int = 0
+    table: Table,
+    name: str,
+    *,
+    output: bool,
+    bits: int | None = None,
+    type: Type | None = None,
+    parameter: int = 0,
+    holds: bool = False,
 ) -> Channel | None:
     """A channel from the keys `var` and `on_stop` (outputs) or `on_error` (inputs) of a table that may have more keys,
     and that the caller closes; None after a mistake."""
     target = table.text("var", required="Main.motor" if output else "Main.start")
-    substitute = read_substitute(table, "on_stop" if output else "on_error", _default(output))
+    substitute = read_substitute(table, "on_stop" if output else "on_error", _default(output and not holds))
     if target is None or not is_target(target, table.value_pos("var"), table.mistakes, output=output):
         return None
     pos = table.value_pos("var")
     return Channel(name, target, pos, output, parameter, bits=bits, type=type, substitute=substitute)
 
 
-def _default(output: bool) -> Substitute:
-    return _WORDS["zero"] if output else _WORDS["hold"]
+def _default(zero: bool) -> Substitute:
+    return _WORDS["zero"] if zero else _WORDS["hold"]
 
 
 def read_substitute(table: Table, key: str, default: Substitute) -> Substitute:

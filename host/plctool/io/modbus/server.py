@@ -252,7 +252,7 @@ def _read_object(entry: Entry, table: Table, kind: int) -> Object | None:
     from_network = kind in (HOLDING, COILS)
     if from_network and isinstance(entry.value, Table):
         from_network = not entry.value.flag("read_only")
-    channel = channel_of(entry, table.mistakes, output=not from_network)
+    channel = channel_of(entry, table.mistakes, output=not from_network, holds=True)
     return None if channel is None else Object(kind, first, bit, from_network, channel, entry.key_pos)
 
 
