@@ -378,8 +378,10 @@ static void what_is_discarded_does_not_arrive(void)
 static void what_cannot_be_opened_is_said(void)
 {
     PORT_REASON reason = {"", false};
-    CHECK(!PortComOpen("/dev/does-not-exist", 115200, &reason));
-    CHECK(strstr(reason.text, "/dev/does-not-exist") != NULL);
+    CHECK(!PortComOpen("does-not-exist", 115200, &reason));
+    CHECK(strstr(reason.text, "does-not-exist") != NULL);
+    CHECK(PortComOpen("/dev/does-not-exist", 115200, &reason) && !PortComIsThere());
+    PortComClose();
     CHECK(!PortComOpen("/dev/null", 115200, &reason));
     CHECK(!PortComOpen("pty", 12345, &reason));
     CHECK_EQUAL(SysComGetCount(), 0);

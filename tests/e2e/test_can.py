@@ -415,13 +415,22 @@ def test_wrong_options_of_plcrt_are_refused(tmp_path: Path) -> None:
         (("--node", "128"), "give 1 to 127"),
         (("--bitrate", "fast"), "is not one of CAN"),
         (("--can-base", "0x123"), "is not a base"),
-        (("--can", "slcan:/dev/no-such-line"), "cannot open CAN"),
+        (("--can", "slcan:/dev/null"), "cannot open CAN"),
+        (("--can", "slcan:no-such-line"), "cannot open CAN"),
         (("--can", "no-such-interface"), "cannot open CAN"),
         (("--can", "slcan:pty", "--bitrate", "123456"), "SLCAN has no such bit rate"),
         (("--can", "slcan:pty", "--bitrate", "500000/3000000"), "SLCAN has no such data bit rate"),
     ):
         with pytest.raises(PlcError, match=said):
             Plcrt(tmp_path / "other.flash", *options).start()
+
+
+def test_an_adapter_that_is_not_plugged_in_is_waited_for(tmp_path: Path) -> None:
+    with Plcrt(tmp_path / "flash", "--can", "slcan:/dev/no-such-line") as plcrt:
+        assert plcrt.process and plcrt.process.stderr
+        assert "CAN slcan:/dev/no-such-line is missing (No such file or directory)" in plcrt.process.stderr.readline()
+        with plctool.connect(f"serial:{plcrt.port}") as plc:
+            assert any("CAN /dev/no-such-line is away" in entry.text for entry in plc.log())
 
 
 def test_a_device_that_is_gone_expects(hub: CanHub) -> None:

@@ -410,7 +410,7 @@ def test_line_is_the_firmwares_again_after_a_restart(line: Rs485, build: Build, 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--tunnel", "/dev/nothing"], "cannot open serial line /dev/nothing"),
+        (["--tunnel", "/dev/null"], "cannot open serial line /dev/null"),
         (["--tunnel-unit", "248"], "--tunnel-unit 248 is not an address of Modbus: give 1 to 247"),
         (["--tunnel-unit", "0"], "--tunnel-unit 0 is not an address"),
         (["--tunnel-baud", "1"], "--tunnel-baud 1 is not a speed"),
@@ -426,3 +426,9 @@ def test_line_of_serial_is_not_that_of_tunnel(tmp_path: Path) -> None:
     path = str(tmp_path / "flash.tty")  # what plcrt itself has just made there
     with pytest.raises(PlcError, match="cannot be used twice"):
         Plcrt(tmp_path / "flash", "--tunnel", path).start()
+
+
+def test_a_line_whose_adapter_is_not_plugged_in_is_waited_for(tmp_path: Path) -> None:
+    plcrt = Plcrt(tmp_path / "flash", "--tunnel", "/dev/no-such-line")
+    with plcrt, plctool.connect(f"serial:{plcrt.port}") as plc:
+        assert any("/dev/no-such-line is away" in entry.text for entry in plc.log())

@@ -8,6 +8,7 @@ import random
 import resource
 import select
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -89,11 +90,58 @@ def test_help_and_version_exit_0(option, text):
     assert done.stdout.startswith(text)
 
 
-@pytest.mark.parametrize("serial", ["/dev/does-not-exist", "/dev/null", "/"])
+@pytest.mark.parametrize("serial", ["/dev/null", "/dev", "/", "does-not-exist", "/dev/null/line"])
 def test_a_serial_line_that_cannot_be_opened_exits_1_and_is_named(tmp_path, serial):
     done = run_plcrt("--flash", str(tmp_path / "flash"), "--serial", serial)
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1 and serial in done.stderr
+
+
+def test_a_serial_line_that_may_not_be_opened_exits_1(tmp_path):
+    (tmp_path / "line").symlink_to("/dev/null")
+    done = run_plcrt("--flash", str(tmp_path / "flash"), "--serial", str(tmp_path / "line"))
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+
+
+def test_it_runs_without_its_serial_adapter_and_serves_it_when_it_comes(tmp_path, eventually):
+    """The link stands for a name that udev gives an adapter."""
+    adapter = tmp_path / "adapter"
+    adapter.symlink_to(tmp_path / "unplugged")
+    options = ["--flash", str(tmp_path / "flash"), "--serial", str(adapter), "--tcp", "127.0.0.1:0"]
+    with started([find_plcrt(), *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        place = process.stdout.readline().removeprefix("tcp: ").strip()
+        assert process.stderr.readline() == f"plcrt: serial line {adapter} is missing: it is used when it comes\n"
+        with connect(f"tcp:{place}") as plc:
+            assert plc.identity().device_name == "plcrt"
+            assert any(f"{adapter} is away" in entry.text for entry in plc.log())
+        ours, theirs = os.openpty()
+        (tmp_path / "unplugged").symlink_to(os.ttyname(theirs))
+        with Connection(Wire(ours)) as connection:
+            eventually(lambda: read_identity(Session(connection)).device_name == "plcrt")
+        os.close(theirs)
+        with connect(f"tcp:{place}") as plc:
+            assert any(f"{adapter} is back" in entry.text for entry in plc.log())
+        process.terminate()
+        assert process.wait(PATIENCE) == 0
+
+
+def test_the_flash_file_is_for_its_owner_alone(plcrt):
+    assert stat.S_IMODE(plcrt.flash.stat().st_mode) == 0o600
+
+
+@pytest.mark.parametrize(("mode", "said"), [(0o600, ""), (0o640, "chmod 600"), (0o604, "chmod 600")])
+def test_a_flash_file_that_others_may_open_is_said(tmp_path, mode, said):
+    flash = tmp_path / "flash"
+    command = [find_plcrt(), "--flash", str(flash), "--tcp", "127.0.0.1:0"]
+    for _ in range(2):
+        flash.touch()
+        flash.chmod(mode)
+        with started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            process.stdout.readline()
+            process.terminate()
+            errors = process.communicate(timeout=PATIENCE)[1]
+        assert said in errors and bool(errors) == bool(said)
+        assert stat.S_IMODE(flash.stat().st_mode) == mode
 
 
 def test_a_flash_file_in_a_folder_that_does_not_exist_exits_1(tmp_path):
@@ -332,13 +380,15 @@ def test_no_function_is_looked_up_by_the_linker_while_it_runs():
 
 def test_it_runs_without_any_line(tmp_path, eventually):
     command = [find_plcrt(), "--flash", str(tmp_path / "flash")]
-    with started(command, stdout=subprocess.PIPE, text=True) as process:
+    with started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         eventually(lambda: find_worker(process.pid))
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
         process.terminate()
         assert process.wait(PATIENCE) == 0
         assert process.stdout.read() == ""
+        said = "plcrt: no tool can reach this controller: give --serial, --tcp, --udp, --can or --tunnel\n"
+        assert process.stderr.read() == said
 
 
 def test_two_do_not_share_a_serial_device(tmp_path):

@@ -58,7 +58,7 @@ static bool set_up(int file, const char *interface, bool fd)
 int CanSocketOpen(const char *interface, bool fd)
 {
     int file = -1;
-    errno = ENODEV;
+    errno = ENAMETOOLONG;
     if (strlen(interface) < IFNAMSIZ) {
         file = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
     }

@@ -18,6 +18,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
@@ -35,6 +36,7 @@ static struct {
     PORT_CAN_OPTIONS options;
     PORT_SOURCE line; /* no file while it is away */
     int slave;        /* of a pseudo terminal */
+    int away;         /* errno of the opening by main */
     bool is_slcan;
     bool configured;
     bool open;
@@ -194,6 +196,22 @@ static const char *advice(int error)
     return error == EPROTONOSUPPORT ? "; for CAN FD it needs mtu 72: ip link set can0 mtu 72" : "";
 }
 
+/* Interfaces are not in a folder of devices, so each name may come; one that is down may be set up. */
+static bool may_come(int error)
+{
+    return can.is_slcan ? PortMayCome(error, can.name) : error == ENODEV || error == ENETDOWN;
+}
+
+const char *PortCanAway(void)
+{
+    static char words[128];
+    if (can.line.file >= 0) {
+        return NULL;
+    }
+    (void)snprintf(words, sizeof(words), "%s%s", strerror(can.away), advice(can.away));
+    return words;
+}
+
 bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON *reason)
 {
     const char *path = slcan_path(text);
@@ -214,8 +232,12 @@ bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON 
     can.is_slcan = path != NULL;
     strcpy(can.name, path != NULL ? path : text);
     can.line = (PORT_SOURCE){.file = pty ? open_pty() : -1, .events = POLLIN};
+    can.away = 0;
     if ((pty && can.slave < 0) || !open_line()) {
-        int error = errno;
+        can.away = errno;
+    }
+    if (can.away != 0 && (pty || !may_come(can.away))) {
+        int error = can.away;
         PortReason(reason, "cannot open CAN %s: %s%s", text, strerror(error), advice(error));
         reason->busy = error == EBUSY;
         PortCanClose();

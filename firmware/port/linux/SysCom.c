@@ -272,7 +272,7 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
     forget(own);
     own->settings = (SYSCOM_SETTINGS){.baud = baud, .parity = SYSCOM_PARITY_NONE, .stop_bits = 1};
     strcpy(link != NULL ? state.link : own->path, link != NULL ? link : path);
-    if (link != NULL ? !open_pty() : !open_device(own)) {
+    if (link != NULL ? !open_pty() : !open_device(own) && !PortMayCome(errno, path)) {
         int error = errno;
         PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)baud, strerror(error));
         reason->busy = error == EBUSY;
@@ -290,6 +290,11 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
     }
     state.configured = true;
     return true;
+}
+
+bool PortComIsThere(void)
+{
+    return own->source.file >= 0;
 }
 
 /* TIOCEXCL would hold as long as any process has the device open. */
@@ -467,6 +472,9 @@ bool PortComCheck(const char *path, const SYSCOM_SETTINGS *settings, PORT_REASON
     strcpy(line.path, path);
     if (!open_device(&line)) {
         int error = errno;
+        if (PortMayCome(error, path)) {
+            return true;
+        }
         PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)settings->baud, text_of(error));
         reason->busy = error == EBUSY;
         return false;

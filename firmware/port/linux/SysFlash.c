@@ -274,7 +274,7 @@ static const char *advice(int error)
 
 bool PortFlashOpen(const char *path, PORT_REASON *reason)
 {
-    state.file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    state.file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
     if (state.file < 0) {
         PortReason(reason, "cannot open flash file %s: %s%s", path, strerror(errno), advice(errno));
         return false;
@@ -284,6 +284,12 @@ bool PortFlashOpen(const char *path, PORT_REASON *reason)
         return false;
     }
     return true;
+}
+
+bool PortFlashIsShared(void)
+{
+    struct stat info;
+    return fstat(state.file, &info) == 0 && (info.st_mode & (S_IRWXG | S_IRWXO)) != 0;
 }
 
 void PortFlashClose(void)

@@ -610,6 +610,25 @@ static bool open_when_free(const OPTIONS *options, PORT_REASON *reason)
     return opened;
 }
 
+/* What may be meant, but is to be known. */
+static void print_warnings(const OPTIONS *options)
+{
+    bool tunnel = options->tunnel.name != NULL;
+    if (options->serial == NULL && options->tcp == NULL && options->udp == NULL && options->can == NULL && !tunnel) {
+        fprintf(stderr, "plcrt: no tool can reach this controller: give --serial, --tcp, --udp, --can or --tunnel\n");
+    }
+    if (options->serial != NULL && !PortComIsThere()) {
+        fprintf(stderr, "plcrt: serial line %s is missing: it is used when it comes\n", options->serial);
+    }
+    if (options->can != NULL && PortCanAway() != NULL) {
+        fprintf(stderr, "plcrt: CAN %s is missing (%s): it is used when it comes\n", options->can, PortCanAway());
+    }
+    if (PortFlashIsShared()) {
+        fprintf(stderr, "plcrt: other users may open %s, with the password and the program in it: chmod 600 %s\n",
+                options->flash, options->flash);
+    }
+}
+
 /* For users who have forgotten it: those who may write the file have the device anyway. */
 static int reset_password(const OPTIONS *options, PORT_REASON *reason)
 {
@@ -650,6 +669,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "plcrt: %s\n", reason.text);
         return EXIT_RUNTIME;
     }
+    print_warnings(&options);
     ModbusToolLineSet(&options.tunnel);
     int status = options.alone ? run_alone() : PortSupervise(run_supervised);
     SysExceptShutdown();

@@ -3,10 +3,13 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#define _DEFAULT_SOURCE /* lstat */
 #include "port.h"
 
+#include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/stat.h>
 
 void PortReason(PORT_REASON *reason, const char *format, ...)
@@ -16,6 +19,15 @@ void PortReason(PORT_REASON *reason, const char *format, ...)
     vsnprintf(reason->text, sizeof(reason->text), format, arguments);
     va_end(arguments);
     reason->busy = false;
+}
+
+bool PortMayCome(int error, const char *path)
+{
+    static const char devices[] = "/dev/";
+    struct stat info;
+    bool missing = error == ENOENT || error == ENODEV || error == ENXIO;
+    bool named = strncmp(path, devices, sizeof(devices) - 1) == 0 || (lstat(path, &info) == 0 && S_ISLNK(info.st_mode));
+    return missing && named;
 }
 
 bool PortIsDevice(int file, const char *path)

@@ -19,6 +19,10 @@ typedef struct {
 
 void PortReason(PORT_REASON *reason, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* Whether what could not be opened, by errno, may come later: a device that is not plugged in. A path outside of /dev that
+ * is not a link either leads to no device. */
+bool PortMayCome(int error, const char *path);
+
 /* Whether `path` leads to the device that is open as `file`: a device may have several names (links of udev). */
 bool PortIsDevice(int file, const char *path);
 
@@ -71,21 +75,26 @@ void PortEventClose(void);
 
 /* ---- SysFlash ---- */
 
-/* Opens the flash file, or creates it with erased bytes, and locks it. Before CMInit. */
+/* Opens the flash file, or creates it with erased bytes, for its owner alone, and locks it. Before CMInit. */
 bool PortFlashOpen(const char *path, PORT_REASON *reason);
+/* Whether users other than its owner may read or write it. */
+bool PortFlashIsShared(void);
 void PortFlashClose(void);
 
 /* ---- SysCom ---- */
 
 bool PortComKnowsBaud(RTS_UI32 baud);
 /* Opens the one serial line: a device, with path "pty" a new pseudo terminal, with "pty:LINK" one that the symbolic link
- * LINK leads to until PortComClose. A link to a pseudo terminal is replaced, another file is an error. Before CMInit. */
+ * LINK leads to until PortComClose. A link to a pseudo terminal is replaced, another file is an error. A device that may
+ * come later is looked for as one that is gone. Before CMInit. */
 bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason);
+/* Whether the line is open; false also without one. */
+bool PortComIsThere(void);
 void PortComClose(void);
 /* For a process whose child has the line now: closes a device, which the child opens again when it is lost. A pseudo
  * terminal stays open, so that it outlives the child. */
 void PortComHandOver(void);
-/* Whether SysComOpenPort will be able to open a line like that. */
+/* Whether SysComOpenPort will be able to open a line like that, now or when its device comes. */
 bool PortComCheck(const char *path, const SYSCOM_SETTINGS *settings, PORT_REASON *reason);
 /* Name of the pseudo terminal, which is its link if it has one; NULL when the line is none. */
 const char *PortComPtyName(void);
@@ -100,8 +109,11 @@ typedef struct {
 } PORT_CAN_OPTIONS;
 
 /* Opens the one CAN controller: an interface of the kernel, "slcan:PATH" for an adapter on a serial line, "slcan:pty" for
- * a new pseudo terminal. Before CMInit. */
+ * a new pseudo terminal. An interface or adapter that may come later is looked for as one that is gone, an interface that
+ * is down too. Before CMInit. */
 bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON *reason);
+/* Why it is not open, in words; NULL if it is. */
+const char *PortCanAway(void);
 void PortCanClose(void);
 /* As PortComHandOver. */
 void PortCanHandOver(void);
