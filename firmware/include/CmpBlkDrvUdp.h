@@ -11,9 +11,10 @@
 #include "CmpRouterEmbedded.h"
 
 typedef struct {
-    RTS_UI32 packets;  /* received */
-    RTS_UI32 too_long; /* longer than any packet */
-    RTS_UI32 no_reply; /* the source cannot be replied to: port 0, multicast */
+    RTS_UI32 packets;   /* received */
+    RTS_UI32 too_long;  /* longer than any packet */
+    RTS_UI32 no_reply;  /* the source cannot be replied to: port 0, multicast */
+    RTS_UI32 not_named; /* name requests without reply: too many, and shorter than the reply */
 } UDP_COUNTERS;
 
 /* Writes the network address of a node: the host bits of `ip` (those after `prefix`, 0..32), preceded by the port index

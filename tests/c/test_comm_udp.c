@@ -279,13 +279,59 @@ static void a_flood_is_worked_off_in_pieces(void)
     net_start("", "@");
     int file = net_udp(0);
     for (int i = 0; i < FLOOD; i++)
-        net_send_to(file, net_device(SYSSOCK_UDP), scan, sizeof(scan));
+        net_send_to(file, net_device(SYSSOCK_UDP), to_another, sizeof(to_another));
     fakes_cycle(0);
     CHECK(BlkDrvUdpGetCounters()->packets < FLOOD);
     while (net_datagram(file, packet, sizeof(packet)) != 0)
         answers++;
     CHECK_EQUAL(answers, FLOOD);
     close(file);
+    net_end();
+}
+
+/* Sends requests for the name from several sources; returns how many are answered, and the bytes of the answers. */
+static int count_names(const RTS_UI8 *request, RTS_UI32 size, int requests, RTS_UI32 *bytes)
+{
+    int files[] = {net_udp(0), net_udp(0), net_udp(0)};
+    int answers = 0;
+
+    for (int i = 0; i < requests; i++)
+        net_send_to(files[i % 3], net_device(SYSSOCK_UDP), request, size);
+    for (int i = 0; i < 3; i++)
+        for (RTS_UI32 count; (count = net_datagram(files[i], packet, sizeof(packet))) != 0; answers++)
+            *bytes += count;
+    for (int i = 0; i < 3; i++)
+        close(files[i]);
+    return answers;
+}
+
+static void requests_of_forged_senders_are_answered_seldom(void)
+{
+    enum { FLOOD = 100, BURST = 32 };
+    RTS_UI32 bytes = 0;
+
+    net_start("", "@");
+    int answers = count_names(scan, sizeof(scan), FLOOD, &bytes);
+    CHECK(answers >= BURST && answers < FLOOD / 2); /* the fakes let some time pass */
+    CHECK_EQUAL(BlkDrvUdpGetCounters()->not_named, (RTS_UI32)(FLOOD - answers));
+    fakes_cycle(1000 * 1000); /* no more than at the start, however long it was quiet */
+    answers = count_names(scan, sizeof(scan), FLOOD, &bytes);
+    CHECK(answers >= BURST && answers < FLOOD / 2);
+    net_end();
+}
+
+static void a_request_as_long_as_the_answer_is_always_answered(void)
+{
+    enum { FLOOD = 100, LONG = 300 };
+    RTS_UI8 request[LONG] = {0};
+    RTS_UI32 bytes = 0;
+
+    net_start("", "@");
+    (void)count_names(scan, sizeof(scan), FLOOD, &bytes);
+    memcpy(request, scan, sizeof(scan));
+    bytes = 0;
+    CHECK_EQUAL(count_names(request, sizeof(request), FLOOD, &bytes), FLOOD);
+    CHECK(bytes <= FLOOD * LONG);
     net_end();
 }
 
@@ -355,6 +401,8 @@ int main(void)
     RUN(clients_that_have_vanished_give_way_in_less_than_a_second);
     RUN(what_is_no_packet_is_dropped);
     RUN(a_flood_is_worked_off_in_pieces);
+    RUN(requests_of_forged_senders_are_answered_seldom);
+    RUN(a_request_as_long_as_the_answer_is_always_answered);
     RUN(the_first_free_port_is_taken_or_the_one_asked_for);
     RUN(what_is_no_place_is_refused);
     return test_result();

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from fake_device import DEVICE_NAME, NODE_NAME, SERIAL, VENDOR_NAME, FakeDevice, FakeLine
 
 from plctool import device
 from plctool.core import lib
 from plctool.errors import LinkError
+from plctool.link import router
 from plctool.link.connection import Connection
 from plctool.link.names import Node
 
@@ -42,3 +45,16 @@ def test_a_reply_that_arrived_while_the_tool_had_to_wait_is_found() -> None:
             return super().receive(timeout)
 
     assert [node.node_name for node in Connection(Stalled(FakeDevice())).scan(0.5)] == [NODE_NAME]
+
+
+@pytest.mark.parametrize(("byte_rate", "sizes"), [(math.inf, [8, 256, 256]), (11520.0, [8, 8, 8])])
+def test_a_request_on_a_network_is_as_long_as_the_reply_when_it_is_repeated(
+    monkeypatch: pytest.MonkeyPatch, byte_rate: float, sizes: list[int]
+) -> None:
+    """A device that many requests arrive at does not reply to short ones."""
+    line = FakeLine(FakeDevice())
+    line.byte_rate = byte_rate
+    sent: list[bytes] = []
+    monkeypatch.setattr(line, "send", lambda *packets: sent.extend(packets))
+    assert Connection(line).scan(1.0) == []
+    assert [len(packet.payload) for data in sent if (packet := router.decode(data))] == sizes

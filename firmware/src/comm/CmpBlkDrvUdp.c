@@ -11,7 +11,9 @@
 
 #include <string.h>
 
+#include "CmpPackets.h"
 #include "SysSocket.h"
+#include "SysTime.h"
 #include "rts_config.h"
 
 #if COMM_ENDPOINTS /* a port without network may compile all of firmware/src */
@@ -20,6 +22,9 @@ enum {
     READ_MAX = 64, /* datagrams per cycle, so that a flood does not stop the rest of the runtime */
     PORT_BITS = 16,
     IP_BITS = 32,
+    NAMES_MAX = 32, /* replies to name requests at once that are longer than the request ... */
+    NAMES_EVERY_MS =
+        64, /* ... and one more after each such time: at most 2 KB a second to a sender that may be forged */
 };
 
 typedef struct {
@@ -31,11 +36,14 @@ typedef struct {
 static struct {
     LISTENER own;
     LISTENER broadcast;
+    RTS_UI32 request_size; /* bytes of the datagram that is handled */
+    RTS_UI32 names;        /* longer replies to name requests that may be sent now, as of `names_at` */
+    RTS_UI32 names_at;     /* SysTimeGetMs */
 } udp;
 
 static UDP_COUNTERS counters;
 
-static const char *const counter_names[] = {"packets", "too long", "without reply"};
+static const char *const counter_names[] = {"packets", "too long", "without reply", "names not sent"};
 RTS_STATIC_ASSERT(sizeof(UDP_COUNTERS) == sizeof(RTS_UI32) * RTS_COUNT(counter_names), each_counter_has_a_name);
 const BLK_COUNTERS BlkDrvUdpCounters = {"UDP", counter_names, RTS_COUNT(counter_names), &counters.packets, 1};
 
@@ -75,6 +83,23 @@ static bool can_be_answered(const SOCKADDRESS *from)
 
 /* ---- packets ---- */
 
+/* True if a reply to a name request of this size may be sent: it is not longer than the request, or one of the few that
+ * are. The sender of a request can be forged, and its victim would be sent 8 times as many bytes as the attacker sends. */
+static bool may_be_named(RTS_UI32 size)
+{
+    if (size <= udp.request_size)
+        return true;
+    RTS_UI32 earned = (SysTimeGetMs() - udp.names_at) / NAMES_EVERY_MS;
+    udp.names_at += earned * NAMES_EVERY_MS;
+    udp.names = earned < NAMES_MAX - udp.names ? udp.names + earned : NAMES_MAX;
+    if (udp.names == 0) {
+        COMM_COUNT(counters.not_named);
+        return false;
+    }
+    udp.names--;
+    return true;
+}
+
 static RTS_RESULT udp_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_UI32 count)
 {
     SOCKADDRESS to = address_of(peer->endpoint);
@@ -87,6 +112,8 @@ static RTS_RESULT udp_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_U
         memcpy(packet + size, parts[i].data, parts[i].size);
         size += parts[i].size;
     }
+    if (((const ROUTER_HEADER *)packet)->service == ROUTER_SVC_NAME_RESPONSE && !may_be_named(size))
+        return ERR_NOBUFFER;
     return SysSockSendTo(udp.own.socket, packet, size, &to);
 }
 
@@ -105,6 +132,7 @@ static void take(const LISTENER *listener, const RTS_UI8 *data, RTS_UI32 size, c
         COMM_COUNT(counters.no_reply);
     } else {
         COMM_COUNT(counters.packets);
+        udp.request_size = size;
         RouterHandleDataFrom(&listener->driver, endpoint_of(from), data, size);
     }
 }
@@ -154,6 +182,8 @@ static void open_all(void)
     BLK_DRV *driver = &udp.own.driver;
 
     memset(&udp, 0, sizeof(udp));
+    udp.names = NAMES_MAX;
+    udp.names_at = SysTimeGetMs();
     open_listener(&udp.own, SYSSOCK_UDP);
     open_listener(&udp.broadcast, SYSSOCK_UDP_BROADCAST);
     if (udp.own.socket == NO_SOCKET)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import secrets
@@ -27,6 +28,7 @@ _PORT_OF_HOST = re.compile(r"[\w.-]+:\d+$")
 _BUSY_PAUSE = 0.25  # between two requests for a channel [s]
 _AT_ONCE = 16  # packages sent before the next look at the input
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
+_LONG_REQUEST = 256  # bytes of those on a network: a device limits replies that are longer than the request
 SCAN_SECONDS = 1.5
 _ALL_REPLIED = 1.0  # time after which all devices on a bus have replied [s]
 
@@ -288,11 +290,13 @@ class Connection:
         """
         request_id = secrets.randbits(32)
         found: list[names.Node] = []  # two may have one address by mistake
+        long_request = 0
         now = self.transport.now()
         end, ask_at = now + seconds, now
         while not (enough and len(found) >= enough):
             if ask_at <= now < end:
-                request = names.encode_request(request_id)
+                request = names.encode_request(request_id, long_request)
+                long_request = _LONG_REQUEST if self.transport.byte_rate == math.inf else 0
                 self.transport.send(self._packet(lib.ROUTER_SVC_NAME_REQUEST, router.BROADCAST, request))
                 ask_at = now + _ASK_EVERY
             node = self._named(self._receive(max(0.0, min(ask_at, end) - now)), request_id)

@@ -34,9 +34,10 @@ class Node:
         return ":".join(self.address[i : i + 2].hex().upper() for i in range(0, len(self.address), 2))
 
 
-def encode_request(request_id: int) -> bytes:
-    """A request to all nodes to name themselves."""
-    return _REQUEST.pack(type=lib.NS_RESOLVE_ADDRESS, version=lib.NS_VERSION_0400, request_id=request_id)
+def encode_request(request_id: int, size: int = 0) -> bytes:
+    """A request to all nodes to name themselves, with zeros up to `size`."""
+    request = _REQUEST.pack(type=lib.NS_RESOLVE_ADDRESS, version=lib.NS_VERSION_0400, request_id=request_id)
+    return request.ljust(size, b"\0")
 
 
 def decode_reply(payload: bytes, request_id: int, address: bytes) -> Node | None:
