@@ -145,7 +145,7 @@ static void it_reflects_nothing(void)
 {
     RTS_UI8 forged[] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x20, 0, 0, 0, 0, 0, 0, 0x02, 0xC2, 0x00, 0x04, 1, 2, 3, 4};
 
-    net_start("", "@:0");
+    net_start("", "@:1740");
     int victim = net_udp(0);
     int attacker = net_udp(0);
     SOCKADDRESS name = net_name(victim);
@@ -341,7 +341,7 @@ static void the_first_free_port_is_taken_or_the_one_asked_for(void)
     char text[64];
     char name[64];
 
-    net_start("", "@:2");
+    net_start("", "@:1742");
     CHECK_EQUAL(net_device(SYSSOCK_UDP).port, UDP_PORT + 2);
     int file = net_udp(0);
     net_send_to(file, to_all(), scan, sizeof(scan)); /* to its port */
@@ -357,7 +357,7 @@ static void the_first_free_port_is_taken_or_the_one_asked_for(void)
         CHECK_EQUAL(net_device(SYSSOCK_UDP).port, UDP_PORT + i);
         net_end();
         files[i] = net_udp(UDP_PORT + i);
-        snprintf(text, sizeof(text), "%s:%d", net_own(), i);
+        snprintf(text, sizeof(text), "%s:%d", net_own(), UDP_PORT + i);
         CHECK(!PortUdpOpen(text, &reason) && reason.busy);
     }
     CHECK(!PortUdpOpen(net_own(), &reason) && reason.busy);
@@ -372,12 +372,14 @@ static void what_is_no_place_is_refused(void)
                                             "1",
                                             "127.0.0.1:4",
                                             "127.0.0.1:-1",
-                                            "127.0.0.1:1740",
+                                            "127.0.0.1:3",
+                                            "127.0.0.1:1739",
+                                            "127.0.0.1:1744",
                                             "host",
                                             "127.0.0.1:",
                                             "127.0.0.1:0x1",
                                             "300.0.0.1",
-                                            "127.0.0.1.1.1.1.1.1.1:0"};
+                                            "127.0.0.1.1.1.1.1.1.1:1740"};
     static const char *const wrong_tcp[] = {"", ":", ":1", "65536", "-1", "127.0.0.1:65536", "host:1", "127.0.0:1"};
     PORT_REASON reason;
 

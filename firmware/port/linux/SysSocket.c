@@ -213,14 +213,13 @@ bool PortTcpOpen(const char *text, PORT_REASON *reason)
     return keep(SYSSOCK_TCP, bind_socket(SOCK_STREAM, place, true), "--tcp", text, reason);
 }
 
-/* The port of that index, or the first of the four that is free. */
-static int bind_udp(SOCKADDRESS address, bool indexed)
+/* The port of that number, or the first of the four that is free. */
+static int bind_udp(SOCKADDRESS address, bool numbered)
 {
-    RTS_UI16 first = indexed ? address.port : 0;
-    RTS_UI16 last = indexed ? address.port : UDP_PORTS - 1;
+    RTS_UI32 last = numbered ? address.port : UDP_PORT + UDP_PORTS - 1;
     int file = -1;
-    for (RTS_UI16 index = first; file < 0 && index <= last; index++) {
-        address.port = (RTS_UI16)(UDP_PORT + index);
+    for (RTS_UI32 port = numbered ? address.port : UDP_PORT; file < 0 && port <= last; port++) {
+        address.port = (RTS_UI16)port;
         file = bind_socket(SOCK_DGRAM, address, false);
     }
     return file;
@@ -246,22 +245,22 @@ static bool tell_refusals(void)
     return true;
 }
 
-bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *indexed)
+bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *numbered)
 {
-    *place = (SOCKADDRESS){INADDR_LOOPBACK, 0};
-    return parse_place(text, UDP_PORTS - 1, place, indexed);
+    *place = (SOCKADDRESS){INADDR_LOOPBACK, UDP_PORT};
+    return parse_place(text, UDP_PORT + UDP_PORTS - 1, place, numbered) && place->port >= UDP_PORT;
 }
 
 bool PortUdpOpen(const char *text, PORT_REASON *reason)
 {
     SOCKADDRESS place;
-    bool indexed;
+    bool numbered;
     make_ready();
-    if (!PortUdpKnows(text, &place, &indexed)) {
+    if (!PortUdpKnows(text, &place, &numbered)) {
         PortReason(reason, "--udp %s is no address", text);
         return false;
     }
-    return keep(SYSSOCK_UDP, bind_udp(place, indexed), "--udp", text, reason) && tell_refusals() &&
+    return keep(SYSSOCK_UDP, bind_udp(place, numbered), "--udp", text, reason) && tell_refusals() &&
            open_broadcast(own_address(sockets.source[SYSSOCK_UDP].file), text, reason);
 }
 

@@ -56,7 +56,7 @@ typedef struct {
 
 static const char usage[] =
     "usage: plcrt --flash FILE [--serial PATH|pty[:LINK]] [--baud N] [--tcp [ADDRESS:]PORT]\n"
-    "             [--udp ADDRESS[:INDEX]] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
+    "             [--udp ADDRESS[:PORT]] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
     "             [--tunnel PATH] [--tunnel-unit N] [--tunnel-baud N] [--tunnel-parity even|odd|none] "
     "[--tunnel-drive]\n"
     "             [--board NAME] [--event NAME=PIPE]...\n"
@@ -69,9 +69,9 @@ static const char usage[] =
     "  --baud N        speed of the serial device, 115200 if not given\n"
     "  --tcp PLACE     serves TCP at [ADDRESS:]PORT, 127.0.0.1:11740 if no place is given, and prints where as\n"
     "                  \"tcp: ADDRESS:PORT\"; port 0 is one that is free, the address 0.0.0.0 all of this machine\n"
-    "  --udp PLACE     serves UDP at ADDRESS[:INDEX], 127.0.0.1 if no place is given, on port 1740 + INDEX (0..3), "
-    "the\n"
-    "                  first one that is free if there is no INDEX, and prints where as \"udp: ADDRESS:PORT\"\n"
+    "  --udp PLACE     serves UDP at ADDRESS[:PORT], 127.0.0.1 if no place is given, on port 1740 to 1743, the first "
+    "one\n"
+    "                  that is free if there is no PORT, and prints where as \"udp: ADDRESS:PORT\"\n"
     "  --can PLACE     serves CAN: an interface of the system (can0), an adapter (slcan:/dev/ttyACM0), or with "
     "slcan:pty a\n"
     "                  pseudo terminal, whose name it prints as \"can: /dev/pts/N\"\n"
@@ -213,9 +213,11 @@ static const char *take_tcp(const char *text)
 static const char *take_udp(const char *text)
 {
     SOCKADDRESS place;
-    bool indexed;
-    if (!PortUdpKnows(text, &place, &indexed)) {
-        refuse("--udp %s is not a valid address: write for example 192.168.1.5, or 192.168.1.5:1 for port 1741", text);
+    bool numbered;
+    if (!PortUdpKnows(text, &place, &numbered)) {
+        refuse("--udp %s is not a valid address: write for example 192.168.1.5, or 192.168.1.5:1741 for one of the "
+               "ports 1740 to 1743",
+               text);
     }
     return text;
 }

@@ -131,11 +131,11 @@ void PortTargetSetBoard(const char *name);
 
 /* ---- SysSocket ---- */
 
-/* For TCP "[ADDRESS:]PORT" or "ADDRESS", for UDP "ADDRESS[:INDEX]" (port UDP_PORT + INDEX). Without an address it is
- * 127.0.0.1; 0.0.0.0 means all addresses of the machine. TCP port 0 is a free port; without INDEX the first free port is
- * used. ...Knows: whether the text is valid; ...Open: opens the socket. Before CMInit. */
+/* For TCP "[ADDRESS:]PORT" or "ADDRESS", for UDP "ADDRESS[:PORT]" (UDP_PORT and the UDP_PORTS - 1 after it). Without an
+ * address it is 127.0.0.1; 0.0.0.0 means all addresses of the machine. TCP port 0 is a free port; without a UDP port the
+ * first free one is used. ...Knows: whether the text is valid; ...Open: opens the socket. Before CMInit. */
 bool PortTcpKnows(const char *text, SOCKADDRESS *place);
-bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *indexed);
+bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *numbered);
 bool PortTcpOpen(const char *text, PORT_REASON *reason);
 bool PortUdpOpen(const char *text, PORT_REASON *reason);
 void PortSockClose(void);
