@@ -13,6 +13,7 @@ from serial.tools.list_ports_common import ListPortInfo
 from small_app import make_application
 
 from plctool.cli import main as cli
+from plctool.cli import output
 from plctool.core import lib
 from plctool.errors import LinkError
 from plctool.link.transport import BlockTransport
@@ -213,6 +214,13 @@ def test_scan_lists_the_devices(tool: Any, plc: FakePlc) -> None:
     assert found["node_name"] == "press-3"
     assert (found["device_name"], found["target"], found["address"]) == ("Fake controller", "cortex-m3", "0001")
     assert "press-3" in tool("scan", *PORT).out
+
+
+def test_a_scan_shows_what_only_some_devices_say() -> None:
+    healthy, broken = {"node_name": "press"}, {"node_name": "oven", "problem": "a component failed to start"}
+    assert output.devices_text({"devices": [healthy, broken]}).splitlines() == [
+        "node_name  problem", "press", "oven       a component failed to start"
+    ]  # fmt: skip
 
 
 def test_a_long_scan_shows_state_and_program_of_each_device(tool: Any, running: FakePlc) -> None:

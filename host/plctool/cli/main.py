@@ -393,7 +393,7 @@ def _scan(args: argparse.Namespace) -> int:
         document = documents.scan_all(all_serial_ports(args), _gateway_wanted(args), _me(args), args.long)
     else:
         document = documents.scan(link, _gateway_wanted(args), _me(args), args.long)
-    return _show(args, document, lambda d: output.table(d["devices"], d["devices"][0]))
+    return _show(args, document, output.devices_text)
 
 
 def _status(args: argparse.Namespace) -> int:

@@ -101,6 +101,12 @@ def table(rows: Sequence[dict[str, Any]], columns: Iterable[str]) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
+def devices_text(document: dict[str, Any]) -> str:
+    """A line for each device that a scan found; what only some of them say is empty for the others."""
+    columns = dict.fromkeys(name for device in document["devices"] for name in device)
+    return table([{name: device.get(name, "") for name in columns} for device in document["devices"]], columns)
+
+
 def place_text(place: dict[str, Any]) -> str:
     """`, Main, main.st:12` for what has a source line, else nothing."""
     return f", {place['pou']}, {place['file']}:{place['line']}" if place.get("file") else ""
