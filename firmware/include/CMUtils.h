@@ -11,8 +11,9 @@
 #include "CmpStd.h"
 
 /*
- * Formats into `out`, always NUL-terminated and cut to `size` bytes (at least 1). Understands %s, %d (int), %u and %X
- * (unsigned, the latter always with eight digits), %%. Returns the length of the result. From any context.
+ * Formats into `out`, always NUL-terminated and cut to `size` bytes (at least 1). Understands %s, %d (int), %u, %X and %x
+ * (unsigned, the latter two the same: always eight digits), %%. Any other conversion, such as %ld or %5d, and what
+ * follows it stand in the result as they are written. Returns the length of the result. From any context.
  */
 RTS_SIZE CMUtlvsnprintf(char *out, RTS_SIZE size, const char *format, va_list arguments) RTS_FORMAT(3, 0);
 RTS_SIZE CMUtlsnprintf(char *out, RTS_SIZE size, const char *format, ...) RTS_FORMAT(3, 4);

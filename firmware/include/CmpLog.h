@@ -27,7 +27,7 @@ typedef struct {
 } LOG_ENTRY;
 
 #ifndef RTS_CFFI
-/* Adds an entry; `format` is always a literal of ours, with %s %d %u %x only. From main or a task context. Without log
+/* Adds an entry; `format` is a literal with the conversions of CMUtils.h. From main or a task context. Without log
  * its arguments are not evaluated, and the messages take no flash. */
 #define LogAdd(...)                   \
     do {                              \

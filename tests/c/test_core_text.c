@@ -28,13 +28,19 @@ static void every_conversion_works(void)
     CHECK(FORMATS("0 7 -7 2147483647", "%d %d %d %d", 0, 7, -7, INT_MAX));
     CHECK(FORMATS("-2147483648", "%d", INT_MIN));
     CHECK(FORMATS("00000000 0000000A 0000001F FFFFFFFF", "%X %X %X %X", 0u, 10u, 31u, UINT_MAX));
+    CHECK(FORMATS("0000000A FFFFFFFF", "%x %x", 10u, UINT_MAX));
+    CHECK(FORMATS("adc at 0x00000005 is ok", "adc at 0x%x is %s", 5u, "ok"));
     CHECK(FORMATS("100%", "%u%%", 100u));
 }
 
-static void unknown_conversions_do_no_harm(void)
+/* No number is taken for the address of a string. */
+static void an_unknown_conversion_ends_the_formatting(void)
 {
-    CHECK(FORMATS("q", "%q"));
-    CHECK(FORMATS("end", "end%"));
+    CHECK(FORMATS("%q", "%q"));
+    CHECK(FORMATS("end%", "end%"));
+    CHECK(FORMATS("a 1 %ld %s", "a %d %ld %s", 1, 2L, "text"));
+    CHECK(FORMATS("%5d %s", "%5d %s", 7, "text"));
+    CHECK(FORMATS("%llu of %s", "%llu of %s", 7ull, "text"));
     CHECK(FORMATS("%", "%%"));
 }
 
@@ -75,7 +81,7 @@ static void wide_text_has_two_bytes_a_character_and_a_nul(void)
 int main(void)
 {
     RUN(every_conversion_works);
-    RUN(unknown_conversions_do_no_harm);
+    RUN(an_unknown_conversion_ends_the_formatting);
     RUN(output_is_cut_to_its_size);
     RUN(length_of_a_text_ends_at_its_nul_or_the_limit);
     RUN(wide_text_has_two_bytes_a_character_and_a_nul);

@@ -54,11 +54,11 @@ RTS_SIZE CMUtlvsnprintf(char *out, RTS_SIZE size, const char *format, va_list ar
     const char *s;
 
     for (; *format != '\0'; format++) {
-        if (*format != '%') {
+        if (*format != '%' || *++format == '%') {
             put_char(&output, *format);
             continue;
         }
-        switch (*++format) {
+        switch (*format) {
         case 's':
             s = va_arg(arguments, const char *);
             put_string(&output, s != NULL ? s : "(null)");
@@ -70,16 +70,15 @@ RTS_SIZE CMUtlvsnprintf(char *out, RTS_SIZE size, const char *format, va_list ar
             put_number(&output, va_arg(arguments, unsigned), 10);
             break;
         case 'X':
+        case 'x':
             put_number(&output, va_arg(arguments, unsigned), 16);
             break;
-        case '\0':
-            format--;
-            break;
-        default:
-            put_char(&output, *format);
-            break;
+        default: /* which argument is whose is not known from here on */
+            put_string(&output, format - 1);
+            goto end;
         }
     }
+end:
     out[output.length] = '\0';
     return output.length;
 }

@@ -120,8 +120,7 @@ RTS_RESULT CMInit(void)
     if (result != ERR_OK) {
         done--; /* the one that failed has undone what it did itself */
         if (!CM_LEAVES_OUT)
-            LogAdd(CMPID_CmpMgr, LOG_ERROR, result, "Start-up failed in %s, step %u",
-                   cmp_names[done % cmp_component_count].name, (unsigned)(done / cmp_component_count));
+            LogAdd(CMPID_CmpMgr, LOG_ERROR, result, "Start of %s failed", cmp_names[done % cmp_component_count].name);
     } else {
         result = CMCallHook(CH_INIT_FINISHED);
     }
