@@ -237,6 +237,40 @@ static void a_board_without_a_name(void)
     SimSetBoard(NULL);
 }
 
+/* ---- exact bounds: one more is refused, the last possible one is taken ---- */
+
+static void a_channel_that_ends_after_its_area(void)
+{
+    begin_with_old();
+    plant.is_careless = true;
+    io.channels[0].map.bits = 32;
+    io.channels[0].map.area_bit = 8 * (spec.areas[APP_AREA_INPUT] - 3);
+    check_refused(ERR_INVALID_REFERENCE, "The I/O configuration is damaged (table ");
+    io.channels[0].map.area_bit = 8 * (spec.areas[APP_AREA_INPUT] - 4);
+    CHECK_EQUAL(try_load(), ERR_OK);
+}
+
+static void a_state_that_ends_after_the_data(void)
+{
+    begin_with_old();
+    io.connectors[0].state = spec.areas[APP_AREA_DATA] - sizeof(IO_DEVICE_STATE) + 4;
+    check_refused(ERR_INVALID_REFERENCE, "The I/O configuration is damaged (table ");
+    io.connectors[0].state = spec.areas[APP_AREA_DATA] - sizeof(IO_DEVICE_STATE);
+    CHECK_EQUAL(try_load(), ERR_OK);
+}
+
+static void a_parameter_that_ends_after_the_configuration(void)
+{
+    IoConfigParameter *parameter;
+
+    begin_with_old();
+    parameter = io_add_parameter(&io, 7, 33, io.head.data_size - 4);
+    parameter->flags = PVF_POINTER;
+    check_refused(ERR_INVALID_REFERENCE, "The I/O configuration is damaged (table ");
+    parameter->bits = 32;
+    CHECK_EQUAL(try_load(), ERR_OK);
+}
+
 static void a_boot_project_is_refused_like_a_download(void)
 {
     begin_with_old();
@@ -266,6 +300,9 @@ int main(void)
     RUN(inputs_and_outputs_of_another_board);
     RUN(a_board_without_a_name);
     RUN(a_part_that_the_runtime_does_not_know);
+    RUN(a_channel_that_ends_after_its_area);
+    RUN(a_state_that_ends_after_the_data);
+    RUN(a_parameter_that_ends_after_the_configuration);
     RUN(a_boot_project_is_refused_like_a_download);
     return test_result();
 }
