@@ -271,6 +271,34 @@ static void a_parameter_that_ends_after_the_configuration(void)
     CHECK_EQUAL(try_load(), ERR_OK);
 }
 
+static void a_bus_of_the_task_after_the_last_one(void)
+{
+    begin_with_old();
+    io.connectors[0].bus_task = 1;
+    check_refused(ERR_INVALID_REFERENCE, "The I/O configuration is damaged (table ");
+    io.connectors[0].bus_task = 0;
+    CHECK_EQUAL(try_load(), ERR_OK);
+}
+
+static void a_device_that_is_its_own_parent(void)
+{
+    begin_with_old();
+    io.connectors[0].parent = 0;
+    check_refused(ERR_INVALID_REFERENCE, "The I/O configuration is damaged (table ");
+}
+
+static void parameters_with_the_same_number(void)
+{
+    IoConfigParameter *second;
+
+    begin_with_old();
+    io_add_parameter(&io, 0, 8, 0);
+    second = io_add_parameter(&io, 0, 8, 0);
+    check_refused(ERR_INVALID_REFERENCE, "The I/O configuration is damaged (table ");
+    second->id = 1;
+    CHECK_EQUAL(try_load(), ERR_OK);
+}
+
 static void a_boot_project_is_refused_like_a_download(void)
 {
     begin_with_old();
@@ -303,6 +331,9 @@ int main(void)
     RUN(a_channel_that_ends_after_its_area);
     RUN(a_state_that_ends_after_the_data);
     RUN(a_parameter_that_ends_after_the_configuration);
+    RUN(a_bus_of_the_task_after_the_last_one);
+    RUN(a_device_that_is_its_own_parent);
+    RUN(parameters_with_the_same_number);
     RUN(a_boot_project_is_refused_like_a_download);
     return test_result();
 }
