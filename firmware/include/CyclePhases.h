@@ -28,7 +28,7 @@ typedef enum {
     CYCLE_AFTER_CODE,  /* outputs are forced, in what the task has written */
     CYCLE_OUTPUTS,     /* drivers take the shared outputs, which have what the task changed */
     CYCLE_RECORD,      /* trace */
-    CYCLE_SAFE_STATE,  /* in no cycle: outputs are zero and stay so, see AppEnterSafeState */
+    CYCLE_SAFE_STATE,  /* in no cycle: devices get what is safe, see AppEnterSafeState */
 } CYCLE_PHASE;
 
 /* `task`: its index; `context`: the areas as the task sees them, and the time of the cycle. Of CYCLE_SAFE_STATE: 0 and
@@ -39,8 +39,8 @@ typedef void (*PF_CYCLE_PHASE)(RTS_UI32 task, const IEC_CONTEXT *context);
 RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run);
 
 /*
- * Puts the application into its safe state: outputs are zero, and the phases registered for CYCLE_SAFE_STATE have made
- * the hardware agree. The one way there: after an exception (in the context of the task that had it, at once, and again
+ * Puts the application into its safe state: outputs are zero, but for those that a channel takes to a device: they keep the
+ * values of their variables, and the phases registered for CYCLE_SAFE_STATE have made the hardware safe. The one way there: after an exception (in the context of the task that had it, at once, and again
  * from main when all tasks have ended their cycle), at a stop, and when a start failed. No task starts another cycle by
  * then, and what those that still run have changed does not reach the outputs any more. From main or a task.
  */

@@ -54,7 +54,8 @@ const IoConfigChannelMap *IoMgrConfigGetChannelMaps(const IoConfigConnectorMap *
  * Copies one channel between the memory of its parameter in the driver, from bit 0 of the parameter on, and the inputs or
  * outputs; the driver knows that its memory is as long. LE: the device has the lowest byte of a number first; BE: the
  * highest. What the engineer says of a channel (IO_CHANNEL_BIG_ENDIAN) turns it round. Channels of single bits are
- * not changed by either; other bits of their byte stay.
+ * not changed by either; other bits of their byte stay. While no cycle may start, an output is copied as the configuration
+ * says for the safe state: zero, a value, or not at all if it holds.
  */
 void IoMgrCopyInputLE(const IoConfigChannelMap *channel, const void *memory);
 void IoMgrCopyInputBE(const IoConfigChannelMap *channel, const void *memory);

@@ -302,7 +302,7 @@ def test_counters_of_the_driver_have_names(plant: Plant) -> None:
     absent = ("Second", "Ghost")  # an optional line that is in use, and its device
     present = [d for d in plant.plc.symbols().io["devices"] if d["name"] not in absent]
     counters = [(d["name"], p["name"]) for d in present for p in d["parameters"] if p["id"] >= FIRST_COUNTER]
-    assert len(counters) == 3 * 6 + 6 + 2, "of three devices, the server and two lines"
+    assert len(counters) == 3 * 7 + 6 + 2, "of three devices, the server and two lines"
     assert all(parameter(plant.plc, device, name, None)["value"] >= 0 for device, name in counters)
     with pytest.raises(UsageError, match=r"Meter has no parameter requets; did you mean requests\?"):
         parameter(plant.plc, "Meter", "requets", None)

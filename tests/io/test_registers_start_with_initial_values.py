@@ -59,10 +59,12 @@ def test_what_the_program_sets_before_is_shown(plc: Simulator) -> None:
     assert list(plc.read(*VALUES).values()) == [30.0, 7, 0]
 
 
-def test_after_that_a_reset_changes_no_register(plc: Simulator) -> None:
+@pytest.mark.parametrize("kind", ["warm", "cold"])
+def test_they_are_there_again_after_a_reset(plc: Simulator, kind: str) -> None:
     plc.set_input("Scada.40001", 3.0)
     plc.run_cycles(2)
-    plc.reset("cold")
+    assert list(plc.read(*VALUES).values()) == [3.0, -5, 0]
+    plc.reset(kind)
     plc.start()
     plc.run_cycles(2)
-    assert list(plc.read(*VALUES).values()) == [3.0, -5, 0]
+    assert list(plc.read(*VALUES).values()) == [20.0, -5, 0]

@@ -28,8 +28,8 @@ def channel_of(
     parameter: int = 0,
     holds: bool = False,
 ) -> Channel | None:
-    """A channel from `NAME = "variable"` or `NAME = { var = ... }`; None after a mistake. `holds`: an output, too, holds
-    its value unless it says otherwise."""
+    """A channel from `NAME = "variable"` or `NAME = { var = ... }`; None after a mistake. `holds`: an output
+    holds its value, too, unless it says otherwise."""
     if isinstance(entry.value, Table):
         channel = read_channel(
             entry.value, entry.key, output=output, bits=bits, type=type, parameter=parameter, holds=holds
