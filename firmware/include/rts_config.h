@@ -455,7 +455,7 @@
 #ifndef MODBUS_MAX_CLIENTS /* serial lines, or TCP connections, with devices; about 400 bytes each */
 #define MODBUS_MAX_CLIENTS 1
 #endif
-#ifndef MODBUS_MAX_DEVICES /* on all of them; about 60 bytes each */
+#ifndef MODBUS_MAX_DEVICES /* on all of them; about 100 bytes each */
 #define MODBUS_MAX_DEVICES 8
 #endif
 #ifndef MODBUS_MAX_JOBS /* reads and writes of all devices; about 40 bytes each */

@@ -492,13 +492,13 @@ static const char *miss_of(const MODBUS_DEVICE *device)
 {
     static const char *const misses[] = {
         [MODBUS_MISS_SILENT] = "it does not reply",
-        [MODBUS_MISS_LATE] = "it replies after its timeout",
+        [MODBUS_MISS_LATE] = "its replies are late",
         [MODBUS_MISS_UNIT] = "another unit replies",
         [MODBUS_MISS_OTHER] = "its replies are not to what was asked",
         [MODBUS_MISS_CUT] = "its replies are incomplete",
         [MODBUS_MISS_DAMAGED] = "its replies are damaged",
         [MODBUS_MISS_CLOSED] = "it closes the connection",
-        [MODBUS_MISS_NO_ENTRANCE] = "its line is never free",
+        [MODBUS_MISS_NO_ENTRANCE] = "its line is busy",
         [MODBUS_MISS_GATEWAY] = "its gateway gets no reply from it",
     };
 
