@@ -23,6 +23,14 @@ enum {
     SYS_START_UNKNOWN = 2,
 };
 
+/* What becomes of the boot project. One that stays stopped is loaded but not called, until it is started by a user, or
+ * until the next start. */
+enum {
+    SYS_BOOT_START = 0,
+    SYS_BOOT_STOPPED = 1,
+    SYS_BOOT_PROVEN = 2, /* started if it has proven itself, else it stays stopped */
+};
+
 /* The code offset is not known, or not that of application code. */
 #ifdef RTS_CFFI
 static const RTS_UI32 APP_NO_CODE_OFFSET;
@@ -32,9 +40,8 @@ static const RTS_UI32 APP_NO_CODE_OFFSET;
 
 typedef struct {
     RTS_UI8 cause; /* SYS_START_* */
-    /* Not 0: the boot project is loaded but not called, until it is started by a user, or until the next start. For a
-     * port whose restart after a crash is not a decision of the user (Linux), and for a button that says so; with
-     * APP_MAY_STAY_STOPPED. */
+    /* SYS_BOOT_*. For a port whose restart after a crash is not a decision of the user (Linux), and for a button that
+     * says so; with APP_MAY_STAY_STOPPED. */
     RTS_UI8 stay_stopped;
     /* What follows describes a crash. */
     RTS_I16 task;         /* index of the task, -1: in none, but in initialisation or the runtime itself */

@@ -10,10 +10,11 @@
 #include "../../firmware/src/app/AppImage.h"
 #include "../../firmware/src/app/AppLife.h"
 #include "AppAddress.h"
+#include "AppException.h"
 #include "SysFileFlash.h"
 #include "app_device.h"
 
-enum { RUN_AT_ONCE = 0, STAY_STOPPED = 1 };
+enum { RUN_AT_ONCE = SYS_BOOT_START, STAY_STOPPED = SYS_BOOT_STOPPED, RUN_PROVEN = SYS_BOOT_PROVEN };
 
 static RTS_RESULT restart(RTS_UI8 cause, RTS_UI8 stay_stopped)
 {
@@ -447,6 +448,34 @@ static void a_program_that_was_never_started_is_the_boot_project(void)
     CHECK_EQUAL(running_step(), 1);
 }
 
+static void only_a_proven_application_runs_again_where_that_is_asked_for(void)
+{
+    RTS_UI8 cause;
+
+    for (cause = SYS_START_POWER; cause <= SYS_START_CRASH; cause++) {
+        start_proven();
+        CHECK_EQUAL(restart(cause, RUN_PROVEN), ERR_OK);
+        CHECK_EQUAL(running_step(), 1);
+        CHECK_EQUAL(AppExceptionGet()->code, RTSEXCPT_NOEXCEPTION);
+        start_unproven_after_proven();
+        CHECK_EQUAL(restart(cause, RUN_PROVEN), ERR_OK);
+        CHECK_EQUAL(app_state(), AS_STOP);
+        CHECK(log_has("Boot project not started"));
+        start_with_counter(1);
+        CHECK_EQUAL(restart(cause, RUN_PROVEN), ERR_OK);
+        CHECK_EQUAL(app_state(), AS_STOP);
+    }
+}
+
+static void a_proven_application_that_crashed_in_its_initialisation_does_not_run_again(void)
+{
+    start_proven();
+    die_in_initialisation(SYS_START_POWER);
+    CHECK_EQUAL(restart(SYS_START_CRASH, RUN_PROVEN), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK(log_has("Boot project not started: it failed before"));
+}
+
 int main(void)
 {
     NEEDS_X86_64;
@@ -476,5 +505,7 @@ int main(void)
     RUN(two_resets_of_unknown_cause_in_initialisation_are_a_death);
     RUN(an_exception_in_initialisation_rolls_back_and_says_why);
     RUN(a_program_that_was_never_started_is_the_boot_project);
+    RUN(only_a_proven_application_runs_again_where_that_is_asked_for);
+    RUN(a_proven_application_that_crashed_in_its_initialisation_does_not_run_again);
     return test_result();
 }

@@ -89,25 +89,62 @@ def test_a_program_that_overruns_its_stack_does_not_end_plcrt_at_start_after_sta
 
 
 @pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT, signal.SIGKILL])
-def test_a_program_stays_stopped_when_the_controller_died_and_runs_again_when_it_is_started(
+def test_a_proven_program_runs_again_three_times_when_the_controller_died(
     tool, plcrt, counter, eventually, kill_worker, number
 ):
     prove(tool, plcrt, counter, eventually)
     crc = status(tool, plcrt)["image_crc"]
+    for restart in (1, 2, 3):
+        kill_worker(number)
+        now = status(tool, plcrt)
+        assert (now["state"], now["image_crc"], now["exception"]) == ("run", crc, None)
+        assert f"(signal {number.name}) and was started again; its program runs again ({restart} of 3" in log(
+            tool, plcrt
+        )
     kill_worker(number)
     now = status(tool, plcrt)
     assert now["state"] in ("stop", "exception") and now["image_crc"] == crc
-    assert f"signal {number.name}" in log(tool, plcrt)
+    said = f"(signal {number.name}) and was started again; its program stays stopped, after 3 restarts in 10 minutes"
+    assert said in log(tool, plcrt)
     tool.ok("start", "--port", plcrt.port)
     assert status(tool, plcrt)["state"] == "run"
 
 
+def test_what_runs_again_after_a_death_has_its_retain_values(tool, plcrt, eventually, kill_worker):
+    source = "PROGRAM Main VAR RETAIN count : UDINT; END_VAR count := count + 1; END_PROGRAM"
+    prove(tool, plcrt, tool.build("retained", source), eventually)
+    before = read(tool, plcrt, "Main.count")
+    eventually(lambda: read(tool, plcrt, "Main.count") > before + 300)  # they are saved each second
+    kill_worker(signal.SIGKILL)
+    assert read(tool, plcrt, "Main.count") > before
+
+
+def test_a_program_that_is_not_proven_stays_stopped_when_the_controller_died(
+    tool, plcrt, counter, eventually, kill_worker
+):
+    image = tool.build("quick", "PROGRAM Main VAR n : DINT; END_VAR n := n + 1; END_PROGRAM")
+    prove(tool, plcrt, counter, eventually)
+    tool.ok("flash", "--port", plcrt.port, str(image))
+    kill_worker(signal.SIGKILL)
+    assert status(tool, plcrt)["state"] == "stop"
+
+
+def test_a_program_that_a_user_has_stopped_stays_stopped_when_the_controller_died(
+    tool, plcrt, counter, eventually, kill_worker
+):
+    prove(tool, plcrt, counter, eventually)
+    tool.ok("stop", "--port", plcrt.port)
+    kill_worker(signal.SIGKILL)
+    assert status(tool, plcrt)["state"] == "stop"
+
+
 @pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGKILL])
-def test_a_proven_program_runs_again_at_the_next_start_after_the_controller_died(
+def test_a_proven_program_runs_again_at_the_next_start_after_too_many_deaths(
     tool, plcrt, counter, eventually, kill_worker, number
 ):
     prove(tool, plcrt, counter, eventually)
-    kill_worker(number)
+    for _ in range(4):
+        kill_worker(number)
     assert status(tool, plcrt)["state"] != "run"
     assert plcrt.stop() == 0
     plcrt.start()

@@ -36,7 +36,9 @@ typedef struct {
     bool up;        /* it serves its line */
     bool ended;     /* in order */
     int number;     /* of the signal that it met, 0: none */
+    bool running;   /* the application ran */
     bool ran;       /* the thread that died has run IEC code */
+    bool in_code;   /* and was in it */
     RTS_I16 task;   /* whose cycle that thread was in, -1: none */
     RTS_UI32 code_offset;
 } LIFE;
@@ -46,9 +48,12 @@ static struct {
     int (*work)(void);
     pid_t worker;
     RTS_I64 started_ms;
-    unsigned failures;    /* deaths in a row that no program can have caused */
-    unsigned end_signals; /* received */
-    RTS_I64 kill_ms;      /* when a worker that was asked to end has to be gone */
+    unsigned failures;                          /* deaths in a row that no program can have caused */
+    RTS_I64 restarts_ms[PORT_PROGRAM_RESTARTS]; /* when programs were started again; the oldest is replaced */
+    unsigned restarts;                          /* in all */
+    unsigned restart;                           /* PortProgramRestart */
+    unsigned end_signals;                       /* received */
+    RTS_I64 kill_ms;                            /* when a worker that was asked to end has to be gone */
     char text[40];
     SYS_START start;
 } state;
@@ -105,6 +110,7 @@ static void on_death(int number, siginfo_t *info, void *ucontext)
         state.life->ran = true;
         state.life->task = find_task(arg);
     }
+    state.life->in_code = place != 0 || state.life->task >= 0;
     if (info->si_code <= 0) {
         raise(number); /* it was sent; a fault comes again by itself */
     }
@@ -130,6 +136,18 @@ bool PortIsUp(void)
     state.life->up = true;
     state.life->announced = true;
     return first;
+}
+
+void PortNoteRunning(bool running)
+{
+    if (state.life != NULL) {
+        state.life->running = running;
+    }
+}
+
+unsigned PortProgramRestart(void)
+{
+    return state.restart;
 }
 
 static void be_worker(pid_t supervisor) __attribute__((noreturn));
@@ -182,6 +200,31 @@ static RTS_UI32 describe_signal(int number)
     return RTSEXCPT_NOEXCEPTION;
 }
 
+/* How many programs were started again of late. */
+static unsigned recent_restarts(void)
+{
+    unsigned recent = 0;
+    for (unsigned i = 0; i < state.restarts && i < PORT_PROGRAM_RESTARTS; i++) {
+        recent += now_ms() - state.restarts_ms[i] < PORT_PROGRAM_RESTARTS_MS;
+    }
+    return recent;
+}
+
+static bool is_restart(void)
+{
+    return state.restart > 0 && state.restart <= PORT_PROGRAM_RESTARTS;
+}
+
+/* A program that ran goes on after what it did not cause, as after a loss of power. It may have caused it after all, by
+ * what it wrote into memory earlier, so that is counted. */
+static void plan_restart(void)
+{
+    state.restart = state.life->running && !state.life->in_code ? recent_restarts() + 1 : 0;
+    if (is_restart()) {
+        state.restarts_ms[state.restarts++ % PORT_PROGRAM_RESTARTS] = now_ms();
+    }
+}
+
 /* SIGKILL comes from outside (a user, the system when memory is short): it is reported, and does not count. */
 static void note_death(int status)
 {
@@ -192,9 +235,10 @@ static void note_death(int status)
     } else {
         snprintf(state.text, sizeof(state.text), "exit status %d", WEXITSTATUS(status));
     }
+    plan_restart();
     state.start = (SYS_START){
         .cause = number == SIGKILL ? SYS_START_POWER : SYS_START_CRASH,
-        .stay_stopped = 1,
+        .stay_stopped = is_restart() ? SYS_BOOT_PROVEN : SYS_BOOT_STOPPED,
         .exception = exception,
         .task = state.life->task,
         .code_offset = state.life->code_offset,
@@ -302,7 +346,8 @@ static bool survives(int status, const sigset_t *set)
                 state.failures, state.text);
         return false;
     }
-    fprintf(stderr, "plcrt: the controller died (%s) and is started again; its program stays stopped\n", state.text);
+    fprintf(stderr, "plcrt: the controller died (%s) and is started again; its program %s\n", state.text,
+            is_restart() ? "runs again if it is proven" : "stays stopped");
     return pause_before_start(set);
 }
 

@@ -9,6 +9,7 @@
  */
 #define _GNU_SOURCE
 #include "AppPassword.h"
+#include "AppState.h"
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
 #include "CmpSrvNumbers.h"
@@ -503,6 +504,7 @@ static void main_loop(void)
     while (!quit) {
         PortMainPass();
         (void)CMCallHook(CH_COMM_CYCLE);
+        PortNoteRunning(AppGetState() == AS_RUN);
         (void)PortWait(PORT_IDLE_MS);
     }
 }
@@ -516,11 +518,28 @@ static bool open_events(const OPTIONS *options, PORT_REASON *reason)
     return opened == options->event_count;
 }
 
+/* What became of the program after the death of a worker. */
+static void describe_program(char *words, size_t size)
+{
+    enum { MINUTES = PORT_PROGRAM_RESTARTS_MS / 60000 };
+    unsigned restart = PortProgramRestart();
+    words[0] = '\0';
+    if (restart > PORT_PROGRAM_RESTARTS) {
+        (void)snprintf(words, size, "; its program stays stopped, after %d restarts in %d minutes",
+                       PORT_PROGRAM_RESTARTS, MINUTES);
+    } else if (AppGetState() == AS_RUN) {
+        (void)snprintf(words, size, "; its program runs again (%u of %d times in %d minutes)", restart,
+                       PORT_PROGRAM_RESTARTS, MINUTES);
+    }
+}
+
 static void log_restart(void)
 {
-    if (SysStartGet()->stay_stopped) {
-        LogAdd(CMPID_CmpMgr, LOG_WARNING, ERR_OK, "The controller died (%s) and was started again",
-               SysStartGet()->text);
+    char words[80];
+    if (SysStartGet()->stay_stopped != SYS_BOOT_START) {
+        describe_program(words, sizeof(words));
+        LogAdd(CMPID_CmpMgr, LOG_WARNING, ERR_OK, "The controller died (%s) and was started again%s",
+               SysStartGet()->text, words);
     }
 }
 

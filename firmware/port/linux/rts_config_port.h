@@ -136,6 +136,10 @@
 #define PORT_LIFE_MS 10000
 #define PORT_MAX_FAILURES 6
 
+/* A proven program that ran then is started again, so many times in so long [ms]; after the next death it stays stopped. */
+#define PORT_PROGRAM_RESTARTS 3
+#define PORT_PROGRAM_RESTARTS_MS (10 * 60 * 1000)
+
 /* How long it may take to end when it is asked to [ms]. */
 #define PORT_END_MS 9000
 

@@ -113,7 +113,10 @@ static RTS_RESULT load_boot_project(bool may_go_back)
 
 static bool stays_stopped(void)
 {
-    return APP_MAY_STAY_STOPPED && SysStartGet()->stay_stopped != 0;
+    if (!APP_MAY_STAY_STOPPED)
+        return false;
+    return SysStartGet()->stay_stopped == SYS_BOOT_STOPPED ||
+           (SysStartGet()->stay_stopped == SYS_BOOT_PROVEN && !AppCommitIsProven(AppCommitGet()->active));
 }
 
 /* Notes that the application was what ended the run before this start. */
