@@ -246,6 +246,19 @@ def test_a_file_that_is_too_large_is_refused(tmp_path: Path) -> None:
         read_regular(file, 1 << 20)
 
 
+def test_a_key_of_many_dots_is_refused(tool: Any, project: Path) -> None:
+    write(project, "a" + ".a" * 20_000 + " = 1\n")
+    done = tool("check")
+    assert done.status == 2 and "there are more than 100 dots in a key" in done.err
+
+
+def test_of_many_unknown_keys_the_first_are_reported(tool: Any, project: Path) -> None:
+    write(project, "".join(f"k{n} = 1\n" for n in range(5_000)))
+    done = tool("check")
+    assert done.status == 2 and done.err.count("there is no 'k") == 20
+    assert "5000 keys of plc.toml are unknown; the first 20 are shown" in done.err
+
+
 # ---- a plc.toml of another user
 
 

@@ -27,7 +27,7 @@ _TOKEN = re.compile(
     re.DOTALL,
 )
 _TOO_LARGE = "a number has at most 64 bits"
-_MAX_DEPTH = 100  # brackets within each other: what reads them calls itself
+_MAX_DEPTH = 100  # brackets within each other, tables that a key names: what reads them calls itself
 _LEAST, _LARGEST = -(1 << 63), (1 << 64) - 1
 _HINTS = {
     "Invalid value": '; write true, false, a number, or a text in quotes, such as "Main.start" or "main.st"',
@@ -65,9 +65,12 @@ class TomlText:
         self._check_numbers()
 
     def _check_depth(self, tokens: list[Token]) -> None:
-        depth = 0
+        depth = dots = 0
         for kind, start, _ in tokens:
             depth += (kind in ("[", "{")) - (kind in ("]", "}"))
+            dots = dots + (kind == ".") if kind in ("text", ".") else 0
+            if dots > _MAX_DEPTH:
+                raise BadToml(self.pos(start), f"there are more than {_MAX_DEPTH} dots in a key")
             if depth > _MAX_DEPTH:
                 raise BadToml(self.pos(start), f"there are more than {_MAX_DEPTH} brackets within each other")
 

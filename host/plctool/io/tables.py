@@ -19,6 +19,7 @@ from plctool.io.mistakes import Mistakes
 from plctool.io.positions import Path, TomlText
 
 T = TypeVar("T")
+_MAX_UNKNOWN = 20  # keys of a table that are reported, each with a hint
 
 _WORDS: dict[type, str] = {
     str: "a text in quotes", int: "a number", float: "a number", bool: "true or false", list: "a list", dict: "a table",
@@ -85,11 +86,13 @@ class Table:
 
     def close(self) -> None:
         """Reports the keys that nothing has asked for."""
-        for key in self._values:
-            if key not in self._read:
-                known = f"; {self._title()} has {listed(self._asked, 'or')}" if self._asked else ""
-                hint = did_you_mean(key, self._asked) or known
-                self.mistakes.error(self._text.key_pos((*self._path, key)), f"there is no '{key}' here{hint}")
+        unknown = [key for key in self._values if key not in self._read]
+        if len(unknown) > _MAX_UNKNOWN:
+            self.error(f"{len(unknown)} keys of {self._title()} are unknown; the first {_MAX_UNKNOWN} are shown")
+        for key in unknown[:_MAX_UNKNOWN]:
+            known = f"; {self._title()} has {listed(self._asked, 'or')}" if self._asked else ""
+            hint = did_you_mean(key, self._asked) or known
+            self.mistakes.error(self._text.key_pos((*self._path, key)), f"there is no '{key}' here{hint}")
 
     def _title(self) -> str:
         return f"[{self.name}]" if self.name else self._what
