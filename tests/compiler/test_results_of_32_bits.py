@@ -1,4 +1,4 @@
-"""In the dialects of CODESYS and TwinCAT integers below 32 bits are computed in 32 bits; elsewhere in their own type."""
+"""In the dialects of CODESYS and TwinCAT narrow integers are computed in 32 bits; elsewhere in their own type."""
 
 from __future__ import annotations
 

@@ -59,7 +59,16 @@ def _build(args: argparse.Namespace) -> int:
 def _settings(args: argparse.Namespace) -> Settings:
     from plctool.cli.projects import settings_of
 
-    return settings_of(args)
+    settings = settings_of(args)
+    _print_dialect(args, settings)
+    return settings
+
+
+def _print_dialect(args: argparse.Namespace, settings: Settings) -> None:
+    """Says which dialect was taken because of the files."""
+    if settings.dialect_file is not None and not args.json:
+        name, file = settings.dialect, settings.dialect_file
+        output.say(f"plctool: {one_line(file.name)} makes this a program for --dialect {name}.", sys.stderr)
 
 
 def _check(args: argparse.Namespace) -> int:
@@ -112,7 +121,11 @@ def _project_of(args: argparse.Namespace) -> Settings | None:
     from plctool.project import project_named
 
     file = needed_project() if args.image is None else project_named([args.image])
-    return None if file is None else settings_of_project(file)
+    if file is None:
+        return None
+    settings = settings_of_project(file)
+    _print_dialect(args, settings)
+    return settings
 
 
 def _image(args: argparse.Namespace) -> int:

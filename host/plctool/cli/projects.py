@@ -10,6 +10,7 @@ from typing import Any
 
 from plctool.cli.links import project_link
 from plctool.compiler import IoFiles, Level, ProgramFiles, program_files
+from plctool.compiler.dialect_of_files import dialect_of_files
 from plctool.compiler.project import Project
 from plctool.compiler.warnings import WarningOptions, warning_options
 from plctool.errors import UsageError
@@ -21,7 +22,8 @@ DEFAULT_LEVEL: Level = 2
 @dataclass(frozen=True)
 class Settings:
     """`files`: what the program is made of; `output_named`: the command line says where `output` is; `own_folder`: the
-    project says so, so that its folder may be made; the others as in `compile_sources`."""
+    project says so, so that its folder may be made; `dialect_file`: that for which the dialect was taken; the others as
+    in `compile_sources`."""
 
     files: ProgramFiles
     warnings: WarningOptions
@@ -36,6 +38,7 @@ class Settings:
     firmware: Path | None = None
     limits: bool = True
     dialect: str | None = None
+    dialect_file: Path | None = None
 
     def every_file(self) -> Iterator[Path]:
         """All that is read."""
@@ -59,8 +62,14 @@ def settings_of(args: argparse.Namespace) -> Settings:
         board=_board(args, project),
         firmware=getattr(args, "firmware", None),
         limits=not getattr(args, "no_limits", False),
-        **_of_build(args, project),
+        **_with_dialect(files, _of_build(args, project)),
     )
+
+
+def _with_dialect(files: ProgramFiles, chosen: dict[str, Any]) -> dict[str, Any]:
+    """What was chosen, with the dialect of the files when none was."""
+    found = None if "dialect" in chosen else dialect_of_files(files.source_files)
+    return chosen if found is None else {**chosen, "dialect": found[0], "dialect_file": found[1]}
 
 
 def settings_of_project(file: Path) -> Settings:

@@ -148,7 +148,7 @@ def compile_sources(
     mps2-an385/standard, to whose target and limits the program is held, so that another `target` is refused;
     `firmware`: the ELF file of any board's firmware, which says the same; without
     `limits` it may need more than any device has. `python`: functions that Python implements, in the simulator.
-    `dialect`: iec, codesys or twincat, where systems disagree about what a program means.
+    `dialect`: iec, codesys or twincat, where systems disagree about what a program means; by default that of its files.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
@@ -164,9 +164,9 @@ def compile_sources(
     from plctool.image.board import board_of, read_firmware
     from plctool.image.targets import find_target
 
-    system = find_dialect(dialect)
     number, size = (2, True) if level == "s" else (level, False)
     files = program_files(paths, io, libraries)
+    system = find_dialect(_dialect_of(files) if dialect is None else dialect)
     description = files.load_io()
     known = None
     if board is not None or firmware is not None:
@@ -209,3 +209,10 @@ def compile_sources(
         check_program_fits(built, options.target, known, None if description is None else description.device)
     found = checked.diagnostics
     return replace(built, warnings=found, rendered_warnings=render_all(found, shown))
+
+
+def _dialect_of(files: ProgramFiles) -> str | None:
+    from plctool.compiler.dialect_of_files import dialect_of_files
+
+    found = dialect_of_files(files.source_files)
+    return None if found is None else found[0]

@@ -453,8 +453,8 @@ class Case(Node):
 
 @dataclass
 class For(Node):
-    """`stop` and `step` are evaluated once, before `var` is set. If `each_turn`, `stop` is evaluated after that and after
-    each step, `step` at first and after each turn. The loop ends without wrapping,
+    """`stop` and `step` are evaluated once, before `var` is set. If `each_turn`, `stop` is evaluated after that and
+    after each step, `step` at first and after each turn. The loop ends without wrapping,
     also at the limits of the type; `FOR i := 5 TO 5` runs once. A step of 0 raises DIVIDEBYZERO when it is not a
     constant (a constant 0 is a compile error). `step` is signed when it leads downwards, whatever the type of
     `var`."""

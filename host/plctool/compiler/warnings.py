@@ -26,7 +26,7 @@ WARNINGS = {
     "endless": "a loop never ends as it is written",
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration or is compared with one",
     "escape": "a string ends with \\n, \\r or \\t, which are two characters each",
-    "for-bound": "a FOR changes its end or step in its body, though both are computed once, or computes them from its own variable",
+    "for-bound": "the end or step of a FOR changes in its body, or depends on the variable of the loop",
     "index": "a FOR goes past the end of an array in an iteration that comes for certain, which stops the program",
     "integer-division": "an integer division drops its fraction before the result becomes a REAL",
     "io": "something in a description of inputs and outputs is probably not meant",

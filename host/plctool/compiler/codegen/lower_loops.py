@@ -79,7 +79,7 @@ def for_loop(frame: Body, s: For) -> None:
 
 
 def _loop_with_limits_of_each_turn(frame: Body, s: For) -> None:
-    """The variable is set before `stop` is computed, in each turn anew; `step` at the start and after each turn."""
+    """The variable is set before `stop` is computed, in each turn again; `step` at the start and after each turn."""
     fn = frame.fn
     start, known_step = frame.value(s.start), known_integer(s.step)
     var = frame.effects.owns_loop_variable(s, frame.pou) if frame.pou else None
