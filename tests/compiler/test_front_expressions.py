@@ -260,9 +260,11 @@ def test_arithmetic_is_done_in_the_type_of_the_operands() -> None:
 
 def test_product_that_is_widened_too_late_is_a_warning() -> None:
     assert faults("di := i * i;", "warning") == [
-        "9: this product is calculated in INT and only then becomes DINT; convert a factor"
+        "9: this product is calculated in INT and only then becomes DINT; convert an operand"
     ]
-    assert faults("di := i + i;", "warning") == []
+    assert faults("di := i + i;", "warning") == [
+        "9: this sum is calculated in INT and only then becomes DINT; convert an operand"
+    ]
 
 
 @pytest.mark.parametrize(

@@ -309,7 +309,7 @@ def test_warnings_are_turned_off_by_name() -> None:
 
 
 def test_unknown_name_of_a_warning_lists_the_names() -> None:
-    names = r"access, address, always, assignment, bits, .*unused, widening, written-input\.$"
+    names = r"access, address, always, assignment, bits, .*unused, widening, wrap, written-input\.$"
     with pytest.raises(UsageError, match=rf"no warning 'unusde'; the names are {names}"):
         warning_options(["narrowing,unusde"])
 

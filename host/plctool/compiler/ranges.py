@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from plctool.compiler.typed import Binary, BinaryOp, Const, Convert, Expr, Load, Variable, VarPlace
-from plctool.iec.types import Elementary, Kind, Type, base_of
+from plctool.iec.types import Elementary, Kind, SubrangeType, Type, base_of
 
 Range = tuple[int, int]
 
@@ -40,6 +40,31 @@ def value_range(e: Expr, variables: Mapping[Variable, Range]) -> Range | None:
     return whole
 
 
+class _Subranges(Mapping[Variable, Range]):
+    """The limits of variables that are of a subrange."""
+
+    def __getitem__(self, variable: Variable) -> Range:
+        t = variable.type
+        if not isinstance(t, SubrangeType):
+            raise KeyError(variable)
+        return t.low, t.high
+
+    def __iter__(self) -> Iterator[Variable]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+
+_SUBRANGES = _Subranges()
+
+
+def may_wrap(e: Binary) -> bool:
+    """Whether a sum, difference or product of integers may be outside of its type."""
+    result, whole = _binary(e, _SUBRANGES), type_range(e.type)
+    return result is None or whole is None or not _within(result, whole)
+
+
 def _within(inner: Range, outer: Range) -> bool:
     return outer[0] <= inner[0] and inner[1] <= outer[1]
 
@@ -52,6 +77,9 @@ def _binary(e: Binary, variables: Mapping[Variable, Range]) -> Range | None:
         return left[0] + right[0], left[1] + right[1]
     if e.op is BinaryOp.SUB:
         return left[0] - right[1], left[1] - right[0]
+    if e.op is BinaryOp.MUL:
+        products = [a * b for a in left for b in right]
+        return min(products), max(products)
     if e.op is BinaryOp.AND:
         limits = [r[1] for r in (left, right) if r[0] >= 0]
         return (0, min(limits)) if limits else None

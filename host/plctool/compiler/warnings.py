@@ -56,7 +56,8 @@ WARNINGS = {
     "unlocated": "a variable AT %I*, %Q* or %M* has no address in VAR_CONFIG, or one such as %IW0.1 no channel",
     "unreachable": "a statement is never reached",
     "unused": "a variable, label or program is never used, not even by a test, or the result of a call",
-    "widening": "a product is computed in a type that is narrower than where it goes",
+    "widening": "a sum, difference or product is computed in a type that is narrower than where it goes",
+    "wrap": "a sum, difference or product below 32 bits is divided or compared, and may have wrapped in its type",
     "written-input": "a program writes an input, which the next cycle overwrites",
 }
 """What each warning is about; its name is the `code` of the diagnostic."""

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.ranges import may_wrap
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.conversions import (
     LONGER_DATES,
@@ -24,7 +25,7 @@ from plctool.compiler.semantics.conversions import (
     time_to_ltime,
     whole_value,
 )
-from plctool.compiler.semantics.pitfalls import lost_fraction, overlays
+from plctool.compiler.semantics.pitfalls import lost_fraction, overlays, wrapping
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Call, Const, Convert, Expr, Load, Place, Pos, VarPlace
 from plctool.iec.common_types import NUMBERS
@@ -332,13 +333,20 @@ class Coercion:
                 self._warn(e.pos, "narrowing", f"{e.type} becomes {target}: half of the values change")
         elif source.signed and not target.signed and target.kind is Kind.INT:
             self._warn(e.pos, "narrowing", f"{e.type} becomes {target}: negative values change")
-        elif target.kind is Kind.INT and isinstance(e, Binary) and e.op is BinaryOp.MUL:
+        elif source.bits < target.bits:
+            self._widened(e, target)
+        return convert(e, target)
+
+    def _widened(self, e: Expr, target: Elementary) -> None:
+        """Warns of what may have wrapped before it becomes a wider type."""
+        long_product = target.kind is Kind.INT and isinstance(e, Binary) and e.op is BinaryOp.MUL and may_wrap(e)
+        what = "product" if long_product else wrapping(e)
+        if what:
             self._warn(
                 e.pos,
                 "widening",
-                f"this product is calculated in {source} and only then becomes {target}; convert a factor",
+                f"this {what} is calculated in {e.type} and only then becomes {target}; convert an operand",
             )
-        return convert(e, target)
 
     def _to_real(self, e: Expr, source: Elementary, target: Elementary) -> Expr:
         if source.kind is Kind.REAL:
@@ -354,7 +362,9 @@ class Coercion:
         lost = lost_fraction(e, target)
         if lost:
             self._warn(e.pos, "integer-division", lost)
-        elif source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
+            return convert(e, target)
+        self._widened(e, target)
+        if source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
             self._warn(e.pos, "precision", f"{e.type} becomes {target}: large values are rounded")
         return convert(e, target)
 

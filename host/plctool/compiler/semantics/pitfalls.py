@@ -15,7 +15,7 @@ from itertools import takewhile
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.ranges import Range, type_range
+from plctool.compiler.ranges import Range, may_wrap, type_range
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.conversions import elementary, is_untyped
 from plctool.compiler.semantics.symbols import ERROR
@@ -249,9 +249,34 @@ def _division(e: Expr) -> Binary | None:
         return _division(e.operand) if source is not None and source.kind in NUMBERS else None
     if not isinstance(e, Binary):
         return None
-    if e.op in (BinaryOp.ADD, BinaryOp.SUB):
-        return _division(e.left) or _division(e.right)
+    if e.op in (BinaryOp.ADD, BinaryOp.SUB, BinaryOp.MUL):
+        found = _division(e.left) or _division(e.right)
+        return None if found is not None and _rounds(e, found) else found
     return e if e.op is BinaryOp.DIV else None
+
+
+def _rounds(e: Binary, division: Binary) -> bool:
+    """Whether a number is rounded to a multiple, as in `i / 10 * 10`."""
+    divisor = division.right.value if isinstance(division.right, Const) else None
+    factors = [side.value for side in (e.left, e.right) if isinstance(side, Const)]
+    return e.op is BinaryOp.MUL and factors == [divisor]
+
+
+# ---- sums and products that wrap below 32 bits before something looks at them ----
+
+_GROWING = {BinaryOp.ADD: "sum", BinaryOp.SUB: "difference", BinaryOp.MUL: "product"}
+
+
+def wrapping(e: Expr) -> str:
+    """What to call the `+`, `-` or `*` below 32 bits that an expression is, if its result may be outside of the type it
+    is computed in; "" for others."""
+    if isinstance(e, Unary):
+        return wrapping(e.operand)
+    base = elementary(e.type)
+    if not isinstance(e, Binary) or e.op not in _GROWING or base is None:
+        return ""
+    narrow = base.kind in NUMBERS and base.bits < SIGNED[32].bits
+    return _GROWING[e.op] if narrow and may_wrap(e) else ""
 
 
 # ---- NOT of a number that is then compared, as in `NOT s = 5` ----

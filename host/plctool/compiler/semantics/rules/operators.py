@@ -22,7 +22,7 @@ from plctool.compiler.semantics.conversions import (
     scaled,
     whole_value,
 )
-from plctool.compiler.semantics.pitfalls import always, lost_in_constants, negated_number
+from plctool.compiler.semantics.pitfalls import always, lost_in_constants, negated_number, wrapping
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.rules.literals import match_literals, untyped_bits
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
@@ -171,7 +171,18 @@ def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expe
         return _build(c, op, left, right, t, offset)
     if c.dialect.computes_in_32_bits and is_widened(op, left, right, t):
         return cut(_build(c, op, *in_32_bits(op, left, right), offset), t)
+    if op in (BinaryOp.DIV, BinaryOp.MOD) and is_narrow(t):
+        _report_wrapping(c, left, right, "divided")
     return _build(c, op, _as_operand(c, left, t), _as_operand(c, right, t), t, offset)
+
+
+def _report_wrapping(c: Checker, left: Expr, right: Expr, how: str) -> None:
+    """Warns of operands that may have wrapped in their type, where other systems have computed them in 32 bits."""
+    for e in (left, right):
+        what = "" if c.scope.bindings else wrapping(e)
+        if what:
+            message = f"this {what} wraps in {e.type} before it is {how}; convert an operand to DINT, or use --dialect"
+            c.world.diagnostics.warning(e.pos, "wrap", message)
 
 
 def _as_operand(c: Checker, e: Expr, t: Type) -> Expr:
@@ -300,8 +311,7 @@ def _character_hint(left: Expr, right: Expr) -> str:
 
 def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr:
     left, right = compared(left, right)
-    if is_untyped(left) is not is_untyped(right):
-        _report_decided(c, op, left, right, offset)
+    decided = is_untyped(left) is not is_untyped(right) and _report_decided(c, op, left, right, offset)
     left, right = match_literals(c, left, right, None)
     if isinstance(left.type, InterfaceType) and isinstance(right.type, StructType):
         right = c.coerce(right, left.type)
@@ -333,6 +343,10 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
         return _build(c, op, left, right, BOOL, offset)
     t = base_of(t)
     _report_sign(c, left, right, t, offset)
+    if decided:
+        return _build(c, op, convert(left, t), convert(right, t), BOOL, offset)
+    if is_narrow(t):
+        _report_wrapping(c, left, right, "compared")
     return _build(c, op, _as_operand(c, left, t), _as_operand(c, right, t), BOOL, offset)
 
 
@@ -366,13 +380,15 @@ def _report_number(c: Checker, left: Expr, right: Expr, offset: int) -> None:
             c.warning(offset, "enum", f"{e.type} is compared with {other.type} by the numbers of its values")
 
 
-def _report_decided(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> None:
+def _report_decided(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> bool:
     """Warns of a comparison with a literal that is always TRUE or FALSE. A generic function may be for other types."""
     literal, value = (left, right) if is_untyped(left) else (right, left)
     if isinstance(literal, Const) and isinstance(literal.value, int) and not c.scope.bindings:
         message = always(op, value, literal.value, swapped=literal is left)
         if message:
             c.warning(offset, "always", message)
+            return True
+    return False
 
 
 def _build(c: Checker, op: BinaryOp, left: Expr, right: Expr, t: Type, offset: int) -> Expr:
