@@ -167,6 +167,77 @@ def test_a_condition_may_be_a_named_transition_or_a_variable(tmp_path: Path) -> 
         assert plc.read("Main.Start.X") is True
 
 
+RAIL = '<leftPowerRail localId="1"/>'
+
+
+def contact(number: int, name: str, source: str, more: str = "") -> str:
+    """A contact of a drawn condition."""
+    return f'<contact localId="{number}" {more}>{into(source)}<variable>{name}</variable></contact>'
+
+
+def coil(number: int, name: str, *sources: str, more: str = "") -> str:
+    """A coil of a drawn condition."""
+    return f'<coil localId="{number}" {more}>{into(*sources)}<variable>{name}</variable></coil>'
+
+
+GREATER = (
+    '<block localId="3" typeName="GT"><inputVariables>'
+    f'<variable formalParameter="IN1">{into("1")}</variable><variable formalParameter="IN2">{into("2")}</variable>'
+    '</inputVariables><outputVariables><variable formalParameter="OUT"/></outputVariables></block>'
+    '<inVariable localId="1"><expression>n</expression></inVariable>'
+    '<inVariable localId="2"><expression>1</expression></inVariable>'
+)  # fmt: skip
+OUTPUT = (
+    '<outVariable localId="4"><connectionPointIn><connection refLocalId="3" formalParameter="OUT"/></connectionPointIn>'
+    "<expression>Go</expression></outVariable>"
+)
+
+
+def drawn_condition(body: str) -> str:
+    """A chart that counts in its first step and goes on when the transition Go holds."""
+    named = '<transition localId="2">' + into("1") + '<condition><reference name="Go"/></condition></transition>\n'
+    elements = (
+        step(1, "Start", initial=True), named, step(3, "Busy", "2"), actions(6, "1", action("Count")),
+        transition(4, "3", "FALSE"), jump(5, "4", "Start"),
+    )  # fmt: skip
+    go = f'<transition name="Go"><body>{body}</body></transition>'
+    return chart(*elements, more=f"{COUNT}<transitions>{go}</transitions>")
+
+
+@pytest.mark.parametrize(
+    ("body", "cycles"),
+    [
+        (f"<FBD>{GREATER}{OUTPUT}</FBD>", 3),
+        (f"<LD>{RAIL}{contact(2, 'Start.X', '1')}{coil(3, 'go', '2')}</LD>", 2),
+        (f"<LD>{RAIL}{contact(2, 'a', '1', 'negated=' + chr(34) + 'true' + chr(34))}{coil(3, 'Go', '2')}</LD>", 2),
+        (f"<LD>{RAIL}{contact(2, 'a', '1')}{contact(4, 'b', '1')}{coil(3, 'Go', '2', '4')}</LD>", None),
+    ],
+)
+def test_a_condition_may_be_drawn(tmp_path: Path, body: str, cycles: int | None) -> None:
+    with started(tmp_path, drawn_condition(body)) as plc:
+        seen = []
+        for _ in range(4):
+            plc.run_cycles(1)
+            seen.append(plc.read("Main.Busy.X"))
+    assert (seen.index(True) + 1 if True in seen else None) == cycles
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        (f"<LD>{RAIL}{coil(3, 'Go', '1', more='storage=' + chr(34) + 'set' + chr(34))}</LD>", "cannot be set or reset"),
+        (
+            f"<LD>{RAIL}{contact(2, 'a', '1', 'edge=' + chr(34) + 'rising' + chr(34))}{coil(3, 'Go', '2')}</LD>",
+            "its condition has an edge; compute it before, in a variable",
+        ),
+        (f"<LD>{RAIL}{coil(3, 'x', '1')}{coil(4, 'y', '1')}</LD>", "no coil or output variable says what Go is"),
+        ("<IL>LD a</IL>", "a condition is written in a language other than ST, LD and FBD"),
+    ],
+)
+def test_a_drawn_condition_that_is_no_expression_is_refused(tmp_path: Path, body: str, why: str) -> None:
+    assert why in errors(tmp_path, drawn_condition(body))[0][1]
+
+
 @pytest.mark.parametrize("more", ["", 'negated="true"'])
 @pytest.mark.parametrize("condition", ["{} // go", "{}; // go", "// go\n:= {}; (* go *)", "(* ; *) {}"])
 def test_a_condition_may_have_comments(tmp_path: Path, condition: str, more: str) -> None:

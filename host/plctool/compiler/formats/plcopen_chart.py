@@ -150,7 +150,9 @@ class Chart:
         if text is not None:
             found = expression(text)
         elif body is not None:
-            raise NotTranslatedError(body.at, "a condition is drawn")
+            found = [
+                (self._drawn(body, transition.get("name") if reference is None else reference.get("name")), body.at)
+            ]
         elif reference is not None:
             found = [(reference.get("name"), reference.at)]
         else:
@@ -159,6 +161,13 @@ class Chart:
         if not found:
             raise NotTranslatedError(transition.at, "a transition has no condition")
         return [("NOT (", transition.at), *found, ("\n)", transition.at)] if negated else found
+
+    def _drawn(self, body: Element, name: str) -> str:
+        """Returns a condition in LD or FBD as an expression."""
+        drawn = next(body.every("LD", "FBD"), None)
+        if drawn is None:
+            raise NotTranslatedError(body.at, "a condition is written in a language other than ST, LD and FBD")
+        return Network(drawn, self._unit, Body(), inline=True).expression(name)
 
     def _steps_before(self, element: Element, depth: int = 0) -> Iterator[str]:
         for ref in _connections(element):

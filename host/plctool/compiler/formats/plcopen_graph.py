@@ -36,11 +36,13 @@ _TRIGGERS = {"rising": "R_TRIG", "falling": "F_TRIG"}
 
 
 class Network:
-    """The networks of one body."""
+    """The networks of one body. `inline`: they are one expression, so nothing in them may need a statement."""
 
-    def __init__(self, element: Element, unit: Unit, body: Body) -> None:
+    def __init__(self, element: Element, unit: Unit, body: Body, *, inline: bool = False) -> None:
+        self._inline = inline
         self._unit = unit
         self._body = body
+        self._root = element
         self._elements = {e.get("localId"): e for e in element.children if e.get("localId")}
         self._types = ResultTypes(unit, self._elements)
         self._order = list(self._elements.values())
@@ -63,6 +65,23 @@ class Network:
         for element in self._in_order():
             self._execute(element)
 
+    def expression(self, name: str) -> str:
+        """Returns the value that goes to the coil or output variable with this name, or to the only one. Raises
+        NotTranslatedError if the value is not one expression."""
+        sinks = [e for e in self._order if e.tag in ("coil", "outVariable")]
+        chosen = [e for e in sinks if _target(e).casefold() == name.casefold()] or sinks
+        if len(chosen) != 1:
+            raise NotTranslatedError(self._root.at, f"no coil or output variable says what {name} is")
+        _check_modifiers(chosen[0])
+        if chosen[0].get("storage") in ("set", "reset"):
+            raise NotTranslatedError(chosen[0].at, "a condition cannot be set or reset")
+        value = self._edge(chosen[0], self._power(chosen[0]))
+        return _negated(value) if _is(chosen[0], "negated") else value
+
+    def _needs_statement(self, element: Element, what: str) -> None:
+        if self._inline:
+            raise NotTranslatedError(element.at, f"its condition has {what}; compute it before, in a variable")
+
     def _in_order(self) -> list[Element]:
         numbered = sorted((e for e in self._order if _number(e) > 0), key=_number)
         rest = [e for e in self._order if _number(e) <= 0 and (e.tag in _SINKS or e.tag == "block")]
@@ -77,9 +96,9 @@ class Network:
         elif element.tag == "return":
             self._body.line(f"IF {self._power(element)} THEN RETURN; END_IF;", element.at)
         elif element.tag == "coil":
-            self._assign(element, (element.child("variable") or element).text, self._power(element))
+            self._assign(element, _target(element), self._power(element))
         elif element.tag in _SINKS and (value := self.point(element.child("connectionPointIn"))) is not None:
-            self._assign(element, (element.child("expression") or element).text, value)
+            self._assign(element, _target(element), value)
 
     def _assign(self, element: Element, target: str, value: str) -> None:
         if _is(element, "negatedIn" if element.tag == "inOutVariable" else "negated"):
@@ -158,6 +177,7 @@ class Network:
         trigger = _TRIGGERS.get(element.get("edge"))
         if trigger is None:
             return value
+        self._needs_statement(element, "an edge")
         if not self._unit.keeps:
             raise NotTranslatedError(element.at, "it looks for an edge, but keeps nothing between its calls")
         name = f"_{trigger}{len(self._body.variables)}_{element.at.line}"
@@ -220,6 +240,7 @@ class Network:
             if item.get("formalParameter").upper() != "EN":
                 found.append((item.get("formalParameter"), value))
             elif value != "TRUE":
+                self._needs_statement(block, f"{block.get('typeName')} with EN")
                 enable = f"_TMP_EN{key}"
                 self._body.variables[enable] = ("BOOL", block.at)
                 self._body.line(f"{enable} := {value};", block.at)
@@ -227,6 +248,7 @@ class Network:
         return enable, found
 
     def _call_instance(self, block: Element, key: str) -> None:
+        self._needs_statement(block, f"the function block {block.get('instanceName')}")
         enable, inputs = self._inputs(block, key)
         call = f"{block.get('instanceName')}({', '.join(f'{n} := {v}' for n, v in inputs)});"
         self._done[key] = ""
@@ -235,6 +257,9 @@ class Network:
     def _call_function(self, block: Element, key: str) -> None:
         name = block.get("typeName")
         enable, inputs = self._inputs(block, key)
+        if self._inline and name.upper() != _EXECUTE:
+            self._done[key] = f"{name}({', '.join(value for _, value in inputs)})"
+            return
         if name.upper() == _EXECUTE and block.child_data("stcode"):
             self._write_statements(block, key, enable)
             return
@@ -272,6 +297,7 @@ class Network:
 
     def _write_statements(self, block: Element, key: str, enable: str) -> None:
         """Adds the statements of an EXECUTE box."""
+        self._needs_statement(block, "statements")
         self._done[key] = ""
         if enable:
             self._body.line(f"IF {enable} THEN", block.at)
@@ -295,6 +321,11 @@ class Network:
                 elif passes:
                     count = 2  # there are two ways to it
         return count
+
+
+def _target(sink: Element) -> str:
+    """Returns the variable of a coil or output variable."""
+    return (sink.child("variable" if sink.tag == "coil" else "expression") or sink).text
 
 
 def _parameters(block: Element, which: str) -> list[Element]:
