@@ -99,7 +99,7 @@ def test_no_output_replaces_what_options_name(tool: Any, project: Path, words: t
 
 
 def test_every_toml_and_project_file_is_left_alone(tool: Any, project: Path) -> None:
-    for name in ("other.toml", "New.TOML", "plc.plcproj", "plc.tsproj"):
+    for name in ("other.toml", "New.TOML", "plc.plcproj", "plc.tsproj", "plc.sln", "plc.xti"):
         assert refused(tool("build", "-o", name), name)
         assert refused(tool("test", "--junit", name), name)
 

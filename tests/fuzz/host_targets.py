@@ -229,7 +229,7 @@ def production_files() -> Iterator[bytes]:
     yield path.read_bytes()
 
 
-SUFFIXES = (".st", ".xml", ".EXP", ".TcPOU", ".TcTTO", ".TcGVL", ".TcDUT", ".plcproj", ".tsproj", ".IO")
+SUFFIXES = (".st", ".xml", ".EXP", ".TcPOU", ".TcTTO", ".TcGVL", ".TcDUT", ".plcproj", ".tsproj", ".IO", ".sln", ".xti")
 
 
 def sources(data: bytes) -> None:
