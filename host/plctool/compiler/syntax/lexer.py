@@ -98,7 +98,7 @@ _OPERATOR_FUNCTIONS = frozenset(("AND", "OR", "XOR", "MOD"))  # names before a p
 
 OPENING = frozenset((
     "MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "MODIFIER", "NAMESPACE", "USING", "INITIAL_STEP", "STEP",
-    "TRANSITION", "PROPERTY_GET", "PROPERTY_SET", "_AT", "JMP",
+    "TRANSITION", "PROPERTY_GET", "PROPERTY_SET", "_AT", "JMP", "POINTER", "REFERENCE",
 ))  # fmt: skip
 """Terminals that are names where no name (after AT, no address) follows."""
 

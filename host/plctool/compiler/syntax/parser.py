@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -89,6 +90,8 @@ def _machine() -> tuple[Builder, Callable[[], Parser]]:
     return builder, lambda: Parser(tables, reducers, gotos)
 
 
+_OF_NEW = re.compile(r"\b__NEW\s*\(\s*\Z", re.IGNORECASE)
+_NEAR = 100  # characters before a word that may hold __NEW and blanks
 _AMBIGUOUS = SOFT | {"OP", "NOT", "NULL"}
 
 
@@ -113,6 +116,10 @@ def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None
         is_name = is_operator_function(token, text)
     elif kind == "OP":
         is_name = kind not in parser.tables.actions[parser.states[-1]] and is_operator_function(token, text)
+    elif kind == "TEXT" and parser.tables.after(parser.states, "NUMBER") is not None:
+        is_name = not _OF_NEW.search(
+            text, max(0, token.pos - _NEAR), token.pos
+        )  # a variable `string`, but for __NEW(STRING(80))
     elif parser.tables.after(parser.states, kind) is None:
         is_name = not begins_unit(token, text)
     else:
