@@ -83,7 +83,7 @@ def test_unknown_warning_exits_2_and_lists_the_names(tool: Any, command: str) ->
     done = tool(command, "main.st", "--no-warn", "unusde")
     assert done.status == 2
     assert done.err.startswith(
-        "plctool: There is no warning 'unusde'; the names are access, always, assignment, bits, bounds, case, "
+        "plctool: There is no warning 'unusde'; the names are access, address, always, assignment, bits, bounds, case, "
     )
     assert done.err.count("\n") == 1
 
