@@ -52,6 +52,10 @@ bool IecCycleMayStart(void);
 void IecCycleCallOff(void);
 /* All but the overruns. ERR_INVALIDID when there is no such task. */
 RTS_RESULT IecCycleGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
+
+/* The share of the time since the tasks were first started that all of them took, of every kind [%]; with several
+ * processors it may be above 100. From main. */
+RTS_UI32 IecTaskGetLoad(void);
 /* The state as after power on. */
 void IecCycleForget(void);
 

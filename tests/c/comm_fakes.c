@@ -277,6 +277,11 @@ RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info)
     return ERR_OK;
 }
 
+RTS_UI32 IecTaskGetLoad(void)
+{
+    return fakes.task_load;
+}
+
 RTS_UI32 IecTaskGetActivity(bool *busy)
 {
     *busy = fakes.task_busy;

@@ -71,6 +71,7 @@ typedef struct {
     IEC_TASK_INFO tasks[FAKE_TASKS];
     RTS_UI32 task_count;
     bool task_busy;
+    RTS_UI32 task_load;
     RTS_UI32 task_activity;
     RTS_UI32 activity_per_look; /* how much there is from one look at it to the next */
     RTS_UI32 lock_depth;

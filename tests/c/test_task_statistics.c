@@ -21,8 +21,24 @@ static void the_average_starts_again_when_the_count_does(void)
     CHECK_EQUAL(info.cycles, 9);
 }
 
+static void the_load_counts_tasks_of_every_kind_over_the_time_since_their_start(void)
+{
+    start_with_counter(1);
+    CHECK_EQUAL(SimAdvance(ms(1000)), ERR_OK);
+    tasks.count = 3;
+    tasks.list[0].sum_ns = 250 * (RTS_UI64)NS_PER_MS;
+    tasks.list[1].sum_ns = 100 * (RTS_UI64)NS_PER_MS;
+    tasks.list[2].sum_ns = 850 * (RTS_UI64)NS_PER_MS;
+    CHECK_EQUAL(IecTaskGetLoad(), 120);
+    tasks.time_started = false;
+    CHECK_EQUAL(IecTaskGetLoad(), 0);
+    tasks.count = 1;
+    tasks.time_started = true;
+}
+
 int main(void)
 {
+    RUN(the_load_counts_tasks_of_every_kind_over_the_time_since_their_start);
     RUN(the_average_starts_again_when_the_count_does);
     return test_result();
 }

@@ -77,6 +77,12 @@ def test_values_of_a_freewheeling_task_are_read_between_its_cycles(tool, connect
     assert all(values["begun"] == values["ended"] for values in consistent)
 
 
+def test_the_load_of_the_shell_counts_freewheeling_tasks(tool, connected, eventually):
+    connected.flash(tool.build("busy", BUSY))
+    connected.write({"turns": 5_000_000})
+    eventually(lambda: int(connected.shell("plcload").removeprefix("PLC load: ").rstrip("%")) >= 10)
+
+
 LOOPS = """VAR_GLOBAL
     run, looping : BOOL;
     n : DINT;

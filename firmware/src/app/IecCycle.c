@@ -440,6 +440,31 @@ RTS_UI32 IecTaskGetCount(void)
     return tasks.count;
 }
 
+/* Again when a cycle ended meanwhile: a 64-bit number may have been read in two halves. */
+static RTS_UI64 read_sum_ns(const TASK *task, RTS_UI32 *cycles)
+{
+    RTS_UI64 sum_ns;
+
+    do {
+        *cycles = SysAtomicLoad(&task->cycles);
+        sum_ns = task->sum_ns;
+        SysAtomicFence();
+    } while (SysAtomicLoad(&task->cycles) != *cycles);
+    return sum_ns;
+}
+
+RTS_UI32 IecTaskGetLoad(void)
+{
+    RTS_I64 time_ns = tasks.time_started ? SysTimeGetNs() - tasks.time_zero : 0;
+    RTS_UI64 busy_ns = 0;
+    RTS_UI32 cycles;
+    RTS_UI32 i;
+
+    for (i = 0; i < tasks.count; i++)
+        busy_ns += read_sum_ns(&tasks.list[i], &cycles);
+    return time_ns < 100 ? 0 : (RTS_UI32)(busy_ns / ((RTS_UI64)time_ns / 100));
+}
+
 RTS_RESULT IecCycleGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)
 {
     const TASK *task;
@@ -454,11 +479,7 @@ RTS_RESULT IecCycleGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)
     info->kind = task->record->kind;
     info->priority = task->record->priority;
     info->interval_us = task->record->interval_us;
-    do { /* again when a cycle ended meanwhile: a 64-bit number may have been read in two halves */
-        info->cycles = SysAtomicLoad(&task->cycles);
-        sum_ns = task->sum_ns;
-        SysAtomicFence();
-    } while (SysAtomicLoad(&task->cycles) != info->cycles);
+    sum_ns = read_sum_ns(task, &info->cycles);
     if (info->cycles == 0)
         return ERR_OK;
     info->last_us = task->last_ns / NS_PER_US;

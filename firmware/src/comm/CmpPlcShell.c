@@ -134,16 +134,9 @@ static void print_tasks(SHELL_OUTPUT *out)
                   (unsigned)info.max_us, (unsigned)info.jitter_us);
 }
 
-/* The share of the time that cyclic tasks take. */
 static void print_load(SHELL_OUTPUT *out)
 {
-    IEC_TASK_INFO info;
-    RTS_UI32 percent = 0;
-
-    for (RTS_UI32 i = 0; i < IecTaskGetCount(); i++)
-        if (IecTaskGetInfo(i, &info) == ERR_OK && info.kind == KIND_CYCLIC && info.interval_us != 0)
-            percent += (RTS_UI32)((RTS_UI64)info.avg_us * 100 / info.interval_us);
-    print(out, "PLC load: %u%%", (unsigned)percent);
+    print(out, "PLC load: %u%%", (unsigned)IecTaskGetLoad());
 }
 
 static void print_counters(SHELL_OUTPUT *out)
@@ -215,7 +208,7 @@ static const SHELL_COMMAND commands[] = {
     {"reload", "load and start the boot project again", RIGHT_CONTROL, AppReload, NULL},
     {"tasklist", "tasks and their times", RIGHT_VIEW, NULL, print_tasks},
     {"channelinfo", "channels and lines, and what went wrong there", RIGHT_VIEW, NULL, print_channels},
-    {"plcload", "share of the time that cyclic tasks take", RIGHT_VIEW, NULL, print_load},
+    {"plcload", "share of the time that tasks took since their start", RIGHT_VIEW, NULL, print_load},
 };
 
 static void print_help(SHELL_OUTPUT *out)
