@@ -25,6 +25,7 @@ SHARED = [
     "SysExcept.h",
     "SysStart.h",
     "CmpAppEmbedded.h",
+    "CmpForce.h",
     "CmpIecTask.h",
     "CmpItf.h",
     "CmpLog.h",

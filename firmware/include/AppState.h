@@ -22,6 +22,7 @@ enum {
     EVT_ResetDone = 0x10006,
     EVT_PrepareDownload = 0x10009,
     EVT_DownloadDone = 0x1000A,
+    EVT_PrepareExit = 0x1000E, /* its variables end: it is given up, or gets its initial values again */
     EVT_CmpApp_Exception = 0x8001C,
 };
 

@@ -92,6 +92,7 @@ enum {
     CMPID_IoDrvSysfs = 0x0029,
     CMPID_CmpFileTransfer = 0x002A,
     CMPID_SimModbus = 0x002B,
+    CMPID_CmpForce = 0x002C,
 };
 
 /* Name of a component, "" when unknown. */

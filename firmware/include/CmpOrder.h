@@ -42,6 +42,9 @@ X(IoDrvGpio)
 #if HAS_IoDrvModbus
 X(IoDrvModbus)
 #endif
+#if HAS_CmpForce
+X(CmpForce)
+#endif
 #ifdef PORT_COMPONENTS
 PORT_COMPONENTS(X)
 #endif

@@ -318,6 +318,16 @@ typedef struct {
     WIRE_UI32 size;
 } MON2_VALUE;
 
+/* One of TAG_MON2_FORCED (own): FORCE_PLACE and value. */
+typedef struct {
+    RTS_UI8 area;
+    RTS_UI8 pointers;
+    RTS_UI8 size;
+    RTS_UI8 mask;
+    RTS_UI8 offset[16]; /* four numbers of 4 bytes */
+    RTS_UI8 value[8];
+} MON2_FORCED;
+
 /* TAG_LOG_ENTRY. */
 typedef struct {
     WIRE_UI32 component;
@@ -395,6 +405,7 @@ WIRE_SIZE(CDL_PACKED, 4);
 WIRE_SIZE(TASK_INFO, 40);
 WIRE_SIZE(MON2_APPLICATION, 20);
 WIRE_SIZE(MON2_VALUE, 6);
+WIRE_SIZE(MON2_FORCED, 28);
 WIRE_SIZE(LOG_RECORD, 16);
 WIRE_SIZE(IO_STATE, 20);
 WIRE_SIZE(IO_PARAMETER, 16);

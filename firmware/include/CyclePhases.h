@@ -4,8 +4,9 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * A cycle is a row of phases: inputs, the process image of the task (AppImage.h), before the code, the code, after the
- * code, the process image, outputs, record. A component registers what it does in a phase in CH_INIT3, for good. While
- * none is registered, a task without process image pays one compare before its code and one after it.
+ * code, the process image, outputs, record. A component registers what it does in a phase in CH_INIT3, for good, or adds
+ * and removes it while tasks run (CmpForce). While none is registered, a task without process image pays one compare
+ * before its code and one after it.
  *
  * All phases of a cycle run in the context of its task, which may be interrupted by tasks of a higher priority and, on
  * several cores, run at the same time as others: a phase that shares data with other tasks locks them itself
@@ -38,6 +39,17 @@ typedef void (*PF_CYCLE_PHASE)(RTS_UI32 task, const IEC_CONTEXT *context);
 /* From main, in CH_INIT3. ERR_NOMEMORY when CYCLE_MAX_PHASES are registered: raise CYCLE_OWN_PHASES. */
 RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run);
 
+/* By CYCLE_PHASE, in the order of registration. */
+typedef struct CYCLE_ENTRY {
+    PF_CYCLE_PHASE run;
+    struct CYCLE_ENTRY *next;
+} CYCLE_ENTRY;
+
+/* The same for what comes and goes, with FORCE_MAX. The component keeps `entry` and sets its `run`. Removed, it may still
+ * be called in the cycles that run just now. IecCycleFindPhases must follow. From main, also while tasks run. */
+void CyclePhaseAdd(CYCLE_PHASE when, CYCLE_ENTRY *entry);
+void CyclePhaseRemove(CYCLE_PHASE when, const CYCLE_ENTRY *entry);
+
 /*
  * Puts the application into its safe state: outputs are zero, but for those that a channel takes to a device: they keep the
  * values of their variables, and the phases registered for CYCLE_SAFE_STATE have made the hardware safe. The one way there: after an exception (in the context of the task that had it, at once, and again
@@ -51,11 +63,6 @@ void AppEnterSafeState(void);
 /* Whether any are registered. */
 bool CyclePhasesExist(void);
 
-/* By CYCLE_PHASE, in the order of registration. */
-typedef struct CYCLE_ENTRY {
-    PF_CYCLE_PHASE run;
-    struct CYCLE_ENTRY *next;
-} CYCLE_ENTRY;
 extern CYCLE_ENTRY *cycle_phases[];
 
 /* Calls those registered for `when`. Most phases have none, so it is inlined. */

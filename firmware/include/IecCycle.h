@@ -50,6 +50,8 @@ void IecCycleStop(void);
 bool IecCycleMayStart(void);
 /* The moment that IecTaskBetweenCycles waits for does not come: no task runs any more. */
 void IecCycleCallOff(void);
+/* Notes that components have added or removed phases (CyclePhases.h): tasks run them, or none, from their next cycle on. */
+void IecCycleFindPhases(void);
 /* All but the overruns. ERR_INVALIDID when there is no such task. */
 RTS_RESULT IecCycleGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
 
@@ -74,6 +76,10 @@ RTS_UI32 IecTaskGetActivity(bool *busy);
  * they do it, in the context of one of them, as soon as there is such a moment. It is called off when the tasks are
  * stopped. From main. */
 bool IecTaskBetweenCycles(void (*copy)(void));
+
+/* False from the moment on at which the application stops: outputs are in the safe state then, or will be. From any
+ * context. */
+bool IecCycleMayRun(void);
 
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
  * simulator, between cycles. */

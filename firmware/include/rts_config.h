@@ -274,7 +274,13 @@
 #define CYCLE_MAX_PHASES (CYCLE_OWN_PHASES + (IO_MAX_CONNECTORS > 0 ? 3 : 0))
 #endif
 
-/* Event callbacks that may be registered, all for components of a port; five words each. 0: the application sends no
+/* Variables, inputs and outputs that may be forced at a time (CmpForce.h); 40 bytes each. 0: none, and no flash for them.
+ * It needs HAS_CmpForce in cmp_list.c, and one of EVENT_MAX_CALLBACKS. */
+#ifndef FORCE_MAX
+#define FORCE_MAX 0
+#endif
+
+/* Event callbacks that may be registered, all for components of a port but one of CmpForce; five words each. 0: the application sends no
  * events. */
 #ifndef EVENT_MAX_CALLBACKS
 #define EVENT_MAX_CALLBACKS 8

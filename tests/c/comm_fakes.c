@@ -18,6 +18,8 @@
 #include "CmpBlkDrvUdp.h"
 #include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
+#include "CmpEventMgr.h"
+#include "CyclePhases.h"
 #include "CmpLogSrv.h"
 #include "CmpPlcShell.h"
 #include "CmpMonitor2.h"
@@ -208,7 +210,47 @@ bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset)
     RTS_UNUSED(offset);
     return false;
 }
+
+RTS_UI8 *AppImageGetCopy(RTS_UI32 task, RTS_UI32 area, RTS_UI32 offset, RTS_UI32 size)
+{
+    RTS_UNUSED(task);
+    RTS_UNUSED(area);
+    RTS_UNUSED(offset);
+    RTS_UNUSED(size);
+    return NULL;
+}
 #endif
+
+/* CmpForce.c keeps its list; no task uses it. */
+void CyclePhaseAdd(CYCLE_PHASE when, CYCLE_ENTRY *entry)
+{
+    RTS_UNUSED(when);
+    RTS_UNUSED(entry);
+}
+
+void CyclePhaseRemove(CYCLE_PHASE when, const CYCLE_ENTRY *entry)
+{
+    RTS_UNUSED(when);
+    RTS_UNUSED(entry);
+}
+
+void IecCycleFindPhases(void)
+{
+}
+
+bool IecCycleMayRun(void)
+{
+    return false;
+}
+
+RTS_RESULT EventRegisterCallback(RTS_UI32 provider, RTS_UI32 event, PF_EVENT_CALLBACK callback, void *user)
+{
+    RTS_UNUSED(provider);
+    RTS_UNUSED(event);
+    RTS_UNUSED(callback);
+    RTS_UNUSED(user);
+    return ERR_OK;
+}
 
 void AppGetStatus(APP_STATUS *status)
 {

@@ -21,6 +21,7 @@ static bool always;
 #define AppImageAttach test_attach
 #define AppImageSetContext test_set_context
 #define AppImageFind test_find
+#define AppImageGetCopy test_get_copy
 #define AppImageCopyIn test_copy_in
 #define AppImageCopyOut test_copy_out
 #define AppAreasGet fake_area

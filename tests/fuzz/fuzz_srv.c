@@ -105,6 +105,16 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
                                  "\x17\x08\x09\x08\x17\x0C\x09\x04\x04");
     case 28:
         return SEED(6, 2, "\x81\x01\x08\x10\x02" "A\0" "\x11\x02" "B\0");
+    case 29:
+        return SEED(0x1B, 3, APP "\x03\x2E" "\xFF\xFF\x01\0\0\0\x55\x05\x00\x02\x10\x00\x06\x00"
+                                 "\xFF\xFF\x01\0\0\0\x04\x07\x00\x02\x20\x00\x06\x00\x40\x04"
+                                 "\0\0\x01\0\0\0\x55\x05\x00\x02\x10\x00\x06\x00");
+    case 30:
+        return SEED(0x1B, 3, APP "\x03\x14" "\xFF\xFF\x01\0\0\0\x55\x0B\x00\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E");
+    case 31:
+        return SEED(0x1B, 0x60, APP "\x46\x04\0\0\0\0");
+    case 32:
+        return SEED(2, 0x20, "\x81\x01\x06\x11\x04" "SSSS");
     default:
         return 0;
     }

@@ -30,6 +30,7 @@
 #define EVENT_MAX_CALLBACKS 64
 #define SRV_OTHER_CLIENTS 1
 #define SRV_NETWORKS 8
+#define FORCE_MAX 128
 #define TCP_BUFFER_SIZE 16384
 #define CAN_FD 1
 #define CAN_BLOCK_SIZE 0 /* the kernel has room */

@@ -80,6 +80,15 @@ bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset)
     return false;
 }
 
+RTS_UI8 *AppImageGetCopy(RTS_UI32 task, RTS_UI32 area, RTS_UI32 offset, RTS_UI32 size)
+{
+    const IMAGE_PART *part = &plan[task].part[area - APP_AREA_INPUT];
+    RTS_UI32 distance = offset - part->first * (RTS_UI32)sizeof(UNIT);
+    RTS_UI32 length = part->count * (RTS_UI32)sizeof(UNIT);
+
+    return distance < length && size <= length - distance ? (RTS_UI8 *)copy_at(part->copy) + distance : NULL;
+}
+
 /* ---- the cycle ---- */
 
 static void copy_in(const IMAGE_PART *part, const UNIT *shared)

@@ -58,12 +58,16 @@ void AppImageCopyOut(RTS_UI32 task, const RTS_UI32 *running);
 /* The area and offset that an address in a copy stands for. When an application is loaded. */
 bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset);
 
+/* Where a task has its copy of `size` bytes of APP_AREA_INPUT or APP_AREA_OUTPUT; NULL: it has none of all of them. */
+RTS_UI8 *AppImageGetCopy(RTS_UI32 task, RTS_UI32 area, RTS_UI32 offset, RTS_UI32 size);
+
 #else /* tasks run one after the other, or there is nothing to share */
 #define AppImageAttach(images) ((void)0)
 #define AppImageSetContext(task, context) ((void)(task), false)
 #define AppImageCopyIn(task) ((void)(task))
 #define AppImageCopyOut(task, running) ((void)(task))
 #define AppImageFind(address, area, offset) false
+#define AppImageGetCopy(task, area, offset, size) ((RTS_UI8 *)NULL)
 #endif
 
 #endif

@@ -177,6 +177,7 @@ static void set_context(void)
 /* Gives up what is loaded, as it is. */
 static void unload(void)
 {
+    AppPostEvent(EVT_PrepareExit);
     (void)IecTaskCreateAll(NULL, 0, &app.context);
     if (AppIoGet() != NULL)
         AppIoGet()->unload();
@@ -232,6 +233,7 @@ RTS_RESULT AppReinitialise(bool cold)
     RTS_RESULT result;
 
     run_global_exit();
+    AppPostEvent(EVT_PrepareExit);
     RetainCapture(cold);
     result = initialise(cold || app.pending == INIT_COLD);
     if (AppIoGet() != NULL)

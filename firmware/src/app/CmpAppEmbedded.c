@@ -12,6 +12,7 @@
 #include "AppCommit.h"
 #include "AppFunctions.h"
 #include "AppLife.h"
+#include "CmpForce.h"
 #include "CmpLog.h"
 #include "SysFileFlash.h"
 #include "rts_config.h"
@@ -125,6 +126,8 @@ void AppGetStatus(APP_STATUS *status)
         status->op_state |= OS_EXCEPTION;
     if (AppCommitGet()->active != SLOT_NONE)
         status->op_state |= OS_BOOTPROJECT_VALID;
+    if (ForceGetCount() > 0)
+        status->op_state |= OS_FORCE_ACTIVE;
 }
 
 const char *AppGetInfo(RTS_UI32 index)

@@ -9,6 +9,7 @@
 
 #include "AppAreas.h"
 #include "CmpItf.h"
+#include "SysAtomic.h"
 #include "rts_config.h"
 
 enum { PLACES = CYCLE_MAX_PHASES > 0 ? CYCLE_MAX_PHASES : 1 };
@@ -16,22 +17,63 @@ enum { PLACES = CYCLE_MAX_PHASES > 0 ? CYCLE_MAX_PHASES : 1 };
 CYCLE_ENTRY *cycle_phases[CYCLE_SAFE_STATE + 1];
 
 static struct {
-    RTS_UI32 count;
+    RTS_UI32 count; /* of those in the rows of phases */
     CYCLE_ENTRY row[PLACES];
+#if FORCE_MAX > 0
+    RTS_UI32 taken; /* of `row` */
+#endif
 } phases;
 
-RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run)
+#if FORCE_MAX > 0
+#define TAKEN phases.taken
+#else
+#define TAKEN phases.count
+#endif
+
+static void append(CYCLE_PHASE when, CYCLE_ENTRY *entry)
 {
     CYCLE_ENTRY **end = &cycle_phases[when];
 
-    if (CYCLE_MAX_PHASES == 0 || phases.count == PLACES)
-        return CMNoRoom(CYCLE_OWN_PHASES);
     while (*end != NULL)
         end = &(*end)->next;
-    *end = &phases.row[phases.count++];
-    (*end)->run = run;
+    *end = entry;
+    phases.count++;
+}
+
+RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run)
+{
+    CYCLE_ENTRY *entry;
+
+    if (CYCLE_MAX_PHASES == 0 || TAKEN == PLACES)
+        return CMNoRoom(CYCLE_OWN_PHASES);
+    entry = &phases.row[TAKEN];
+    entry->run = run;
+    append(when, entry);
+#if FORCE_MAX > 0
+    phases.taken++;
+#endif
     return ERR_OK;
 }
+
+#if FORCE_MAX > 0
+void CyclePhaseAdd(CYCLE_PHASE when, CYCLE_ENTRY *entry)
+{
+    entry->next = NULL;
+    SysAtomicFence(); /* a task sees it complete */
+    append(when, entry);
+}
+
+/* A task that is at `entry` goes on from there. */
+void CyclePhaseRemove(CYCLE_PHASE when, const CYCLE_ENTRY *entry)
+{
+    CYCLE_ENTRY **at = &cycle_phases[when];
+
+    while (*at != entry)
+        at = &(*at)->next;
+    *at = entry->next;
+    phases.count--;
+}
+#endif
 
 bool CyclePhasesExist(void)
 {

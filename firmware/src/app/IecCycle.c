@@ -400,6 +400,14 @@ void IecCycleCreate(const CDL_TASK *records, RTS_UI32 count, const IEC_CONTEXT *
     tasks.time_started = false;
 }
 
+void IecCycleFindPhases(void)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < tasks.count; i++)
+        tasks.list[i].has_phases = tasks.list[i].has_copies || CyclePhasesExist();
+}
+
 void IecCycleStart(void)
 {
     if (!tasks.time_started)
@@ -416,6 +424,11 @@ bool IecCycleMayStart(void)
 void IecCycleStop(void)
 {
     SysAtomicStore(&tasks.running, 0);
+}
+
+bool IecCycleMayRun(void)
+{
+    return SysAtomicLoad(&tasks.running) != 0;
 }
 
 void IecCycleCallOff(void)

@@ -8,6 +8,7 @@
 #include "AppAddress.h"
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
+#include "CmpForce.h"
 #include "CmpIecTask.h"
 #include "CmpPackets.h"
 #include "CmpSrv.h"
@@ -123,6 +124,19 @@ static RTS_RESULT reset(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTagWrite16(reply, TAG_SERVICE_RESULT, verdict);
     return ERR_OK;
 }
+
+#if FORCE_MAX > 0
+static RTS_RESULT end_forces(void)
+{
+    ForceEndAll();
+    return ERR_OK;
+}
+
+static RTS_RESULT release_force_list(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    return control(request, reply, end_forces);
+}
+#endif
 
 #if SRV_OTHER_CLIENTS
 static RTS_RESULT single_cycle(SRV_REQUEST *request, BTAG_WRITER *reply)
@@ -506,6 +520,9 @@ static const SRV_SERVICE services[] = {
     {SRV_APP_RESET, RIGHT_CONTROL, reset},
     {SRV_APP_READ_STATUS, RIGHT_LOOK, read_status},
     {SRV_APP_DOWNLOAD_COMPACT, RIGHT_DOWNLOAD, download_compact},
+#if FORCE_MAX > 0
+    {SRV_APP_RELEASE_FORCE_LIST, RIGHT_WRITE, release_force_list},
+#endif
 #if SRV_INFORMATION
     {SRV_APP_READ_APPLICATION_LIST, RIGHT_LOOK, read_application_list},
     {SRV_APP_READ_APPLICATION_INFO, RIGHT_LOOK, read_application_info},

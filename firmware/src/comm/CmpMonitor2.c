@@ -1,5 +1,5 @@
 /*
- * CmpMonitor2.c - the monitoring services (group 0x1B): reads and writes variables.
+ * CmpMonitor2.c - the monitoring services (group 0x1B): reads, writes and forces variables.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -15,6 +15,7 @@
 #include "AppAddress.h"
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
+#include "CmpForce.h"
 #include "CmpIecTask.h"
 #include "CmpPackets.h"
 #include "CmpSrv.h"
@@ -24,6 +25,7 @@
 enum {
     ENTRY_HEAD = sizeof(MON2_VALUE),
     CONSISTENT_SIZE = 8, /* its element, with the padding before it */
+    SERIAL_SIZE = FORCE_MAX > 0 ? 8 : 0,
     ALL_BITS = 0xFF,
 };
 
@@ -61,8 +63,21 @@ static RTS_UI32 take(PROGRAM *program, RTS_UI32 size)
     return value;
 }
 
-/* Takes "Ld16/Ld32 offset, Rao area" and any number of "Der pointer, Ld16/Ld32 offset, Add". */
-static MON_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address)
+/* Goes on from the pointer at *address; where a force is parsed, notes it. */
+static MON_RESULT take_pointer(AREA_ADDRESS *address, FORCE_PLACE *place)
+{
+    if (FORCE_MAX == 0 || place == NULL)
+        return AppAddressFollow(address);
+    if (place->pointers == FORCE_POINTERS)
+        return MONITORING_ERR_NESTING_DEPTH;
+    place->offset[place->pointers++] = address->offset;
+    address->offset = 0;
+    return MONITORING_ERR_OK;
+}
+
+/* Takes "Ld16/Ld32 offset, Rao area" and any number of "Der pointer, Ld16/Ld32 offset, Add". With `place` no pointer is
+ * followed, and *address has the area, and the offset after the last one. */
+static MON_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address, FORCE_PLACE *place)
 {
     static const RTS_UI8 der[] = {MON2_OP_DER, MON2_POINTER_SIZE};
     RTS_UI32 wanted = MON2_OP_RAO;
@@ -79,7 +94,7 @@ static MON_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address)
         if (!goes_on_with(program, der, sizeof(der)))
             return MONITORING_ERR_OK;
         skip(program, sizeof(der));
-        MON_RESULT result = AppAddressFollow(address);
+        MON_RESULT result = take_pointer(address, place);
         if (result != MONITORING_ERR_OK)
             return result;
         wanted = MON2_OP_ADD;
@@ -139,11 +154,11 @@ static const RTS_UI8 *take_copy_head(PROGRAM *program)
 }
 
 /* The address alone; to write also some bits at it, or a program that copies to it. *mask: NULL when this is not to
- * write. */
-static MON_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask)
+ * write. *place: see take_address. */
+static MON_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask, FORCE_PLACE *place)
 {
     const RTS_UI8 *tail = mask != NULL ? take_copy_head(&program) : NULL;
-    MON_RESULT result = take_address(&program, address);
+    MON_RESULT result = take_address(&program, address, place);
 
     if (result != MONITORING_ERR_OK)
         return result;
@@ -277,7 +292,7 @@ static void read_variable(BTAG_WRITER *reply, const READ_VAR *var, RTS_UI32 rese
     RTS_UI32 room = BTagGetRoom(reply);
     RTS_UI32 id = var->id;
     RTS_UI32 size = var->size;
-    MON_RESULT result = parse(var->program, &address, NULL);
+    MON_RESULT result = parse(var->program, &address, NULL, NULL);
 
     if (result == MONITORING_ERR_OK)
         result = AppAddressResolve(&address, size, &memory);
@@ -324,7 +339,7 @@ static RTS_RESULT read_list(BTAG_READER *list, BTAG_WRITER *reply)
         var.id = i++;
         result = parse_variable(list, &tag, &var);
         if (result == ERR_OK)
-            read_variable(reply, &var, (count - i) * ENTRY_HEAD + CONSISTENT_SIZE);
+            read_variable(reply, &var, (count - i) * ENTRY_HEAD + CONSISTENT_SIZE + SERIAL_SIZE);
     }
     BTagPad(reply);
     BTagClose(reply);
@@ -350,11 +365,16 @@ static RTS_RESULT mon_read(SRV_REQUEST *request, BTAG_WRITER *reply)
     result = read_list(&list, reply);
     if (!busy && IecTaskGetActivity(&busy) == before)
         BTagWrite16(reply, TAG_MON2_CONSISTENT, 1);
+    if (ForceGetCount() > 0)
+        BTagWrite32(reply, TAG_MON2_FORCE_SERIAL, ForceGetSerial());
     return result;
 }
 
 typedef struct {
     const RTS_UI8 *value;
+#if FORCE_MAX > 0
+    RTS_UI32 action; /* MON2_FORCE, MON2_UNFORCE */
+#endif
     RTS_UI32 size;
     RTS_UI32 mask; /* ALL_BITS, or those to write of the first byte alone */
     PROGRAM program;
@@ -367,6 +387,9 @@ static bool next_write(const RTS_UI8 **data, RTS_UI32 *size, WRITE_VAR *var)
 
     if (*size < sizeof(*head))
         return false;
+#if FORCE_MAX > 0
+    var->action = BytesGet16(head->id);
+#endif
     var->size = BytesGet32(head->size);
     var->value = (const RTS_UI8 *)(head + 1);
     RTS_UI32 rest = *size - (RTS_UI32)sizeof(*head);
@@ -400,7 +423,7 @@ static MON_RESULT write_variable(WRITE_VAR *var, bool commit)
 {
     AREA_ADDRESS address;
     RTS_UI8 *memory = NULL;
-    MON_RESULT result = parse(var->program, &address, &var->mask);
+    MON_RESULT result = parse(var->program, &address, &var->mask, NULL);
 
     if (result == MONITORING_ERR_OK)
         result = AppAddressResolve(&address, var->size, &memory);
@@ -411,8 +434,64 @@ static MON_RESULT write_variable(WRITE_VAR *var, bool commit)
     return result;
 }
 
+/* ---- forced variables ---- */
+
+#if FORCE_MAX > 0
+static RTS_UI32 to_add; /* values that a request adds to the list, as far as it has been checked */
+
+static MON_RESULT check_force(const FORCE_PLACE *place)
+{
+    MON_RESULT result = ForceCheck(place);
+
+    if (result == MONITORING_ERR_OK && !ForceHas(place) && ForceGetCount() + ++to_add > ForceGetRoom())
+        result = MONITORING_ERR_FORCE_FAILED;
+    return result;
+}
+
+static MON_RESULT parse_force(WRITE_VAR *var, FORCE_PLACE *place)
+{
+    AREA_ADDRESS address;
+
+    memset(place, 0, sizeof(*place));
+    MON_RESULT result = parse(var->program, &address, &var->mask, place);
+    if (result != MONITORING_ERR_OK)
+        return result;
+    place->area = (RTS_UI8)address.area;
+    place->offset[place->pointers] = address.offset;
+    place->size = var->size <= sizeof(RTS_UI64) ? (RTS_UI8)var->size : 0;
+    place->mask = (RTS_UI8)var->mask;
+    return MONITORING_ERR_OK;
+}
+
+/* A place whose force ends may be one that cannot be reached any more. */
+static MON_RESULT force_variable(WRITE_VAR *var, bool commit)
+{
+    FORCE_PLACE place;
+    RTS_UI64 value = 0;
+    bool ends = var->action == MON2_UNFORCE;
+    MON_RESULT result = parse_force(var, &place);
+
+    if (!ends && var->action != MON2_FORCE)
+        result = MONITORING_ERR_UNSUPPORTED_OPERATOR;
+    if (result == MONITORING_ERR_OK && !ends && !commit)
+        result = check_force(&place);
+    if (result != MONITORING_ERR_OK || !commit)
+        return result;
+    if (ends) {
+        ForceEnd(&place);
+        return MONITORING_ERR_OK;
+    }
+    memcpy(&value, var->value, place.size);
+    return ForceSet(&place, value);
+}
+#else
+#define force_variable(var, commit) MONITORING_ERR_OK
+#endif
+
+/* ---- lists of changes ---- */
+
 /* One pass over the list; stops at the first bad entry. */
-static RTS_RESULT write_list(const BTAG *list, bool commit, MON_RESULT *error, RTS_UI32 *index)
+static RTS_RESULT change_list(const BTAG *list, bool forces, bool commit, MON_RESULT *error, RTS_UI32 *index)
 {
     const RTS_UI8 *data = list->data;
     RTS_UI32 size = list->size;
@@ -422,7 +501,7 @@ static RTS_RESULT write_list(const BTAG *list, bool commit, MON_RESULT *error, R
     for (*index = 0; !(size < 4 && is_zero(data, size)); ++*index) {
         if (!next_write(&data, &size, &var))
             return ERR_L7_INCOMPLETE;
-        *error = write_variable(&var, commit);
+        *error = forces ? force_variable(&var, commit) : write_variable(&var, commit);
         if (*error != MONITORING_ERR_OK)
             break;
     }
@@ -435,7 +514,8 @@ static void write_error(BTAG_WRITER *reply, RTS_UI32 error, RTS_UI32 index)
     BTagWrite32(reply, TAG_MON2_ERROR_INDEX, index);
 }
 
-static RTS_RESULT mon_write(SRV_REQUEST *request, BTAG_WRITER *reply)
+/* Changes nothing if the check of one entry fails. */
+static RTS_RESULT change_all(SRV_REQUEST *request, BTAG_WRITER *reply, bool forces)
 {
     BTAG list;
     RTS_RESULT refused;
@@ -450,15 +530,65 @@ static RTS_RESULT mon_write(SRV_REQUEST *request, BTAG_WRITER *reply)
         return ERR_OK;
     }
     for (int commit = 0; result == ERR_OK && error == MONITORING_ERR_OK && commit <= 1; commit++)
-        result = write_list(&list, commit, &error, &index);
+        result = change_list(&list, forces, commit != 0, &error, &index);
     if (result == ERR_OK && error != MONITORING_ERR_OK)
         write_error(reply, error, index);
     return result;
 }
 
+static RTS_RESULT mon_write(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    return change_all(request, reply, false);
+}
+
+#if FORCE_MAX > 0
+static RTS_RESULT mon_force(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    to_add = 0;
+    return change_all(request, reply, true);
+}
+
+static void append_forced(BTAG_WRITER *reply, const FORCED_VALUE *forced)
+{
+    MON2_FORCED entry;
+
+    entry.area = forced->place.area;
+    entry.pointers = forced->place.pointers;
+    entry.size = forced->place.size;
+    entry.mask = forced->place.mask;
+    for (RTS_UI32 i = 0; i <= FORCE_POINTERS; i++)
+        BytesPut32(entry.offset + 4 * i, forced->place.offset[i]);
+    BytesPut32(entry.value, (RTS_UI32)forced->value);
+    BytesPut32(entry.value + 4, (RTS_UI32)(forced->value >> 32));
+    BTagAppend(reply, &entry, sizeof(entry));
+}
+
+/* From an index on, as many as fit. */
+static RTS_RESULT mon_force_list(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    const FORCED_VALUE *forced;
+    RTS_UI32 index = 0;
+    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_MON2_FORCE_START, &index);
+
+    if (result != ERR_OK && result != ERR_L7_TAG_MISSING)
+        return result;
+    BTagWrite32(reply, TAG_MON2_FORCE_SERIAL, ForceGetSerial());
+    BTagWrite32(reply, TAG_MON2_FORCE_MAX, ForceGetRoom());
+    BTagOpen(reply, TAG_MON2_FORCED, BTAG_ALIGN_0);
+    while ((forced = ForceGet(index++)) != NULL && BTagGetRoom(reply) >= sizeof(MON2_FORCED))
+        append_forced(reply, forced);
+    BTagClose(reply);
+    return ERR_OK;
+}
+#endif
+
 static const SRV_SERVICE services[] = {
     {SRV_MON2_READ, RIGHT_VIEW, mon_read},
     {SRV_MON2_WRITE, RIGHT_WRITE, mon_write},
+#if FORCE_MAX > 0
+    {SRV_MON2_FORCE, RIGHT_WRITE, mon_force},
+    {SRV_MON2_FORCE_LIST, RIGHT_VIEW, mon_force_list},
+#endif
 };
 
 RTS_RESULT CmpMonitor2_Hook(CMP_HOOK hook)
