@@ -280,8 +280,8 @@
 #define FORCE_MAX 0
 #endif
 
-/* Event callbacks that may be registered, all for components of a port but one of CmpForce; five words each. 0: the application sends no
- * events. */
+/* Event callbacks that may be registered, all for components of a port but one of CmpForce; five words each. 0: the
+ * application sends no events. */
 #ifndef EVENT_MAX_CALLBACKS
 #define EVENT_MAX_CALLBACKS 8
 #endif

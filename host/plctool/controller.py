@@ -9,11 +9,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Never, Self, overload
 
 from plctool.core import lib
+from plctool.debug.forced import ForcedPlace, ForceList, name_forced, place_of
 from plctool.debug.kept_changes import KeptChanges, kept_changes
 from plctool.debug.symbols import (
     SourceLine,
@@ -25,8 +26,9 @@ from plctool.debug.symbols import (
     symbol_path,
 )
 from plctool.debug.variables import Change, Reading, Symbol
-from plctool.errors import DeviceError, UsageError
+from plctool.errors import DeviceError, UsageError, with_article
 from plctool.files import write_atomically
+from plctool.iec.types import ArrayType, StringType, StructType
 from plctool.image.file import image_crc, parse_image, read_program
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, AppState, LogEntry, Status, TaskInfo, went_down
@@ -70,12 +72,14 @@ class ProgramStopped(DeviceError):
 
 @dataclass(frozen=True)
 class PlcStatus:
-    """`state` is "run", "stop", "exception" or "none"; `image_crc` is 0 without application."""
+    """`state` is "run", "stop", "exception" or "none"; `image_crc` is 0 without application. `forced`: the names of
+    the variables that are forced."""
 
     state: AppState
     image_crc: int
     image_size: int
     exception: ExceptionInfo | None
+    forced: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -116,6 +120,7 @@ class Controller(ABC):
 
     def __init__(self) -> None:
         self._tables: dict[int, SymbolTable] = {}  # by CRC of the image
+        self._forces: ForceList | None = None  # that was read last
 
     def __enter__(self) -> Self:
         return self
@@ -225,7 +230,8 @@ class Controller(ABC):
         """What the application does, and the exception that stopped it, with the names and lines of its symbols."""
         status = self.raw_status()
         exception = self._explain(status.image_crc, status.exception) if status.exception else None
-        return PlcStatus(status.state, status.image_crc, status.image_size, exception)
+        forced = list(self._named_forces(status.image_crc)) if status.operating_state & lib.OS_FORCE_ACTIVE else []
+        return PlcStatus(status.state, status.image_crc, status.image_size, exception, forced)
 
     def check_running(self) -> None:
         """Raises ProgramStopped when the application stopped with an exception."""
@@ -315,7 +321,15 @@ class Controller(ABC):
     def sample_symbols(self, table: SymbolTable, symbols: dict[str, Symbol]) -> Reading:
         """The same of variables of a table, by the names they are to have. None: a pointer leads to no variable."""
         contents = self._read(table, list(symbols.values()))
-        return Reading(symbols, dict(zip(symbols, contents.values, strict=True)), contents.consistent)
+        forced = [] if contents.forced is None else self._forced_of(symbols, contents.forced)
+        return Reading(symbols, dict(zip(symbols, contents.values, strict=True)), contents.consistent, forced)
+
+    def _forced_of(self, symbols: dict[str, Symbol], serial: int) -> list[str]:
+        """The names of those of which a part is in the list with this serial number, or a newer one."""
+        if self._forces is None or self._forces.serial != serial:
+            self._forces = self._read_forces()
+        places = self._forces.places
+        return [n for n, s in symbols.items() if s.fixed is None and any(place.overlaps(s) for place in places)]
 
     def write(self, values: Mapping[str, Any], *rest: Never) -> None:
         """Sets variables, at once if they fit a message; strings such as 'T#80ms' are understood. Writing one bit keeps
@@ -330,6 +344,73 @@ class Controller(ABC):
         for symbol, _ in named:
             symbol.check_writable(symbol.area)
         self._write(table, [(symbol, symbol.change(value)) for symbol, value in named])
+
+    # ---- forced variables ----
+
+    def force(self, values: Mapping[str, Any]) -> None:
+        """Keeps variables, inputs and outputs at these values, whatever the program and the devices write, until
+        `unforce`, a reset, a download or power-off; all of them, or none when one cannot be forced. A value is
+        what `write` takes; a bit, a scalar, an element or a member, not a string, an array or a structure.
+
+        Raises UsageError for what cannot be forced, DeviceError when the controller has no room for as many.
+        """
+        if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
+            raise UsageError(f'This takes names with values, such as {{"Main.speed": 5}}, not {values!r}.')
+        table = self.symbols()
+        named = [(_forcible(table.resolve(name)), value) for name, value in values.items()]
+        for symbol, _ in named:
+            symbol.check_writable(symbol.area)
+        changes = [(symbol, replace(place_of(symbol), value=symbol.change(value).data)) for symbol, value in named]
+        try:
+            self._force(table, changes)
+        except DeviceError as error:
+            raise self._not_forced(error, [symbol for symbol, _ in changes]) from None
+
+    def unforce(self, names: Sequence[str] | None = None) -> None:
+        """Ends the force of these variables, or of all with None. They keep their values until they are written.
+        Raises UsageError, and ends nothing, when one is not forced."""
+        if names is None:
+            return self._unforce_all()
+        if isinstance(names, str):
+            raise UsageError(f'This takes a list of names, such as ["Main.a"], not {names!r}.')
+        table = self.symbols()
+        places = [(name, place_of(table.resolve(name))) for name in names]
+        listed = self._read_forces().places
+        for name, place in places:
+            if not any(place.same_place(forced) for forced in listed):
+                raise UsageError(f"{name} is not forced; 'plctool forced' shows what is.", "not-forced")
+        self._unforce(table, [place for _, place in places])
+        return None
+
+    def forced(self) -> dict[str, Any]:
+        """What is forced, by name, and the values."""
+        return self.forced_reading().values
+
+    def forced_reading(self) -> Reading:
+        """The same as a reading."""
+        found = self._named_forces(self._application_crc())
+        symbols = {name: symbol for name, (symbol, _) in found.items()}
+        return Reading(symbols, {name: content for name, (_, content) in found.items()}, forced=list(found))
+
+    def _named_forces(self, crc: int) -> dict[str, tuple[Symbol, bytes]]:
+        variables: list[Symbol] = []
+        with suppress(UsageError):  # without symbols they have addresses only
+            variables = list(self._symbols_of(crc).variables.values())
+        self._forces = self._read_forces()
+        return name_forced(self._forces.places, variables)
+
+    def _not_forced(self, error: DeviceError, symbols: Sequence[Symbol]) -> DeviceError:
+        """The same in the words of who wanted to force these."""
+        if error.result == lib.MONITORING_ERR_FORCE_FAILED:
+            listed = self._read_forces()
+            message = f"This controller forces {listed.room} variables at most, and {len(listed.places)} are forced"
+            advice = "end some with 'plctool unforce'"
+            return DeviceError(f"{message}; {len(symbols)} more have no room: {advice}.", "force-full", error.result)
+        if error.result == lib.MONITORING_ERR_NESTING_DEPTH:
+            deep = max(symbols, key=lambda s: len(s.place[2]))
+            message = f"{deep.name} is at the end of more than {lib.FORCE_POINTERS} pointers"
+            return DeviceError(f"{message}; force it by the name that it was declared with.", "pointers", error.result)
+        return error
 
     # ---- what each kind does its own way ----
 
@@ -361,6 +442,32 @@ class Controller(ABC):
     @abstractmethod
     def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> None:
         """Raises DeviceError when a pointer to one of the variables leads to no variable."""
+
+    @abstractmethod
+    def _force(self, table: SymbolTable, changes: Sequence[tuple[Symbol, ForcedPlace]]) -> None:
+        """Raises DeviceError with MONITORING_ERR_* as its result, or when a pointer leads to no variable."""
+
+    @abstractmethod
+    def _unforce(self, table: SymbolTable, places: Sequence[ForcedPlace]) -> None: ...
+
+    @abstractmethod
+    def _unforce_all(self) -> None: ...
+
+    @abstractmethod
+    def _read_forces(self) -> ForceList: ...
+
+
+def _forcible(symbol: Symbol) -> Symbol:
+    """Raises UsageError for what is more than a number."""
+    if isinstance(symbol.type, StringType):
+        raise UsageError(f"{symbol.name} is a string, which cannot be forced; write it.", "not-forcible")
+    if isinstance(symbol.type, StructType | ArrayType):
+        part = next(symbol.leaves(), symbol).name
+        raise UsageError(
+            f"{symbol.name} is {with_article(symbol.type)}; force its parts by their names, such as {part}.",
+            "not-forcible",
+        )
+    return symbol
 
 
 def _keep_symbols(image: Path, crc: int) -> None:

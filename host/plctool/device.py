@@ -13,6 +13,7 @@ from typing import Any, cast
 from plctool.archives import MAX_BYTES, ArchiveError, inflate
 from plctool.controller import Closed, Controller, OtherTool
 from plctool.core import lib
+from plctool.debug.forced import ForcedPlace, ForceList
 from plctool.debug.symbols import SymbolTable, load_symbols
 from plctool.debug.variables import Change, Reading, Symbol, unreachable
 from plctool.errors import DeviceError, LinkError, UsageError, did_you_mean
@@ -26,7 +27,16 @@ from plctool.link import file_services, io_services, services
 from plctool.link.connection import SCAN_SECONDS, Choice, Connection, MessageLink, no_answer, patience_factor
 from plctool.link.file_services import SYMBOLS_NAME, FileList, Progress
 from plctool.link.io_services import IoDevice, IoModule
-from plctool.link.monitoring import APP_CHANGED, AreaRange, Contents, Write, read_memory, write_memory
+from plctool.link.monitoring import (
+    APP_CHANGED,
+    AreaRange,
+    Contents,
+    Write,
+    force_memory,
+    read_forced,
+    read_memory,
+    write_memory,
+)
 from plctool.link.names import Node
 from plctool.link.passwords import AskPassword, no_password
 from plctool.link.services import Identity, LogEntry, Stack, Status, TaskInfo
@@ -310,7 +320,8 @@ class Plc(Controller):
         ranges = [_range(symbol) for symbol in symbols if symbol.fixed is None]
         contents = read_memory(self._session, table.image_crc, ranges)
         read = iter(contents.values)
-        return Contents([next(read) if s.fixed is None else s.fixed for s in symbols], contents.consistent)
+        values = [next(read) if s.fixed is None else s.fixed for s in symbols]
+        return Contents(values, contents.consistent, contents.forced)
 
     def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> None:
         """By one message if they fit."""
@@ -320,6 +331,22 @@ class Plc(Controller):
         except DeviceError:
             self._check_reachable(table, [symbol for symbol, _ in changes if symbol.pointer is not None])
             raise
+
+    def _force(self, table: SymbolTable, changes: Sequence[tuple[Symbol, ForcedPlace]]) -> None:
+        try:
+            force_memory(self._session, table.image_crc, [place for _, place in changes], lib.MON2_FORCE)
+        except DeviceError:
+            self._check_reachable(table, [symbol for symbol, _ in changes if symbol.pointer is not None])
+            raise
+
+    def _unforce(self, table: SymbolTable, places: Sequence[ForcedPlace]) -> None:
+        force_memory(self._session, table.image_crc, places, lib.MON2_UNFORCE)
+
+    def _unforce_all(self) -> None:
+        services.end_all_forces(self._session)
+
+    def _read_forces(self) -> ForceList:
+        return read_forced(self._session)
 
     def _check_reachable(self, table: SymbolTable, symbols: Sequence[Symbol]) -> None:
         """Raises DeviceError when a pointer to one of the variables leads to no variable."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
 
 from plctool.controller import Closed, Controller
 from plctool.core import error_name, give_back_core, lib, take_core
+from plctool.debug.forced import ForcedPlace, ForceList
 from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Change, Symbol, unreachable
@@ -380,7 +381,8 @@ class Simulator(Controller):
 
     def _read(self, table: SymbolTable, symbols: Sequence[Symbol]) -> Contents:
         """As they are between two cycles."""
-        return Contents([self._content(symbol) for symbol in symbols], consistent=True)
+        forced = self._lib.ForceGetSerial() if self._lib.ForceGetCount() else None
+        return Contents([self._content(symbol) for symbol in symbols], consistent=True, forced=forced)
 
     def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> None:
         for symbol, _ in changes:
@@ -393,6 +395,36 @@ class Simulator(Controller):
             if is_input(symbol) and table.io:
                 first = symbol.offset * 8 + (symbol.bit or 0)
                 self.follow_inputs(first, first + (1 if symbol.bit is not None else symbol.size * 8))
+
+    def _force(self, table: SymbolTable, changes: Sequence[tuple[Symbol, ForcedPlace]]) -> None:
+        listed = self._read_forces()
+        new = [p for _, p in changes if not any(p.same_place(old) for old in listed.places)]
+        if len(listed.places) + len(new) > listed.room:
+            _check_monitoring(lib.MONITORING_ERR_FORCE_FAILED)
+        for symbol, place in changes:
+            self._writable(symbol)
+            if len(place.hops) > lib.FORCE_POINTERS:
+                _check_monitoring(lib.MONITORING_ERR_NESTING_DEPTH)
+            _check_monitoring(self._lib.ForceCheck(self._c_place(place)))
+        for _, place in changes:
+            _check_monitoring(self._lib.ForceSet(self._c_place(place), int.from_bytes(place.value, "little")))
+
+    def _unforce(self, table: SymbolTable, places: Sequence[ForcedPlace]) -> None:
+        for place in places:
+            self._lib.ForceEnd(self._c_place(place))
+
+    def _unforce_all(self) -> None:
+        self._lib.ForceEndAll()
+
+    def _read_forces(self) -> ForceList:
+        forced = (self._lib.ForceGet(index) for index in range(self._lib.ForceGetCount()))
+        return ForceList(self._lib.ForceGetSerial(), self._lib.ForceGetRoom(), [_forced_place(f) for f in forced])
+
+    def _c_place(self, place: ForcedPlace) -> Any:
+        c = self._ffi.new("FORCE_PLACE *")
+        c.area, c.pointers, c.size, c.mask = place.area, len(place.hops), place.size, place.mask
+        c.offset[0 : 1 + len(place.hops)] = [place.offset, *place.hops]
+        return c
 
     def _writable(self, symbol: Symbol) -> Any:
         """Its memory. Raises DeviceError if a pointer leads to none, UsageError if it is a constant."""
@@ -442,6 +474,12 @@ class Simulator(Controller):
         return area[0], offset[0] + symbol.offset
 
 
+def _forced_place(forced: Any) -> ForcedPlace:
+    p = forced.place
+    offset, *hops = p.offset[0 : 1 + p.pointers]
+    return ForcedPlace(p.area, offset, tuple(hops), p.size, p.mask, forced.value.to_bytes(8, "little")[: p.size])
+
+
 @dataclass
 class _Plant:
     """`due_ns`: when `step` is called next."""
@@ -462,6 +500,12 @@ def _ns(ms: float, seconds: float = 0) -> int:
 def _check_callable(step: object) -> None:
     if not callable(step):
         raise UsageError(f"A plant is a function that gets the simulator, not {step!r}.", "plant")
+
+
+def _check_monitoring(result: int) -> None:
+    if result != lib.MONITORING_ERR_OK:
+        name = l7.monitoring_error_name(result)
+        raise DeviceError(f"The simulator refused the force: {name}.", l7.slug(name), result)
 
 
 def _check(result: int, what: str) -> None:

@@ -104,7 +104,7 @@ def test_what_is_no_image_exits_2(tool: Any, plc: FakePlc, scratch: Path) -> Non
 
 def test_status_without_application(tool: Any, plc: FakePlc) -> None:
     assert tool("status", *PORT, "--json").json == {
-        "state": "none", "image_crc": None, "exception": None, "program": None
+        "state": "none", "image_crc": None, "exception": None, "program": None, "forced": []
     }  # fmt: skip
     assert tool("status", *PORT).out == "state: none\n"
 
@@ -117,6 +117,7 @@ def test_a_crc_has_eight_digits(tool: Any, running: FakePlc, monkeypatch: pytest
 def test_status_of_a_running_program_has_the_crc_that_build_printed(tool: Any, running: FakePlc) -> None:
     document = tool("status", *PORT, "--json").json
     assert (document["state"], document["image_crc"], document["exception"]) == ("run", f"{running.crc:08X}", None)
+    assert document["forced"] == []
 
 
 def test_status_shows_name_and_version_of_the_program(tool: Any, running: FakePlc) -> None:
@@ -244,7 +245,7 @@ def test_read_gives_values_by_the_names_asked_for(tool: Any, running: FakePlc) -
     running.memory[0][16:20] = b"abc\0"
     done = tool("read", *PORT, "Main.count", "Main.ok", "Main.name", "Main.pause", "--json")
     values = {"Main.count": 168, "Main.ok": True, "Main.name": "abc", "Main.pause": "T#80ms"}
-    assert done.json == {"values": values, "consistent": True}
+    assert done.json == {"values": values, "consistent": True, "forced": []}
 
 
 def test_read_shows_values_as_st_writes_them(tool: Any, running: FakePlc) -> None:
@@ -330,7 +331,8 @@ def test_what_is_no_symbol_file_exits_2(tool: Any, running: FakePlc, scratch: Pa
 
 def test_write_understands_strings_and_shows_the_values_after(tool: Any, running: FakePlc) -> None:
     done = tool("write", *PORT, "Main.count=16#2A", "Main.pause=T#1s", "Main.name=a=b", "Main.ok=TRUE", "--json")
-    assert done.json == {"values": {"Main.count": 42, "Main.pause": "T#1s", "Main.name": "a=b", "Main.ok": True}}
+    values = {"Main.count": 42, "Main.pause": "T#1s", "Main.name": "a=b", "Main.ok": True}
+    assert done.json == {"values": values, "forced": []}
     assert running.memory[0][0] == 42
 
 

@@ -326,6 +326,7 @@ class FakePlc:
     """The services on top: an application in memory. Pass `handle` to a FakeDevice."""
 
     LOGIN = 0x80001234
+    FORCE_ROOM = 3
 
     def __init__(self) -> None:
         self.state, self.operating = lib.AS_NONE, 0
@@ -343,6 +344,7 @@ class FakePlc:
         self.tasks: list[tuple[list[int], str]] = []
         self.requests: list[tuple[int, int]] = []
         self.writes = 0
+        self.forced: dict[tuple[int, int, int, int, bytes], bytes] = {}  # what by place
         self.password = b""  # its verifier
         self.wrong = 0  # proofs of another one
         self.pauses = 0  # proofs from now on that come too early after a wrong one
@@ -382,6 +384,9 @@ class FakePlc:
             (app, lib.SRV_APP_READ_APPLICATION_INFO): self._info,
             (lib.SG_MONITORING2, lib.SRV_MON2_READ): self._read,
             (lib.SG_MONITORING2, lib.SRV_MON2_WRITE): self._write,
+            (lib.SG_MONITORING2, lib.SRV_MON2_FORCE): self._force,
+            (lib.SG_MONITORING2, lib.SRV_MON2_FORCE_LIST): self._force_list,
+            (app, lib.SRV_APP_RELEASE_FORCE_LIST): self._release_forces,
             (lib.SG_LOG, lib.SRV_LOG_GET_ENTRIES): self._log,
             (lib.SG_PLCSHELL, lib.SRV_SHELL_EXECUTE): self._shell,
             (lib.SG_USERMGR, lib.SRV_USER_SET_CREDENTIALS): self._set_credentials,
@@ -543,6 +548,40 @@ class FakePlc:
             at += 8 + size + code_size
             self.writes += 1
         return []
+
+    def _force(self, tags: bintag.Tags) -> list[bintag.Tag]:
+        if error := self._check_monitoring(tags):
+            return error
+        data, at, index = tags.bytes(lib.TAG_MON2_WRITE_LIST), 0, 0
+        while at + 6 < len(data):
+            action, size = struct.unpack_from("<HI", data, at)
+            value, code = data[at + 6 : at + 6 + size], data[at + 8 + size :]
+            at += 8 + size + struct.unpack_from("<H", data, at + 6 + size)[0]
+            mask = code[6] if code[5:6] == bytes([lib.MON2_OP_MASK]) else 0xFF
+            place = (code[4], 0, size, mask, struct.pack("<4I", self._load(code)[0], 0, 0, 0))
+            if action == lib.MON2_UNFORCE:
+                self.forced.pop(place, None)
+            elif len(self.forced) == self.FORCE_ROOM and place not in self.forced:
+                full = bintag.u32(lib.TAG_MON2_ERROR, lib.MONITORING_ERR_FORCE_FAILED)
+                return [full, bintag.u32(lib.TAG_MON2_ERROR_INDEX, index)]
+            else:
+                self.forced[place] = value
+            index += 1
+        return []
+
+    def _force_list(self, tags: bintag.Tags) -> list[bintag.Tag]:
+        """Two at a time."""
+        start = tags.u32(lib.TAG_MON2_FORCE_START)
+        entries = [
+            struct.pack("<4B16s8s", *place, value) for place, value in list(self.forced.items())[start : start + 2]
+        ]
+        listed = [bintag.raw(lib.TAG_MON2_FORCED, b"".join(entries))] if entries else []
+        room = bintag.u32(lib.TAG_MON2_FORCE_MAX, self.FORCE_ROOM)
+        return [bintag.u32(lib.TAG_MON2_FORCE_SERIAL, 1), room, *listed]
+
+    def _release_forces(self, tags: bintag.Tags) -> list[bintag.Tag]:
+        self.forced = {}
+        return [bintag.u16(lib.TAG_SERVICE_RESULT, lib.ERR_OK)]
 
     def _address(self, code: bytes) -> tuple[int, int, bool]:
         """Area and offset, and whether a pointer led there. A pointer holds the number of an area + 1 and an offset."""

@@ -29,6 +29,7 @@ from plctool.device import Plc  # noqa: E402
 from plctool.link.connection import Connection  # noqa: E402
 
 VARIABLES = 11
+FORCED = 8
 ENOUGH = 200  # counts
 PATIENCE = 30.0  # [s]
 
@@ -133,6 +134,25 @@ def count_lines(machine: str, firmware: Firmware, folder: Path) -> list[int]:
     return counts
 
 
+def count_forced(machine: str, firmware: Firmware, folder: Path) -> list[int]:
+    """A cycle with nothing forced, one after that has ended, and one with FORCED numbers of four bytes."""
+    names = [f"v{i}" for i in range(FORCED)]
+    text = program(f"VAR n, {', '.join(names)} : DINT; END_VAR", "n := n + 1;")
+    counter = Counter(machine, firmware, compile_text(text, TARGETS[machine], folder, checks="none"), folder)
+
+    def force_and_end(plc: Plc) -> None:
+        plc.force({"Main.v0": 1})
+        plc.unforce()
+        time.sleep(0.05)
+
+    def force(plc: Plc) -> None:
+        plc.force({f"Main.{name}": 1 for name in names})
+        time.sleep(0.05)
+
+    irq, end = "AlarmIrq", firmware.functions["main"]
+    return [counter.count(irq, end), counter.count(irq, end, force_and_end), counter.count(irq, end, force)]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("machine", choices=TARGETS)
@@ -152,6 +172,8 @@ def main() -> None:
         one = counter.count("SrvHandleMessage", caller, lambda plc: plc.read_all(full_names[:1]) and None)
         more = counter.count("SrvHandleMessage", caller, lambda plc: plc.read_all(full_names) and None)
         alone, shared = count_images(args.machine, firmware, Path(folder))
+        can_force = "mon_force" in firmware.functions
+        forced = count_forced(args.machine, firmware, Path(folder)) if can_force else []
         lines = count_lines(args.machine, firmware, Path(folder)) if "IoDrvGpio_Hook" in firmware.functions else []
     print(f"{args.machine}: instructions of the runtime, {args.firmware.stem}")
     print(f"{cycle:6}  a task cycle: from the alarm's interrupt back to the main loop")
@@ -161,6 +183,9 @@ def main() -> None:
     )
     if lines:
         print(f"{lines[1] - lines[0]:6}  more for three lines of the board: one input, two outputs")
+    if forced:
+        print(f"{forced[2] - forced[0]:6}  more for {FORCED} forced numbers")
+        print(f"{forced[1] - forced[0]:6}  more when the force of all has ended")
     print(f"{one:6}  a request that reads one variable")
     print(f"{(more - one) / (VARIABLES - 1):6.0f}  each further variable")
 

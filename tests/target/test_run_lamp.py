@@ -22,6 +22,11 @@ def test_lamp_is_on_while_the_program_runs(make_board, build):
         assert not shines()
         plc.flash(build(COUNTER).path)
         assert shines()
+        plc.force({"Main.count": 5})
+        eventually(lambda: not shines())  # for a moment of each second
+        eventually(shines)
+        plc.unforce()
+        eventually(shines)
         plc.stop()
         assert not shines()
         plc.start()

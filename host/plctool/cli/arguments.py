@@ -285,6 +285,22 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
         "values", nargs="+", type=_text, metavar="NAME=VALUE", help="value as 'read' shows it: Main.pause=T#2s"
     )
     _add_link(write, symbols=True)
+    force = command("force", "keep variables, inputs and outputs at a value, whatever the program and devices write")
+    force.add_argument(
+        "values",
+        nargs="+",
+        type=_text,
+        metavar="NAME=VALUE",
+        help="value as 'read' shows it: Main.pause=T#2s, %%IX0.3=1",
+    )
+    _add_link(force, symbols=True)
+    unforce = command("unforce", "end what 'force' did")
+    unforce.add_argument(
+        "names", nargs="*", type=_text, metavar="NAME", help="a variable, as 'force' or 'forced' names it"
+    )
+    unforce.add_argument("--all", action="store_true", help="all that is forced")
+    _add_link(unforce, symbols=True)
+    _add_link(command("forced", "print what is forced"), symbols=True)
     watch = command(
         "watch", "print values of variables periodically", json="print a JSON document a line for each reading"
     )

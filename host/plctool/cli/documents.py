@@ -605,6 +605,7 @@ def status_document(status: PlcStatus) -> Document:
         "state": str(status.state),
         "image_crc": None if status.state is AppState.NONE else f"{status.image_crc:08X}",
         "exception": None if status.exception is None else exception_document(status.exception),
+        "forced": status.forced,
     }
 
 
@@ -621,15 +622,43 @@ def tasks(plc: Controller) -> Document:
 def read(plc: Controller, names: Sequence[str]) -> tuple[Document, Texts]:
     """The values of variables, and how ST writes them."""
     reading = plc.sample(names)
-    return {"values": reading.values, "consistent": reading.consistent}, reading.texts
+    document = {"values": reading.values, "consistent": reading.consistent, "forced": reading.forced}
+    return document, reading.marked_texts
 
 
 def write(plc: Controller, texts: Mapping[str, str]) -> tuple[Document, Texts]:
     """Writes values as typed and reads them back."""
     table = plc.symbols()
     plc.write({name: table.resolve(name).parse(text) for name, text in texts.items()})
-    reading = plc.sample(list(texts))
-    return {"values": reading.values}, reading.texts
+    return _read_back(plc, list(texts))
+
+
+def _read_back(plc: Controller, names: Sequence[str]) -> tuple[Document, Texts]:
+    reading = plc.sample(names)
+    return {"values": reading.values, "forced": reading.forced}, reading.marked_texts
+
+
+def force(plc: Controller, texts: Mapping[str, str]) -> tuple[Document, Texts]:
+    """Forces values as typed and reads them back."""
+    table = plc.symbols()
+    plc.force({name: table.resolve(name).parse(text) for name, text in texts.items()})
+    return _read_back(plc, list(texts))
+
+
+def unforce(plc: Controller, names: Sequence[str]) -> tuple[Document, Texts]:
+    """Ends the force of these variables, and reads them; of all without names."""
+    if names:
+        plc.unforce(names)
+        return _read_back(plc, names)
+    were = list(plc.forced())
+    plc.unforce()
+    return {"values": {}, "forced": [], "unforced": were}, {}
+
+
+def forced(plc: Controller) -> tuple[Document, Texts]:
+    """What is forced."""
+    reading = plc.forced_reading()
+    return {"values": reading.values, "forced": reading.forced}, reading.texts
 
 
 def shell(plc: Plc, command: str) -> Document:
@@ -744,8 +773,13 @@ def watch(
 ) -> Iterator[tuple[Document, Texts]]:
     """Readings, one after the other; see `Plc.watch`. What is named comes before what patterns match."""
     for seconds, reading in plc.watch(_named_first(names), interval, count, waiting):
-        document = {"time_s": round(seconds, 6), "values": reading.values, "consistent": reading.consistent}
-        yield document, reading.texts
+        document = {
+            "time_s": round(seconds, 6),
+            "values": reading.values,
+            "consistent": reading.consistent,
+            "forced": reading.forced,
+        }
+        yield document, reading.marked_texts
 
 
 def watch_csv(

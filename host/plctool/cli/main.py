@@ -536,6 +536,26 @@ def _write(args: argparse.Namespace) -> int:
     return _show(args, document, lambda d: output.values_text(texts))
 
 
+def _force(args: argparse.Namespace) -> int:
+    with _connect(args) as plc:
+        document, texts = documents.force(plc, pairs(args.values))
+    return _show(args, document, lambda d: output.values_text(texts))
+
+
+def _unforce(args: argparse.Namespace) -> int:
+    if bool(args.names) == args.all:
+        raise UsageError("Name what is not to be forced any more, or write --all; 'plctool forced' shows it.", "usage")
+    with _connect(args) as plc:
+        document, texts = documents.unforce(plc, args.names)
+    return _show(args, document, lambda d: output.unforced_text(d, texts))
+
+
+def _forced(args: argparse.Namespace) -> int:
+    with _connect(args) as plc:
+        document, texts = documents.forced(plc)
+    return _show(args, document, lambda d: output.forced_text(texts))
+
+
 def _watch(args: argparse.Namespace) -> int:
     if args.csv is not None:
         return _watch_csv(args)
@@ -649,7 +669,8 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "reset": _reset,
     "tasks": _tasks, "log": _log, "shell": _shell, "passwd": _passwd,
     "files": _files, "source": _source, "port-check": _port_check,
-    "read": _read, "write": _write, "watch": _watch, "gateway": _gateway, "completion": _completion, "man": _man,
+    "read": _read, "write": _write, "force": _force, "unforce": _unforce, "forced": _forced, "watch": _watch,
+    "gateway": _gateway, "completion": _completion, "man": _man,
 }  # fmt: skip
 
 

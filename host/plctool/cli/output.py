@@ -237,6 +237,18 @@ def flash_several_text(document: dict[str, Any]) -> str:
     )
 
 
+def unforced_text(document: dict[str, Any], texts: dict[str, str]) -> str:
+    """The values that variables have without force, or how many are forced no more."""
+    if texts:
+        return values_text(texts)
+    names = document["unforced"]
+    return f"{', '.join(names)}: not forced any more" if names else "nothing was forced"
+
+
+def forced_text(texts: dict[str, str]) -> str:
+    return values_text(texts) or "nothing is forced"
+
+
 def tasks_text(document: dict[str, Any]) -> str:
     """A line for each task."""
     columns = ("name", "cycles", "last_us", "avg_us", "min_us", "max_us", "jitter_us", "overruns")
@@ -253,6 +265,8 @@ def status_text(document: dict[str, Any]) -> str:
         task = f" in task {exception['task']}" if exception["task"] else ""
         where = f"{place_text(exception)}{detail_text(exception)}{calls_text(exception)}"
         lines.append(f"exception: {exception['name']}{task}{where}")
+    if document["forced"]:
+        lines.append(f"forced: {', '.join(document['forced'])}")
     return "\n".join(lines)
 
 

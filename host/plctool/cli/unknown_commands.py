@@ -10,10 +10,8 @@ from plctool.errors import UsageError, did_you_mean
 from plctool.project import IMAGE_SUFFIX
 
 _LATER = {
-    "force": "use write, which a program may overwrite",
     "debug": "there are no breakpoints; watch shows variables, run --trace records them",
     "online": "flash replaces the program, and keeps RETAIN variables",
-    "unforce": "there is nothing to unforce",
 }
 _OTHER_NAMES = {
     "compile": "build", "make": "build", "simulate": "run", "download": "flash", "monitor": "watch",

@@ -295,11 +295,12 @@ def _indices(t: ArrayType) -> list[str]:
 @dataclass(frozen=True)
 class Reading:
     """Variables that were read together, and what they held, by the names they were asked for. `consistent`: no task
-    ran meanwhile, so this is a state between two cycles."""
+    ran meanwhile, so this is a state between two cycles. `forced`: the names of those of which a part is forced."""
 
     symbols: dict[str, Symbol]
     contents: dict[str, bytes | None]
     consistent: bool = True
+    forced: list[str] = field(default_factory=list)
 
     @property
     def values(self) -> dict[str, Any]:
@@ -310,6 +311,11 @@ class Reading:
     def texts(self) -> dict[str, str]:
         """The values as ST writes them."""
         return {name: self.symbols[name].literal(value) for name, value in self.values.items()}
+
+    @property
+    def marked_texts(self) -> dict[str, str]:
+        """The same, with a mark at what is forced."""
+        return {name: f"{text} (forced)" if name in self.forced else text for name, text in self.texts.items()}
 
     def check(self, names: Iterable[str], read: Callable[[Symbol], bytes | None]) -> None:
         """Raises DeviceError when a pointer to one of these does not lead to a variable. An interface variable may be

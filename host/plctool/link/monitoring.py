@@ -1,13 +1,16 @@
-"""Monitoring: reads and writes the memory of the application (codesys-v3-protocol 4.9 and docs/protocol.md)."""
+"""Monitoring: reads, writes and forces the memory of the application (codesys-v3-protocol 4.9 and docs/protocol.md)."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from plctool.core import lib
+from plctool.debug.forced import ForcedPlace, ForceList
 from plctool.errors import DeviceError
 from plctool.link import bintag, l7
 from plctool.link.session import Session
@@ -16,6 +19,8 @@ from plctool.link.wire import Layout
 APP_CHANGED = "app-changed"  # code of the error when the application is not the one of the symbols
 _VALUE_HEAD = Layout("MON2_VALUE")  # before each value
 _APPLICATION = Layout("MON2_APPLICATION")
+_FORCED = Layout("MON2_FORCED")
+_OFFSETS = struct.Struct("<4I")
 _FAR = 0x10000  # offsets from here on take 32 bits
 _MESSAGE_OVERHEAD = 96  # layer 7 header, application tag and list heads, bytes
 _TRIES = 5  # to read values while no task runs
@@ -42,10 +47,11 @@ class AreaRange:
 @dataclass(frozen=True)
 class Contents:
     """What was read, in order; None where a pointer leads to no memory of the application. `consistent`: no task was
-    in its cycle meanwhile."""
+    in its cycle meanwhile. `forced`: the serial number of the list of forced variables; None if it is empty."""
 
     values: list[bytes | None]
     consistent: bool
+    forced: int | None = None
 
 
 def read_memory(session: Session, image_crc: int, ranges: Sequence[AreaRange]) -> Contents:
@@ -60,13 +66,14 @@ def read_memory(session: Session, image_crc: int, ranges: Sequence[AreaRange]) -
     cut = [[r.part(at, min(longest, r.size - at)) for at in range(0, r.size, longest)] for r in ranges]
     pieces = [piece for parts in cut for piece in parts]
     in_one_access = len(pieces) == 1 and pieces[0].size in (1, 2, 4)
+    forced = None
     for _ in range(_TRIES):
-        values, consistent = _read_pieces(session, image_crc, pieces, room)
+        values, consistent, forced = _read_pieces(session, image_crc, pieces, room)
         consistent = consistent or in_one_access
         if consistent or len(_fitting(pieces, room)) < len(pieces):
             break
     rest = iter(values)
-    return Contents([_joined([next(rest) for _ in parts]) for parts in cut], consistent)
+    return Contents([_joined([next(rest) for _ in parts]) for parts in cut], consistent, forced)
 
 
 def _joined(parts: Sequence[bytes | None]) -> bytes | None:
@@ -76,15 +83,15 @@ def _joined(parts: Sequence[bytes | None]) -> bytes | None:
 
 def _read_pieces(
     session: Session, image_crc: int, pieces: Sequence[AreaRange], room: int
-) -> tuple[list[bytes | None], bool]:
+) -> tuple[list[bytes | None], bool, int | None]:
     values: list[bytes | None] = []
-    consistent = True
+    consistent, forced = True, None
     while len(values) < len(pieces):
         batch = _fitting(pieces[len(values) :], room)
-        found, undisturbed = session.recover(partial(_read_batch, session, image_crc, batch))
+        found, undisturbed, forced = session.recover(partial(_read_batch, session, image_crc, batch))
         consistent = undisturbed and len(batch) == len(pieces)
         values += found
-    return values, consistent
+    return values, consistent, forced
 
 
 def _fitting(pieces: Sequence[AreaRange], room: int) -> Sequence[AreaRange]:
@@ -126,8 +133,10 @@ def _load(value: int) -> bytes:
     return struct.pack("<BI", lib.MON2_OP_LD32, value)
 
 
-def _read_batch(session: Session, image_crc: int, batch: Sequence[AreaRange]) -> tuple[list[bytes | None], bool]:
-    """The values, and whether they are consistent."""
+def _read_batch(
+    session: Session, image_crc: int, batch: Sequence[AreaRange]
+) -> tuple[list[bytes | None], bool, int | None]:
+    """The values, whether they are consistent, and the serial number of the list of forced variables, if any are."""
     variables = b"".join(map(_read_variable, batch))
     tags = session.call(
         lib.SG_MONITORING2,
@@ -153,7 +162,8 @@ def _read_batch(session: Session, image_crc: int, batch: Sequence[AreaRange]) ->
             content = content[piece.size :]
     if len(values) != len(batch):
         raise bintag.malformed("values are missing")
-    return values, tags.find(lib.TAG_MON2_CONSISTENT) is not None
+    forced = None if tags.find(lib.TAG_MON2_FORCE_SERIAL) is None else tags.u32(lib.TAG_MON2_FORCE_SERIAL)
+    return values, tags.find(lib.TAG_MON2_CONSISTENT) is not None, forced
 
 
 def _leads_nowhere(piece: AreaRange, error: int) -> bool:
@@ -182,16 +192,20 @@ def write_memory(session: Session, image_crc: int, values: Sequence[Write]) -> N
     message = b""
     parts = (part for value in values for part in _parts(value, room))
     for index, write in enumerate(parts):
-        code = _address_code(write.where)
-        if write.mask != _ALL_BITS:
-            code += bytes([lib.MON2_OP_MASK, write.mask])
-        entry = _VALUE_HEAD.pack(id=index, size=len(write.value)) + write.value + struct.pack("<H", len(code)) + code
+        entry = _entry(write, index)
         if message and len(message) + len(entry) > room:
             _write_batch(session, image_crc, message)
             message = b""
         message += entry
     if message:
         _write_batch(session, image_crc, message)
+
+
+def _entry(write: Write, number: int) -> bytes:
+    code = _address_code(write.where)
+    if write.mask != _ALL_BITS:
+        code += bytes([lib.MON2_OP_MASK, write.mask])
+    return _VALUE_HEAD.pack(id=number, size=len(write.value)) + write.value + struct.pack("<H", len(code)) + code
 
 
 def _parts(write: Write, room: int) -> Iterator[Write]:
@@ -207,11 +221,90 @@ def _parts(write: Write, room: int) -> Iterator[Write]:
 
 
 def _write_batch(session: Session, image_crc: int, entries: bytes) -> None:
+    reply = _send_list(session, image_crc, lib.SRV_MON2_WRITE, entries)
+    _check_monitoring(session, reply, "write")
+
+
+def _send_list(session: Session, image_crc: int, service: int, entries: bytes) -> bintag.Tags:
     def request() -> bintag.Tags:
         tags = [_application_tag(session, image_crc), bintag.raw(lib.TAG_MON2_WRITE_LIST, entries)]
-        return session.call(lib.SG_MONITORING2, lib.SRV_MON2_WRITE, tags)
+        return session.call(lib.SG_MONITORING2, service, tags)
 
-    _check_monitoring(session, session.recover(request, repeatable=False), "write")
+    return session.recover(request, repeatable=False)
+
+
+# ---- forced variables ------------------------------------------------------------------------------------------------
+
+
+def force_memory(session: Session, image_crc: int, places: Sequence[ForcedPlace], action: int) -> None:
+    """Forces the values (`action` MON2_FORCE) or ends that (MON2_UNFORCE) in the application with this CRC: all of
+    them, or none if they fit one request.
+
+    Not repeated when it is unknown whether it was done. Raises DeviceError, whose result is MONITORING_ERR_*.
+    """
+    session.recover(session.application)
+    room = session.connection.buffer_size - _MESSAGE_OVERHEAD
+    message = b""
+    for place in places:
+        where = AreaRange(place.area, place.offset, place.size, place.hops)
+        entry = _entry(Write(where, place.value.ljust(place.size, b"\0"), place.mask), action)
+        if message and len(message) + len(entry) > room:
+            _force_batch(session, image_crc, message)
+            message = b""
+        message += entry
+    if message:
+        _force_batch(session, image_crc, message)
+
+
+def _force_batch(session: Session, image_crc: int, entries: bytes) -> None:
+    with _explained():
+        reply = _send_list(session, image_crc, lib.SRV_MON2_FORCE, entries)
+    _check_monitoring(session, reply, "force")
+
+
+def read_forced(session: Session) -> ForceList:
+    """What is forced."""
+
+    def request(start: int) -> bintag.Tags:
+        return session.call(lib.SG_MONITORING2, lib.SRV_MON2_FORCE_LIST, [bintag.u32(lib.TAG_MON2_FORCE_START, start)])
+
+    with _explained():
+        reply = session.recover(lambda: request(0))
+    serial, room = reply.u32(lib.TAG_MON2_FORCE_SERIAL), reply.u32(lib.TAG_MON2_FORCE_MAX)
+    places: list[ForcedPlace] = []
+    while found := [_forced_place(entry) for entry in _FORCED.unpack_each(reply.find(lib.TAG_MON2_FORCED) or b"")]:
+        places += found
+        if len(places) >= room:
+            break
+        reply = session.recover(partial(request, len(places)))
+    return ForceList(serial, room, places)
+
+
+def _forced_place(entry: Any) -> ForcedPlace:
+    offset, *hops = _OFFSETS.unpack(entry.offset)
+    return ForcedPlace(
+        entry.area,
+        offset,
+        tuple(hops[: entry.pointers]),
+        entry.size,
+        entry.mask,
+        entry.value.to_bytes(8, "little")[: entry.size],
+    )
+
+
+@contextmanager
+def _explained() -> Iterator[None]:
+    """Says of a firmware without these services how it gets them."""
+    try:
+        yield
+    except DeviceError as error:
+        if error.result != lib.ERR_L7_UNKNOWNCMD:
+            raise
+        raise DeviceError(
+            "This firmware cannot force variables. Build it with FORCE_MAX and HAS_CmpForce (docs/force.md).",
+            "no-force",
+            error.result,
+        ) from None
 
 
 def _application_tag(session: Session, image_crc: int) -> bintag.Tag:

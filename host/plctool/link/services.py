@@ -276,6 +276,12 @@ def cycle(session: Session) -> None:
     _check_control(reply, "cycle")
 
 
+def end_all_forces(session: Session) -> None:
+    """Ends the force of all variables."""
+    reply = session.recover(partial(_control, session, lib.SRV_APP_RELEASE_FORCE_LIST))
+    _check_control(reply, "unforce")
+
+
 def reset(session: Session, option: int) -> None:
     """`option` is RESET_OPTION_*; origin deletes the application."""
     look(session)
