@@ -63,8 +63,10 @@ static void fail(void)
 
     if (SysComGetCount() > 0 && SysComOpen(0) == ERR_OK)
         (void)SysComWrite(0, (const RTS_UI8 *)text, (RTS_UI32)size);
-    while (SysTimeGetMs() - start_ms < LAST_WORDS_MS)
+    while (SysTimeGetMs() - start_ms < LAST_WORDS_MS) {
         BoardWatchdogKick();
+        CpuSleep(); /* until the next tick */
+    }
     ResetNow(RESET_START, failure->id);
 }
 #else
