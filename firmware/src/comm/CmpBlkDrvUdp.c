@@ -112,6 +112,8 @@ static RTS_RESULT udp_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_U
         memcpy(packet + size, parts[i].data, parts[i].size);
         size += parts[i].size;
     }
+    if (size < sizeof(ROUTER_HEADER))
+        return ERR_NET_MSGSIZE;
     if (((const ROUTER_HEADER *)packet)->service == ROUTER_SVC_NAME_RESPONSE && !may_be_named(size))
         return ERR_NOBUFFER;
     return SysSockSendTo(udp.own.socket, packet, size, &to);
