@@ -1,4 +1,5 @@
 # make demo   the whole story on this machine        make test   the tests (ARGS="--jobs 1": one at a time)
+# make quick  the tests nearest to what changed since the last commit, in about ten seconds (ARGS="--since main", "--list")
 # make lint   style, types, words                    make bench  figures, side by side (ARGS="--programs DIR": more pairs)
 # make format gives C and Python their one style
 # make wheel  dist/*.whl for this kind of Linux and every Python from 3.11 on, tried in those that are here
@@ -24,7 +25,7 @@ RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command 
 BOARD_BUILDS := $(CORTEX_M) $(RISC_V)
 BUILDS := build build-sanitized $(BOARD_BUILDS)
 
-.PHONY: demo test test-vcan test-kernel lint format bench size wheel release run-release attack soak fuzz properties habits all clean
+.PHONY: demo test quick test-vcan test-kernel lint format bench size wheel release run-release attack soak fuzz properties habits all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz
 
 demo: $(VENV)/installed
@@ -39,6 +40,10 @@ run-test: run-all
 
 run-all: $(BUILDS:%=%/build.ninja)
 	set -e; for build in $(BUILDS); do $(MESON) compile -C $$build; done
+
+quick: build/build.ninja
+	@ninja --quiet -C build under_attack
+	@$(BIN)/python tests/quick.py $(ARGS)
 
 # CAN of a real kernel, in a small Linux of its own; skipped with the reason where that cannot run.
 test-vcan: build/build.ninja

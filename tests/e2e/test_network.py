@@ -283,7 +283,7 @@ def test_a_long_scan_by_broadcast_shows_the_program_of_each_device(
         done = tool("scan", "--long", "--udp", "127.255.255.255", "--json")
         return {(device["place"], device["state"]) for device in done.json["devices"]} if done.status == 0 else set()
 
-    with Plcrt(tmp_path / "second.flash", "--udp", f"{_own_loopback()}:3") as second:
+    with Plcrt(tmp_path / "second.flash", "--udp", f"{_own_loopback()}:1743") as second:
         with plctool.connect(f"udp:{plcrt.udp}") as plc:
             plc.flash(counter)
         eventually(lambda: {(plcrt.udp, "run"), (second.udp, "none")} <= states())
