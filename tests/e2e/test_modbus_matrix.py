@@ -25,6 +25,7 @@ from plctool.testing.waiting import eventually
 
 # ---- the matrix ------------------------------------------------------------------------------------------------------
 
+LOOPBACK = 8  # of servers, by a request of its own
 FUNCTIONS = (1, 2, 3, 4, 5, 6, 15, 16, 17, 22, 23, 43)
 TRANSPORTS = ("tcp", "rtu")
 COUNTERPARTS = ("pymodbus", "libmodbus", "mbpoll")
@@ -81,7 +82,7 @@ def test_the_matrix_has_every_function_of_the_documentation() -> None:
     table = text.partition("| function | limit of a request |")[2].partition("\n\n")[0]
     rows = re.findall(r"^\| ([\d, /]+) ", table, re.MULTILINE)
     named = {int(code) for row in rows if row.strip() != "43/128" for code in re.findall(r"\d+", row.partition("/")[0])}
-    assert named == set(FUNCTIONS)
+    assert named == {*FUNCTIONS, LOOPBACK}
 
 
 # ---- plcrt as a server -----------------------------------------------------------------------------------------------
@@ -232,7 +233,7 @@ NOWHERE = 600  # registers; 9600 is the first bit of them
 NO_FUNCTION, NO_ADDRESS, NO_VALUE = 1, 2, 3
 REFUSED = {
     **{f"function {code}": (bytes([code]), NO_FUNCTION) for code in (7, 11, 12, 20, 21, 24, 65, 100)},
-    "function 8": (request(8, 0, 0x55AA), NO_FUNCTION),
+    "another diagnosis than the loopback": (request(LOOPBACK, 1, 0), NO_FUNCTION),
     "43/13": (bytes([43, 13, 1, 0]), NO_FUNCTION),
     "43/128 without a tunnel": (bytes([43, 128, 0, 0]), NO_FUNCTION),
     # Addresses that are not there.
@@ -301,6 +302,14 @@ def test_plcrt_refuses(served: Served, transport: str, counterpart: str) -> None
             found[name] = refused.value.code
         assert client.read(3, 0, 123) == words
     assert found == {name: code for name, (_, code) in REFUSED.items()}
+
+
+@pytest.mark.parametrize("transport", TRANSPORTS)
+def test_plcrt_returns_what_a_loopback_sends(served: Served, transport: str) -> None:
+    """Libmodbus and mbpoll do not know it."""
+    with CLIENTS["pymodbus"](served.places[transport]) as client:
+        client.send(request(LOOPBACK, 0, 0x55AA))  # raises if it is refused
+        assert client.read(3, 0, 1)  # the next reply is that to the next request
 
 
 @pytest.mark.parametrize("counterpart", COUNTERPARTS)
