@@ -58,7 +58,7 @@ def test_a_lost_commit_log_costs_no_program(tool, plcrt, counter):
     plcrt.start()
     assert state(tool, plcrt) == ("run", crc_of(tool, counter))
     texts = [entry["text"] for entry in tool.ok("log", "--port", plcrt.port)["entries"]]
-    assert "No commit record: newest program taken" in texts
+    assert "No commit record: newest program taken, no password known" in texts
 
 
 def test_a_flash_that_another_firmware_laid_out_is_said_on_stderr(tool, plcrt, counter):
