@@ -156,9 +156,10 @@ static void begin_tcp(HABIT of_device)
     ModbusClientBegin(&client, devices, 1);
 }
 
+/* NULL: there is none yet. */
 static FAKE_SOCKET *newest(void)
 {
-    return &fakes.sockets[fakes.used - 1];
+    return fakes.used > 0 ? &fakes.sockets[fakes.used - 1] : NULL;
 }
 
 static void reply_to(FAKE_SOCKET *socket)
@@ -177,7 +178,7 @@ static void serve_tcp(void)
 {
     FAKE_SOCKET *socket = newest();
 
-    if (fakes.used == 0 || !socket->open || socket->out_size == 0 || is_down)
+    if (socket == NULL || !socket->open || socket->out_size == 0 || is_down)
         return;
     if (socket->peer.port == 0) {
         socket->peer_gone = true;
@@ -204,9 +205,9 @@ static void restart_tcp(RTS_UI32 down_ms)
 {
     is_down = true;
     fakes.connect_result = is_dark ? ERR_PENDING : ERR_NET_NOTCONNECTED;
-    if (is_dark)
+    if (newest() != NULL && is_dark)
         newest()->peer.port = 0;
-    else
+    else if (newest() != NULL)
         newest()->peer_gone = true;
     run_tcp_ms(down_ms);
     forget_all(0);
