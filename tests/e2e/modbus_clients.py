@@ -60,6 +60,9 @@ class Client(Protocol):
     def identification(self) -> list[str]:
         """Vendor, product and version."""
 
+    def loopback(self, word: int) -> int:
+        """By function 8, diagnostic 0."""
+
     def send(self, pdu: bytes) -> None:
         """Sends a request as it is."""
 
@@ -115,6 +118,10 @@ class Pymodbus:
     def identification(self) -> list[str]:
         found = self._checked(self._client.read_device_information(**self._unit)).information
         return [found[i].decode() for i in range(3)]
+
+    def loopback(self, word: int) -> int:
+        reply = self._checked(self._client.diag_query_data(word.to_bytes(2, "big"), **self._unit))
+        return int.from_bytes(reply.message, "big")
 
     def send(self, pdu: bytes) -> None:
         self._checked(self._client.execute(False, _Raw(pdu, self._unit["device_id"])))
@@ -205,6 +212,9 @@ class Libmodbus:
     def identification(self) -> list[str]:
         raise NotImplementedError
 
+    def loopback(self, word: int) -> int:
+        raise NotImplementedError
+
     def send(self, pdu: bytes) -> None:
         sent, reply = (ctypes.c_uint8 * 260)(self._place.unit, *pdu), (ctypes.c_uint8 * 260)()
         self._ask("modbus_send_raw_request", sent, 1 + len(pdu))
@@ -271,6 +281,9 @@ class Mbpoll:
         return found[1].strip()
 
     def identification(self) -> list[str]:
+        raise NotImplementedError
+
+    def loopback(self, word: int) -> int:
         raise NotImplementedError
 
     def send(self, pdu: bytes) -> None:

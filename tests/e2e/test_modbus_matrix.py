@@ -25,8 +25,7 @@ from plctool.testing.waiting import eventually
 
 # ---- the matrix ------------------------------------------------------------------------------------------------------
 
-LOOPBACK = 8  # of servers, by a request of its own
-FUNCTIONS = (1, 2, 3, 4, 5, 6, 15, 16, 17, 22, 23, 43)
+FUNCTIONS = (1, 2, 3, 4, 5, 6, 8, 15, 16, 17, 22, 23, 43)
 TRANSPORTS = ("tcp", "rtu")
 COUNTERPARTS = ("pymodbus", "libmodbus", "mbpoll")
 # What plcrt asks as a client, by the description, by MODBUS_READ and MODBUS_WRITE, and by `plctool io scan`.
@@ -51,8 +50,8 @@ class LeftOut:
 
 CLIENT_ROLES = ("description", "block", "scan")
 LEFT_OUT = (
-    LeftOut(("server",), "libmodbus", (43,), TRANSPORTS, "has no such request"),
-    LeftOut(("server",), "mbpoll", (22, 23, 43), TRANSPORTS, "has no such request"),
+    LeftOut(("server",), "libmodbus", (8, 43), TRANSPORTS, "has no such request"),
+    LeftOut(("server",), "mbpoll", (8, 22, 23, 43), TRANSPORTS, "has no such request"),
     LeftOut(("server",), "mbpoll", (17,), ("tcp",), "asks it on serial lines only"),
     LeftOut(CLIENT_ROLES, "mbpoll", FUNCTIONS, TRANSPORTS, "is no server"),
     LeftOut(("scan",), "libmodbus", (43,), TRANSPORTS, "does not know it"),
@@ -82,7 +81,7 @@ def test_the_matrix_has_every_function_of_the_documentation() -> None:
     table = text.partition("| function | limit of a request |")[2].partition("\n\n")[0]
     rows = re.findall(r"^\| ([\d, /]+) ", table, re.MULTILINE)
     named = {int(code) for row in rows if row.strip() != "43/128" for code in re.findall(r"\d+", row.partition("/")[0])}
-    assert named == {*FUNCTIONS, LOOPBACK}
+    assert named == set(FUNCTIONS)
 
 
 # ---- plcrt as a server -----------------------------------------------------------------------------------------------
@@ -203,6 +202,8 @@ def test_plcrt_serves(served: Served, function: int, transport: str, counterpart
             most = min(most, MOST_OF_MBPOLL if function != 15 else MOST_OF_MBPOLL // 16 * 16)
         if function < 5:
             check_reads(client, function, most)
+        elif function == 8:
+            assert client.loopback(0x55AA) == 0x55AA
         elif function < 17:
             check_writes(client, function, most, served.plc, array)
         elif function == 17:
@@ -233,7 +234,7 @@ NOWHERE = 600  # registers; 9600 is the first bit of them
 NO_FUNCTION, NO_ADDRESS, NO_VALUE = 1, 2, 3
 REFUSED = {
     **{f"function {code}": (bytes([code]), NO_FUNCTION) for code in (7, 11, 12, 20, 21, 24, 65, 100)},
-    "another diagnosis than the loopback": (request(LOOPBACK, 1, 0), NO_FUNCTION),
+    "8 but loopback": (request(8, 1, 0xFF00), NO_FUNCTION),
     "43/13": (bytes([43, 13, 1, 0]), NO_FUNCTION),
     "43/128 without a tunnel": (bytes([43, 128, 0, 0]), NO_FUNCTION),
     # Addresses that are not there.
@@ -302,14 +303,6 @@ def test_plcrt_refuses(served: Served, transport: str, counterpart: str) -> None
             found[name] = refused.value.code
         assert client.read(3, 0, 123) == words
     assert found == {name: code for name, (_, code) in REFUSED.items()}
-
-
-@pytest.mark.parametrize("transport", TRANSPORTS)
-def test_plcrt_returns_what_a_loopback_sends(served: Served, transport: str) -> None:
-    """Libmodbus and mbpoll do not know it."""
-    with CLIENTS["pymodbus"](served.places[transport]) as client:
-        client.send(request(LOOPBACK, 0, 0x55AA))  # raises if it is refused
-        assert client.read(3, 0, 1)  # the next reply is that to the next request
 
 
 @pytest.mark.parametrize("counterpart", COUNTERPARTS)
