@@ -18,7 +18,12 @@ enum {
     MODBUS_ROLE_SERIAL_SERVER = 3,
     MODBUS_ROLE_TCP_SERVER = 4,
     MODBUS_ROLE_RTU_TCP_CLIENT = 5, /* frames of a serial line on a TCP connection */
+    /* The same two with MODBUS_PARAM_HOST in place of an address. A firmware that does not know them refuses the line. */
+    MODBUS_ROLE_NAMED_TCP_CLIENT = 6,
+    MODBUS_ROLE_NAMED_RTU_TCP_CLIENT = 7,
 };
+
+enum { MODBUS_MAX_HOST = 253 };
 
 enum {
     MODBUS_PARAM_ROLE = 1,
@@ -37,6 +42,7 @@ enum {
     MODBUS_PARAM_ASK_AGAIN =
         13,                 /* of a device [ms]: how often it is asked while it is lost; MODBUS_RETRY_MS if missing */
     MODBUS_PARAM_GAPS = 14, /* of a server: the value of registers that are in no range; if missing they are refused */
+    MODBUS_PARAM_HOST = 15, /* of a client on TCP: the name of its server, or its IPv6 address, a text */
     MODBUS_PARAM_OBJECT = 0x100, /* + n: object n of the identification of a server, a text */
     MODBUS_PARAM_JOB = 0x1000,   /* + n: a MODBUS_JOB */
     MODBUS_PARAM_RANGE = 0x2000, /* + n: a MODBUS_RANGE */

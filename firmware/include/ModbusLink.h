@@ -66,6 +66,10 @@ struct MODBUS_LINK {
     RTS_UI32 gap_ns;     /* RTU: the longest pause within one, as bytes are handed over; no less than silence_ns */
     RTS_UI32 char_ns;    /* RTU: how long a character takes */
     SOCKADDRESS peer;    /* TCP: the server that a client connects to */
+#if SYSSOCK_NAMES
+    const char *host;  /* TCP: its name in place of its address; NULL: none */
+    RTS_RESULT lookup; /* of the name, in the last attempt: ERR_OK, or what SysSockGetConnected says */
+#endif
     RTS_UI8 looks_for;   /* RTU: MODBUS_LOOKS_FOR_* */
     RTS_UI8 unit;        /* RTU: the server's own; of a client, to which a request was sent last, */
     RTS_UI8 function;    /* and its function */

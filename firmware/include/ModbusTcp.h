@@ -23,6 +23,13 @@ void ModbusTcpBeginServer(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns);
 void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer);
 /* The same for a gateway that passes on the frames of its serial line (ModbusRtu.h), as on a line of this device. */
 void ModbusTcpBeginRtuClient(MODBUS_LINK *link, const SOCKADDRESS *peer);
+#if SYSSOCK_NAMES
+/* From now on the link of a client connects to the host of this name, at the port of its peer. The name is looked up for
+ * each connection; `host` stays valid as long as the link is in use. */
+void ModbusTcpSetHost(MODBUS_LINK *link, const char *host);
+#endif
+/* Returns why there is no connection because of the host's name; NULL: for another reason. */
+const char *ModbusTcpExplainName(const MODBUS_LINK *link);
 /* Of a client nothing that is on its way arrives any more: it would do so minutes later, after newer values. Nor of a
  * server whose peer does not read: the system would keep it for ever. */
 void ModbusTcpClose(MODBUS_LINK *link);

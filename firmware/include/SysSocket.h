@@ -1,5 +1,5 @@
 /*
- * SysSocket.h - IPv4 sockets of the block drivers of networks, and of field buses.
+ * SysSocket.h - IPv4 sockets of the block drivers of networks, and of field buses, which may also reach hosts by name.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -31,6 +31,8 @@ typedef struct {
     RTS_UI32 mask;
 } SOCKNETWORK;
 
+enum { SYSSOCK_MAX_NAME = 253 }; /* RFC 1035 */
+
 typedef enum {
     SYSSOCK_TCP,           /* listens */
     SYSSOCK_UDP,           /* sends and receives */
@@ -46,7 +48,12 @@ RTS_RESULT SysSockListen(const SOCKADDRESS *own, RTS_HANDLE *listener);
 
 /* Begins a connection, which sends without delay; RTS_INVALID_HANDLE: no room, or no way there. */
 RTS_HANDLE SysSockConnect(const SOCKADDRESS *peer);
-/* ERR_OK: it is there; ERR_PENDING: not yet; ERR_NET_NOTCONNECTED: refused, or no way there. */
+/* The same to a host by its name, or an IPv6 address, for ports with SYSSOCK_NAMES. The port copies `host`; names of more
+ * than SYSSOCK_MAX_NAME characters have no way there. Of several addresses each is tried. */
+RTS_HANDLE SysSockConnectName(const char *host, RTS_UI16 port);
+/* ERR_OK: it is there; ERR_PENDING: not yet; ERR_NET_NOTCONNECTED: refused, or no way there. By name also
+ * ERR_NOT_READY_YET: the name is being looked up, or was just found; ERR_NO_OBJECT: no host has this name; ERR_TIMEOUT: no
+ * name server replies. */
 RTS_RESULT SysSockGetConnected(RTS_HANDLE socket);
 
 /* The local address of a socket, and the length of its network prefix in bits (0..32). ERR_INVALID_HANDLE. */

@@ -502,6 +502,11 @@
 #define SYSSOCK_MAX_FIELD_BUS (MODBUS_MAX_CONNECTIONS + 1 + MODBUS_MAX_SERVERS + MODBUS_MAX_CLIENTS)
 #endif
 
+/* 1: the port finds hosts by name (SysSockConnectName); 8 bytes for each Modbus line. 0: by IPv4 address only. */
+#ifndef SYSSOCK_NAMES
+#define SYSSOCK_NAMES 0
+#endif
+
 /* A Modbus device that is lost is asked again after this time, unless its configuration says otherwise: so often others on
  * its line wait for its time-out. The first time it is asked after a short one, because most losses are short. If there
  * are no others, after MODBUS_RETRY_ALONE_MS each time [ms]. */

@@ -224,8 +224,18 @@ RTS_HANDLE SysSockConnect(const SOCKADDRESS *peer)
     return fakes.used++;
 }
 
+RTS_HANDLE SysSockConnectName(const char *host, RTS_UI16 port)
+{
+    RTS_HANDLE socket = SysSockConnect(&(SOCKADDRESS){0, port});
+
+    fakes.sockets[socket].host = host;
+    return socket;
+}
+
 RTS_RESULT SysSockGetConnected(RTS_HANDLE socket)
 {
+    if (fakes.sockets[socket].host != NULL && fakes.lookup_result != ERR_OK)
+        return fakes.lookup_result;
     fakes.sockets[socket].connected = fakes.connect_result == ERR_OK;
     return fakes.connect_result;
 }

@@ -33,6 +33,7 @@ typedef struct {
     bool connected;
     bool peer_gone; /* the other end has closed */
     SOCKADDRESS peer;
+    const char *host;             /* NULL: by address */
     RTS_UI8 in[FAKE_SOCKET_ROOM]; /* to the device */
     RTS_UI32 in_size;
     RTS_UI8 out[FAKE_SOCKET_ROOM];
@@ -62,6 +63,7 @@ typedef struct {
     RTS_RESULT listen_result;
     RTS_UI32 listeners;
     RTS_RESULT connect_result; /* ERR_OK, ERR_PENDING, ERR_NET_NOTCONNECTED */
+    RTS_RESULT lookup_result;  /* of a connection by name, before that: ERR_OK, or what SysSockGetConnected says */
     RTS_UI32 connects;
     RTS_UI32 send_limit; /* bytes that one SysSockSend takes */
     RTS_UI32 window;     /* bytes that a socket takes before they are read */

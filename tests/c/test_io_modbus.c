@@ -444,6 +444,20 @@ static void a_tcp_server_whose_port_is_in_use_says_so_and_tries_again(void)
     CHECK_EQUAL(state.ok, 1);
 }
 
+/* A build without SYSSOCK_NAMES: the image is refused in words, not connected to address 0. */
+static void a_host_that_is_looked_up_is_refused_where_there_are_no_names(void)
+{
+    static const RTS_UI32 roles[] = {MODBUS_ROLE_NAMED_TCP_CLIENT, MODBUS_ROLE_NAMED_RTU_TCP_CLIENT};
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(roles); i++) {
+        begin();
+        (void)add_line(roles[i]);
+        io_add_text_parameter(&io, MODBUS_PARAM_HOST, "meter.plant");
+        CHECK_EQUAL(load_io(), ERR_NOT_SUPPORTED);
+        CHECK(log_has("this device finds no names: write an IPv4 address as host."));
+    }
+}
+
 /* Its place in the tables is not what the server had that was left out. */
 static void a_server_comes_after_one_that_is_left_out(void)
 {
@@ -603,5 +617,6 @@ int main(void)
     RUN(a_tcp_server_that_is_left_out_does_not_listen);
     RUN(a_tcp_server_whose_port_is_in_use_says_so_and_tries_again);
     RUN(a_server_comes_after_one_that_is_left_out);
+    RUN(a_host_that_is_looked_up_is_refused_where_there_are_no_names);
     return test_result();
 }

@@ -317,8 +317,70 @@ static void what_is_no_frame_ends_the_connection(void)
     CHECK(ModbusDeviceIsGood(&devices[0]));
 }
 
+/* ---- by name ---- */
+
+static void begin_by_name(void)
+{
+    begin(1);
+    ModbusTcpSetHost(&client.link, "meter.plant");
+}
+
+static void a_host_is_looked_up_for_each_connection(void)
+{
+    begin_by_name();
+    run_ms(1000);
+    CHECK(newest()->host != NULL && strcmp(newest()->host, "meter.plant") == 0);
+    CHECK_EQUAL(newest()->peer.port, 502);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+    CHECK(ModbusTcpExplainName(&client.link) == NULL);
+    newest()->peer_gone = true;
+    run_ms(300);
+    CHECK_EQUAL(fakes.connects, 2);
+    CHECK(newest()->host != NULL);
+}
+
+static void a_name_that_is_not_known_is_asked_for_again_and_is_the_reason(void)
+{
+    begin_by_name();
+    fakes.lookup_result = ERR_NO_OBJECT;
+    run_ms(10000);
+    CHECK(ModbusDeviceIsLost(&devices[0]));
+    CHECK_EQUAL(devices[0].miss, MODBUS_MISS_NO_ENTRANCE);
+    CHECK(strcmp(ModbusTcpExplainName(&client.link), "its host name is not known") == 0);
+    CHECK(fakes.connects >= 5 && fakes.connects <= 11);
+    fakes.lookup_result = ERR_TIMEOUT;
+    run_ms(2000);
+    CHECK(strcmp(ModbusTcpExplainName(&client.link), "no name server replies") == 0);
+    fakes.lookup_result = ERR_OK;
+    run_ms(2500);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+    CHECK(ModbusTcpExplainName(&client.link) == NULL);
+}
+
+/* The device is lost meanwhile, but the question stays: asked again each time, a slow server would never be heard. */
+static void a_slow_name_server_is_waited_for_longer_than_for_a_connection(void)
+{
+    begin_by_name();
+    fakes.lookup_result = ERR_NOT_READY_YET;
+    run_ms(MODBUS_CONNECT_MS * 3);
+    CHECK_EQUAL(fakes.connects, 1);
+    CHECK(ModbusDeviceIsLost(&devices[0]));
+    CHECK(strcmp(ModbusTcpExplainName(&client.link), "no name server replies") == 0);
+    fakes.lookup_result = ERR_PENDING;
+    run_ms(MODBUS_CONNECT_MS - 1000);
+    CHECK_EQUAL(fakes.connects, 1); /* its time begins when the name is known */
+    CHECK(ModbusTcpExplainName(&client.link) == NULL);
+    fakes.lookup_result = ERR_OK;
+    run_ms(2500);
+    CHECK_EQUAL(fakes.connects, 1);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
 int main(void)
 {
+    RUN(a_host_is_looked_up_for_each_connection);
+    RUN(a_name_that_is_not_known_is_asked_for_again_and_is_the_reason);
+    RUN(a_slow_name_server_is_waited_for_longer_than_for_a_connection);
     RUN(one_connection_serves_all_devices_of_a_gateway);
     RUN(a_refused_connection_is_tried_every_second);
     RUN(a_slow_connection_is_waited_for);

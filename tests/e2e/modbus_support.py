@@ -65,8 +65,16 @@ class Devices:
     n % 16 of register n // 16). Context manager; may be entered again."""
 
     def __init__(
-        self, units: list[int], *, tcp: int = 0, serial: str = "", baud: int = 19200, rtu: bool = False
+        self,
+        units: list[int],
+        *,
+        tcp: int = 0,
+        serial: str = "",
+        baud: int = 19200,
+        rtu: bool = False,
+        host: str = "127.0.0.1",
     ) -> None:
+        self._host = host
         self._units, self._tcp, self._serial, self._baud = units, tcp, serial, baud
         self._framer = FramerType.RTU if rtu else FramerType.SOCKET  # on TCP
         self.memory: dict[int, list[int]] = {}
@@ -95,7 +103,7 @@ class Devices:
             # One that is alone has to leave requests to others unanswered.
             server = ModbusSerialServer(devices, port=self._serial, baudrate=self._baud, ignore_missing_devices=True)
         else:
-            address = ("127.0.0.1", self._tcp)
+            address = (self._host, self._tcp)
             server = ModbusTcpServer(devices, framer=self._framer, address=address, ignore_missing_devices=True)
         await server.serve_forever(background=True)
         return server

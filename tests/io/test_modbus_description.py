@@ -299,9 +299,25 @@ MISTAKES = [
     (server('"40001.3" = "Main.on", "40001.03" = "Main.off"'), "40001.03 is the bit 40001.3 in line 3"),
     (server('"40001.3" = "Main.on", "400001.3" = "Main.off"'), "400001.3 is the bit 40001.3 in line 3"),
     (server('40001.3 = "Main.on", 40001.4 = "Main.off"'), 'a bit of a register is written in quotes: "40001.3"'),
-    ('[modbus.server.tcp]\naddress = "plc"', "'plc' is not an address: write for example"),
-    ('[[modbus.tcp]]\nhost = ""', "'' is not an address"),
-    ('[[modbus.tcp]]\nhost = "10.0.0.1:503"', 'is not an address: write host = "10.0.0.1" and port = 503'),
+    ('[modbus.server.tcp]\naddress = "plc"', "'plc' is not an IPv4 address: write for example"),
+    ('[[modbus.tcp]]\nhost = ""', "'' is not an address or a name: a name has at most 253 letters"),
+    ('[[modbus.tcp]]\nhost = "10.0.0.1:503"', 'is not an address or a name: write host = "10.0.0.1" and port = 503'),
+    ('[[modbus.tcp]]\nhost = "[fd00::7]:503"', 'write host = "fd00::7" and port = 503'),
+    ('[[modbus.tcp]]\nhost = "tcp://meter.plant/"', 'write host = "meter.plant"'),
+    ('[[modbus.tcp]]\nhost = "10.0.0.256"', "an IPv4 address is four numbers of 0 to 255"),
+    ('[[modbus.tcp]]\nhost = "10.1"', "an IPv4 address is four numbers of 0 to 255"),
+    ('[[modbus.tcp]]\nhost = "0x7f000001"', "an IPv4 address is four numbers of 0 to 255"),
+    ('[[modbus.tcp]]\nhost = "fd00::1::2"', 'an IPv6 address is written as "fd00::7"'),
+    ('[[modbus.tcp]]\nhost = "[fd00::1"', 'an IPv6 address is written as "fd00::7"'),
+    ('[[modbus.tcp]]\nhost = "fe80::1%"', 'an IPv6 address is written as "fd00::7"'),
+    ('[[modbus.tcp]]\nhost = "z\u00e4hler.plant"', 'write "xn--zhler-gra.plant"'),
+    ('[[modbus.tcp]]\nhost = "meter_7"', "no hyphen beside a dot: write for example"),
+    ('[[modbus.tcp]]\nhost = "-meter"', "no hyphen beside a dot"),
+    ('[[modbus.tcp]]\nhost = "meter..plant"', "63 between two dots"),
+    ('[[modbus.tcp]]\nhost = " meter"', "letters, digits, hyphens and dots"),
+    (f'[[modbus.tcp]]\nhost = "{"a" * 64}.plant"', "63 between two dots"),
+    (f'[[modbus.tcp]]\nhost = "{"a." * 126}ab"', "at most 253 letters"),
+    ('[modbus.server.tcp]\naddress = "::1"', "'::1' is not an IPv4 address"),
     (server('"40001.16" = "Main.on"'), "3: 40001.16: the bits of a register are 0 to 15"),
     (device("word_1", address=-1), "10: -1 is not the address of holding registers: they are 40001 to 49999"),
     (device("word_1").replace("9600", '"9600"'), "baud is a text in quotes; it has to be a number: write baud = 9600"),
@@ -445,6 +461,32 @@ def test_a_serial_line_in_the_network_has_a_role_of_its_own(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
+    ("host", "found"),
+    [
+        ("meter-7.plant.example", "meter-7.plant.example"),
+        ("localhost", "localhost"),
+        ("7eleven.", "7eleven."),
+        ("::1", "::1"),
+        ("[fd00::7]", "fd00::7"),
+        ("fe80::1%eth0", "fe80::1%eth0"),
+        ("a" * 63 + ".b", "a" * 63 + ".b"),
+    ],
+)
+@pytest.mark.parametrize("framing", ["tcp", "rtu"])
+def test_a_host_that_is_looked_up_has_a_role_that_older_firmware_refuses(
+    tmp_path: Path, host: str, found: str, framing: str
+) -> None:
+    text = NETWORK.format(line=f'framing = "{framing}"', device="unit = 3").replace("192.168.0.5", host)
+    line = configuration(build(tmp_path, PROGRAM, text)).connectors[0]
+    values = {p.id: p.value for p in line.parameters}
+    roles = {"tcp": lib.MODBUS_ROLE_NAMED_TCP_CLIENT, "rtu": lib.MODBUS_ROLE_NAMED_RTU_TCP_CLIENT}
+    assert values[lib.MODBUS_PARAM_ROLE][0] == roles[framing]
+    assert values[lib.MODBUS_PARAM_HOST].rstrip(b"\0") == found.encode()
+    assert lib.MODBUS_PARAM_ADDRESS not in values
+    assert line.name == f"modbus_{found}"[: lib.IO_CONFIG_MAX_NAME - 1]
+
+
+@pytest.mark.parametrize(
     ("line", "device", "message"),
     [
         ('framing = "ascii"', "unit = 3", "framing cannot be 'ascii'; it can be tcp or rtu"),
@@ -463,7 +505,8 @@ def test_framing_and_units_that_cannot_be(tmp_path: Path, line: str, device: str
     [
         ("socket://192.168.0.5:8899", 'with host = "192.168.0.5", port = 8899 and framing = "rtu"'),
         ("tcp://gateway/", 'with host = "gateway" and framing = "rtu"'),
-        ("rfc2217://[::1]:4000", 'with host = "192.168.0.7" and framing = "rtu"'),
+        ("rfc2217://[::1]:4000", 'with host = "::1", port = 4000 and framing = "rtu"'),
+        ("socket://a b:4000", 'with host = "192.168.0.7" and framing = "rtu"'),
     ],
 )
 def test_url_in_place_of_a_serial_line_is_refused_with_what_to_write(tmp_path: Path, port: str, hint: str) -> None:

@@ -273,3 +273,16 @@ def test_a_serial_line_in_the_network_has_the_same_devices_and_faults(tmp_path: 
             plc.fault("Tank", fault, 0)
             plc.run_for(11_000)
             assert good(plc) == DEVICES
+
+
+@pytest.mark.parametrize("host", ["meter-7.plant", "fd00::7"])
+def test_a_host_that_is_looked_up_has_the_same_devices(tmp_path: Path, host: str) -> None:
+    assert DESCRIPTION.count("192.168.0.7") == 1
+    (tmp_path / "main.st").write_text(SOURCE)
+    (tmp_path / "main.io.toml").write_text(DESCRIPTION.replace("192.168.0.7", host))
+    with Simulator.from_sources(tmp_path / "main.st") as plc:
+        plc.run_for(1000)
+        assert good(plc) == DEVICES
+        plc.fault("Net", "absent")
+        plc.run_for(5000)
+        assert good(plc) == ("Tank", "Drive")

@@ -10,6 +10,8 @@
 #include "SysSocket.h"
 
 #include "CmpSrvNumbers.h"
+#include "HostNames.h"
+#include "SysTime.h"
 #include "port.h"
 #include "rts_config.h"
 
@@ -31,11 +33,23 @@ enum {
     SOCKETS = PURPOSES + TCP_MAX_CONNECTIONS + 1 + SYSSOCK_MAX_FIELD_BUS, /* one waits for a place */
     BACKLOG = 16,
     IP_BITS = 32,
+    NOT_ASKED = -1,
+    ADDRESS_MS = 1000, /* so long one of several addresses may take to accept a connection */
 };
+
+/* A connection that is made by name. */
+typedef struct {
+    bool is_used;
+    int question; /* NOT_ASKED: `found` has the answer */
+    HOST_ADDRESSES found;
+    RTS_UI32 next; /* of the addresses */
+    RTS_UI32 began_ms;
+} BY_NAME;
 
 /* The first ones are those the device listens on, in the order of SYSSOCK_PURPOSE. */
 static struct {
     PORT_SOURCE source[SOCKETS];
+    BY_NAME by_name[SOCKETS];
     bool ready;
 } sockets;
 
@@ -45,6 +59,23 @@ static void make_ready(void)
         sockets.source[i].file = -1;
     }
     sockets.ready = true;
+}
+
+static void close_file(PORT_SOURCE *source)
+{
+    PortWaitRemove(source);
+    if (source->file >= 0) {
+        close(source->file);
+    }
+    source->file = -1;
+}
+
+static void end_by_name(BY_NAME *connection)
+{
+    if (connection->is_used && connection->question != NOT_ASKED) {
+        HostNameForget(connection->question);
+    }
+    connection->is_used = false;
 }
 
 static PORT_SOURCE *find(RTS_HANDLE socket)
@@ -280,11 +311,8 @@ void PortSockClose(void)
 {
     make_ready();
     for (int i = 0; i < SOCKETS; i++) {
-        PortWaitRemove(&sockets.source[i]);
-        if (sockets.source[i].file >= 0) {
-            close(sockets.source[i].file);
-        }
-        sockets.source[i].file = -1;
+        end_by_name(&sockets.by_name[i]);
+        close_file(&sockets.source[i]);
     }
 }
 
@@ -349,7 +377,7 @@ RTS_RESULT SysSockGetNetwork(RTS_UI32 index, SOCKNETWORK *network)
 static RTS_HANDLE find_free(void)
 {
     RTS_HANDLE handle = PURPOSES;
-    while (handle < SOCKETS && sockets.source[handle].file >= 0) {
+    while (handle < SOCKETS && (sockets.source[handle].file >= 0 || sockets.by_name[handle].is_used)) {
         handle++;
     }
     return handle;
@@ -400,23 +428,88 @@ RTS_RESULT SysSockListen(const SOCKADDRESS *own, RTS_HANDLE *listener)
     return *listener != RTS_INVALID_HANDLE ? ERR_OK : ERR_NOBUFFER;
 }
 
+/* Begins a connection; -1: no way there. */
+static int begin_connection(const void *address, socklen_t size, int family)
+{
+    int file = socket(family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (file < 0) {
+        return -1;
+    }
+    send_without_delay(file);
+    if (connect(file, address, size) != 0 && errno != EINPROGRESS) {
+        close(file);
+        return -1;
+    }
+    return file;
+}
+
 RTS_HANDLE SysSockConnect(const SOCKADDRESS *peer)
 {
     struct sockaddr_in there = make_address(peer->ip, peer->port);
-    int file = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    int file = begin_connection(&there, sizeof(there), AF_INET);
     if (file < 0) {
-        return RTS_INVALID_HANDLE;
-    }
-    send_without_delay(file);
-    if (connect(file, (struct sockaddr *)&there, sizeof(there)) != 0 && errno != EINPROGRESS) {
-        close(file);
         return RTS_INVALID_HANDLE;
     }
     make_ready();
     return take(file, POLLOUT);
 }
 
-RTS_RESULT SysSockGetConnected(RTS_HANDLE socket)
+/* ---- connections by name ---- */
+
+RTS_HANDLE SysSockConnectName(const char *host, RTS_UI16 port)
+{
+    make_ready();
+    RTS_HANDLE handle = find_free();
+    int question = handle < SOCKETS ? HostNameAsk(host, port) : NOT_ASKED;
+    if (question == NOT_ASKED) {
+        return RTS_INVALID_HANDLE;
+    }
+    sockets.by_name[handle] = (BY_NAME){.is_used = true, .question = question};
+    return handle;
+}
+
+/* Begins a connection to the next of the addresses to which there is a way. */
+static RTS_RESULT try_next(BY_NAME *connection, PORT_SOURCE *source)
+{
+    close_file(source);
+    while (source->file < 0 && connection->next < connection->found.count) {
+        const struct sockaddr_in6 *there = &connection->found.address[connection->next++];
+        bool is_ip6 = there->sin6_family == AF_INET6;
+        source->file =
+            begin_connection(there, is_ip6 ? sizeof(*there) : sizeof(struct sockaddr_in), there->sin6_family);
+    }
+    connection->began_ms = SysTimeGetMs();
+    source->events = POLLOUT;
+    return source->file >= 0 && PortWaitAdd(source) ? ERR_OK : ERR_NET_NOTCONNECTED;
+}
+
+static RTS_RESULT take_answer(BY_NAME *connection, PORT_SOURCE *source)
+{
+    RTS_RESULT result = HostNameGet(connection->question, &connection->found);
+    if (result == ERR_PENDING) {
+        return ERR_NOT_READY_YET;
+    }
+    connection->question = NOT_ASKED;
+    if (result == ERR_OK) {
+        result = try_next(connection, source);
+    }
+    return result == ERR_OK ? (RTS_RESULT)ERR_NOT_READY_YET : result;
+}
+
+/* How the connection to one of the addresses is; when it fails, or takes long, the next one has its turn. */
+static RTS_RESULT look_further(BY_NAME *connection, PORT_SOURCE *source, RTS_RESULT result)
+{
+    bool has_more = connection->next < connection->found.count;
+    bool is_slow = result == ERR_PENDING && SysTimeGetMs() - connection->began_ms >= ADDRESS_MS;
+    if (result == ERR_OK) {
+        connection->is_used = false;
+    } else if (has_more && (is_slow || result != ERR_PENDING)) {
+        result = try_next(connection, source) == ERR_OK ? ERR_PENDING : ERR_NET_NOTCONNECTED;
+    }
+    return result;
+}
+
+static RTS_RESULT get_connected(RTS_HANDLE socket)
 {
     struct pollfd polled = {.fd = file_of(socket), .events = POLLOUT};
     int error = 0;
@@ -430,6 +523,19 @@ RTS_RESULT SysSockGetConnected(RTS_HANDLE socket)
     find(socket)->events = POLLIN;
     bool good = getsockopt(polled.fd, SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error == 0;
     return good ? ERR_OK : ERR_NET_NOTCONNECTED;
+}
+
+RTS_RESULT SysSockGetConnected(RTS_HANDLE socket)
+{
+    PORT_SOURCE *source = find(socket);
+    if (source == NULL || !sockets.by_name[socket].is_used) {
+        return get_connected(socket);
+    }
+    BY_NAME *connection = &sockets.by_name[socket];
+    if (connection->question != NOT_ASKED) {
+        return take_answer(connection, source);
+    }
+    return look_further(connection, source, get_connected(socket));
 }
 
 RTS_HANDLE SysSockAccept(RTS_HANDLE listener, SOCKADDRESS *peer)
@@ -559,6 +665,7 @@ void SysSockClose(RTS_HANDLE socket)
     if (source == NULL) {
         return;
     }
+    end_by_name(&sockets.by_name[socket]);
     PortWaitRemove(source);
     if (socket >= PURPOSES && source->file >= 0) { /* those of the device are the port's */
         close(source->file);

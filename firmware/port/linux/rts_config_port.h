@@ -113,6 +113,7 @@
 
 /* Modbus: as many connections as the field has; the others as many as a large machine has. */
 #define MODBUS_MAX_CONNECTIONS 32
+#define SYSSOCK_NAMES 1
 #define MODBUS_MAX_CLIENTS 16
 #define MODBUS_MAX_DEVICES 128
 #define MODBUS_MAX_JOBS 512

@@ -262,6 +262,13 @@ RTS_HANDLE SysSockConnect(const SOCKADDRESS *peer)
     return wire != NULL ? handle_of(wire) : RTS_INVALID_HANDLE;
 }
 
+/* Each name is one of a host. */
+RTS_HANDLE SysSockConnectName(const char *host, RTS_UI16 port)
+{
+    RTS_UNUSED(host);
+    return SysSockConnect(&(SOCKADDRESS){0, port});
+}
+
 RTS_RESULT SysSockGetConnected(RTS_HANDLE socket)
 {
     return SimModbusIsPlugged(socket) ? ERR_OK : ERR_PENDING;

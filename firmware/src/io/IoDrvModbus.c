@@ -18,6 +18,7 @@
 #include "ModbusScan.h"
 #include "ModbusServerTcp.h"
 #include "ModbusSetup.h"
+#include "ModbusTcp.h"
 #include "ModbusToolLine.h"
 #include "ModbusTunnel.h"
 #include "SysLock.h"
@@ -478,14 +479,22 @@ static void reset(void)
 
 /* ---- why a device is lost ---- */
 
-static bool is_on_tcp(const MODBUS_DEVICE *device)
+/* The connection of a device; NULL: it is on a serial line. */
+static const MODBUS_LINK *connection_of(const MODBUS_DEVICE *device)
 {
     for (RTS_UI32 i = 0; i < setup.client_count; i++) {
         const MODBUS_CLIENT *client = &setup.clients[i].client;
         if (device >= client->devices && device < client->devices + client->device_count)
-            return ModbusLinkType(&client->link) != &ModbusRtuType;
+            return ModbusLinkType(&client->link) != &ModbusRtuType ? &client->link : NULL;
     }
-    return false;
+    return NULL;
+}
+
+static const char *no_connection(const MODBUS_LINK *link)
+{
+    const char *why = MODBUS_MAX_CONNECTIONS > 0 ? ModbusTcpExplainName(link) : NULL;
+
+    return why != NULL ? why : "no connection to it";
 }
 
 static const char *miss_of(const MODBUS_DEVICE *device)
@@ -501,8 +510,11 @@ static const char *miss_of(const MODBUS_DEVICE *device)
         [MODBUS_MISS_NO_ENTRANCE] = "its line is busy",
         [MODBUS_MISS_GATEWAY] = "its gateway gets no reply from it",
     };
+    const MODBUS_LINK *link;
 
-    return device->miss == MODBUS_MISS_NO_ENTRANCE && is_on_tcp(device) ? "no connection to it" : misses[device->miss];
+    if (device->miss == MODBUS_MISS_NO_ENTRANCE && (link = connection_of(device)) != NULL)
+        return no_connection(link);
+    return misses[device->miss];
 }
 
 /* A line is lost when all its devices are. */

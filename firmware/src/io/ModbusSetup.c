@@ -142,6 +142,17 @@ static void close_link(MODBUS_LINK *link)
 
 /* ---- TCP ---- */
 
+static bool is_named(RTS_UI32 role)
+{
+    return role == MODBUS_ROLE_NAMED_TCP_CLIENT || role == MODBUS_ROLE_NAMED_RTU_TCP_CLIENT;
+}
+
+static bool is_on_tcp(RTS_UI32 role)
+{
+    return role == MODBUS_ROLE_TCP_CLIENT || role == MODBUS_ROLE_TCP_SERVER || role == MODBUS_ROLE_RTU_TCP_CLIENT ||
+           is_named(role);
+}
+
 static RTS_RESULT refuse_tcp(const IoConfigConnector *connector)
 {
     return MODBUS_REFUSE(connector, ERR_NOT_SUPPORTED, "this device has no TCP.");
@@ -154,14 +165,39 @@ static SOCKADDRESS address_of(const IoConfigConnector *connector)
                          (RTS_UI16)number(connector, MODBUS_PARAM_PORT, MODBUS_PORT)};
 }
 
+RTS_STATIC_ASSERT((int)MODBUS_MAX_HOST == (int)SYSSOCK_MAX_NAME, what_a_port_takes);
+
+static const char *host_of(const IoConfigConnector *connector)
+{
+    return IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(connector, MODBUS_PARAM_HOST));
+}
+
+static RTS_RESULT check_host(const IoConfigConnector *connector)
+{
+    const char *host = host_of(connector);
+
+    if (!SYSSOCK_NAMES)
+        return MODBUS_REFUSE(connector, ERR_NOT_SUPPORTED,
+                             "this device finds no names: write an IPv4 address as host.");
+    if (host == NULL || host[0] == '\0' || CMUtlStrNLen(host, MODBUS_MAX_HOST + 1) > MODBUS_MAX_HOST)
+        return MODBUS_REFUSE(connector, ERR_PARAMETER, "it needs a host of 1 to %u characters.",
+                             (unsigned)MODBUS_MAX_HOST);
+    return ERR_OK;
+}
+
 static void begin_client(MODBUS_LINK *link, const IoConfigConnector *connector)
 {
     const SOCKADDRESS peer = address_of(connector);
+    RTS_UI32 role = number(connector, MODBUS_PARAM_ROLE, 0);
 
-    if (number(connector, MODBUS_PARAM_ROLE, 0) == MODBUS_ROLE_RTU_TCP_CLIENT)
+    if (role == MODBUS_ROLE_RTU_TCP_CLIENT || role == MODBUS_ROLE_NAMED_RTU_TCP_CLIENT)
         ModbusTcpBeginRtuClient(link, &peer);
     else
         ModbusTcpBeginClient(link, &peer);
+#if SYSSOCK_NAMES
+    if (is_named(role))
+        ModbusTcpSetHost(link, host_of(connector));
+#endif
 }
 
 static void begin_server(MODBUS_SERVER *server, const IoConfigConnector *connector)
@@ -176,6 +212,12 @@ static void close_servers(void)
     ModbusServerTcpClose();
 }
 #else
+static RTS_RESULT check_host(const IoConfigConnector *connector)
+{
+    RTS_UNUSED(connector);
+    return ERR_OK;
+}
+
 static void begin_client(MODBUS_LINK *link, const IoConfigConnector *connector)
 {
     RTS_UNUSED(link);
@@ -395,15 +437,19 @@ static RTS_RESULT add_server(MODBUS_SETUP *setup, const IoConfigConnector *conne
 static RTS_RESULT add_line(MODBUS_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connector)
 {
     RTS_UI32 role = number(connector, MODBUS_PARAM_ROLE, 0);
-    bool is_tcp =
-        role == MODBUS_ROLE_TCP_CLIENT || role == MODBUS_ROLE_TCP_SERVER || role == MODBUS_ROLE_RTU_TCP_CLIENT;
+    bool is_tcp = is_on_tcp(role);
+    RTS_RESULT result = is_named(role) ? check_host(connector) : (RTS_RESULT)ERR_OK;
 
     if (is_tcp && !HAS_TCP)
         return refuse_tcp(connector);
+    if (result != ERR_OK)
+        return result;
     switch (role) {
     case MODBUS_ROLE_SERIAL_CLIENT:
     case MODBUS_ROLE_TCP_CLIENT:
     case MODBUS_ROLE_RTU_TCP_CLIENT:
+    case MODBUS_ROLE_NAMED_TCP_CLIENT:
+    case MODBUS_ROLE_NAMED_RTU_TCP_CLIENT:
         return add_client(setup, driver, connector, is_tcp);
     case MODBUS_ROLE_SERIAL_SERVER:
     case MODBUS_ROLE_TCP_SERVER:

@@ -67,6 +67,10 @@ void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer)
     link->breaks = 0;
     link->closings = 0;
     link->peer = *peer;
+#if SYSSOCK_NAMES
+    link->host = NULL;
+    link->lookup = ERR_OK;
+#endif
 }
 
 void ModbusTcpBeginRtuClient(MODBUS_LINK *link, const SOCKADDRESS *peer)
@@ -109,11 +113,62 @@ static void fail(MODBUS_LINK *link, RTS_I64 now_ns)
         link->breaks++;
 }
 
+#if SYSSOCK_NAMES
+void ModbusTcpSetHost(MODBUS_LINK *link, const char *host)
+{
+    link->host = host;
+}
+
+const char *ModbusTcpExplainName(const MODBUS_LINK *link)
+{
+    switch (link->lookup) {
+    case ERR_NO_OBJECT:
+        return "its host name is not known";
+    case ERR_TIMEOUT:
+    case ERR_NOT_READY_YET:
+        return "no name server replies";
+    default:
+        return NULL;
+    }
+}
+
+static RTS_HANDLE open_socket(const MODBUS_LINK *link)
+{
+    return link->host != NULL ? SysSockConnectName(link->host, link->peer.port) : SysSockConnect(&link->peer);
+}
+
+/* A name server takes its time, for which the connection is not to blame. */
+static void note_lookup(MODBUS_LINK *link, RTS_RESULT result, RTS_I64 now_ns)
+{
+    link->lookup = result;
+    if (result == ERR_NOT_READY_YET)
+        link->began_ns = now_ns;
+}
+#else
+const char *ModbusTcpExplainName(const MODBUS_LINK *link)
+{
+    RTS_UNUSED(link);
+    return NULL;
+}
+
+static RTS_HANDLE open_socket(const MODBUS_LINK *link)
+{
+    return SysSockConnect(&link->peer);
+}
+
+static void note_lookup(MODBUS_LINK *link, RTS_RESULT result, RTS_I64 now_ns)
+{
+    RTS_UNUSED(link);
+    RTS_UNUSED(result);
+    RTS_UNUSED(now_ns);
+}
+#endif
+
 static void connect_again(MODBUS_LINK *link, RTS_I64 now_ns)
 {
     if (now_ns - link->failed_ns < (RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS)
         return;
-    begin(link, SysSockConnect(&link->peer), now_ns);
+    begin(link, open_socket(link), now_ns);
     link->connecting = is_open(link);
     if (!is_open(link))
         fail(link, now_ns);
@@ -123,10 +178,12 @@ static void look_at_connecting(MODBUS_LINK *link, RTS_I64 now_ns)
 {
     RTS_RESULT result = SysSockGetConnected(link->handle);
 
+    note_lookup(link, result, now_ns);
     link->accepted = result == ERR_OK;
     if (result == ERR_OK)
         link->connecting = false;
-    else if (result != ERR_PENDING || now_ns - link->began_ns >= (RTS_I64)MODBUS_CONNECT_MS * NS_PER_MS)
+    else if ((result != ERR_PENDING && result != ERR_NOT_READY_YET) ||
+             now_ns - link->began_ns >= (RTS_I64)MODBUS_CONNECT_MS * NS_PER_MS)
         fail(link, now_ns);
 }
 

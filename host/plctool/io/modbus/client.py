@@ -33,9 +33,9 @@ from plctool.io.modbus.registers import (
 from plctool.io.modbus.settings import (
     DRIVER,
     MAX_UNIT,
-    address_parameters,
     counters,
     default_name,
+    host_parameters,
     number_parameter,
     serial_settings,
     structure_parameter,
@@ -52,6 +52,13 @@ _TURNAROUND_US = 5000  # what a device takes to reply, for the load of a line
 _TIMEOUT_US = int(lib.MODBUS_TIMEOUT_MS) * 1000
 _AROUND = 3  # bytes around a PDU: unit and CRC
 _BROADCAST_US = 100_000  # for all devices of a line to do what is asked of them (Modbus over Serial Line 2.4.1)
+# By whether the host is found by name, and whether the frames are those of a serial line.
+_ROLES = {
+    (False, False): int(lib.MODBUS_ROLE_TCP_CLIENT),
+    (False, True): int(lib.MODBUS_ROLE_RTU_TCP_CLIENT),
+    (True, False): int(lib.MODBUS_ROLE_NAMED_TCP_CLIENT),
+    (True, True): int(lib.MODBUS_ROLE_NAMED_RTU_TCP_CLIENT),
+}
 _REVERSE_FLAGS = {
     1: 0,
     2: int(lib.MODBUS_JOB_REVERSE_2),
@@ -411,9 +418,9 @@ def read_tcp_client(table: Table) -> list[Connector]:
     """A device on the network, or a gateway and the devices at it."""
     line = read_connector(ModbusLine, table, DRIVER, default_name=default_name(table, "host"))
     line.is_rtu = bool(table.choice("framing", {"tcp": False, "rtu": True}, False))
-    role = lib.MODBUS_ROLE_RTU_TCP_CLIENT if line.is_rtu else lib.MODBUS_ROLE_TCP_CLIENT
-    line.parameters.append(number_parameter(int(lib.MODBUS_PARAM_ROLE), int(role)))
-    line.parameters += address_parameters(table, "host", "")
+    by_name, place = host_parameters(table)
+    line.parameters.append(number_parameter(int(lib.MODBUS_PARAM_ROLE), _ROLES[by_name, line.is_rtu]))
+    line.parameters += place
     line.patience = _read_patience(table, Patience())
     return [line, *_read_devices(table, line)]
 

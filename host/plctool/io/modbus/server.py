@@ -36,10 +36,10 @@ from plctool.io.modbus.registers import (
 from plctool.io.modbus.settings import (
     DRIVER,
     MAX_UNIT,
-    address_parameters,
     counters,
     default_name,
     number_parameter,
+    own_address_parameters,
     serial_settings,
     structure_parameter,
     text_parameter,
@@ -268,7 +268,7 @@ def read_serial_server(table: Table) -> Connector:
 def read_tcp_server(table: Table) -> Connector:
     """A server on the network."""
     server = _read_server(table, "modbus_server", int(lib.MODBUS_ROLE_TCP_SERVER))
-    address, port = address_parameters(table, "address", "0.0.0.0")
+    address, port = own_address_parameters(table)
     server.parameters += [address, port]
     server.takes = f"the TCP port {port.value} of {ipaddress.IPv4Address(int(address.value))}"
     unit = table.number("unit", 0, MAX_UNIT, 0)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ipaddress
-import re
 from typing import Any
 
 from plctool.core import ffi, lib
 from plctool.iec.types import BYTE, UDINT, ArrayType, StringType
+from plctool.io.modbus.hosts import read_host, split_place, what_to_write
 from plctool.io.model import Connector, Parameter
 from plctool.io.names import MAX_LINE, MAX_NAME, is_line
 from plctool.io.tables import Table
@@ -42,7 +42,7 @@ def counters(*names: str) -> dict[str, int]:
 def default_name(table: Table, key: str) -> str:
     """What a line is called that has no name."""
     found = table.text(key)
-    return f"modbus_{(found or 'line').rpartition('/')[2]}"[:MAX_NAME]
+    return f"modbus_{(found or 'line').rpartition('/')[2].strip('[]')}"[:MAX_NAME]
 
 
 def serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
@@ -72,27 +72,40 @@ def serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
 
 def _network_hint(url: str) -> str:
     """What to write in place of a URL, with which other software names a serial server in the network."""
-    found = re.fullmatch(r"[a-z0-9+.]+://(?P<host>[^:/]+)(:(?P<port>\d+))?/?", url, re.ASCII | re.IGNORECASE)
-    host, port = (found["host"], found["port"]) if found else ("192.168.0.7", None)
+    host, port = split_place(url) or ("192.168.0.7", None)
     keys = f'host = "{host}"' + (f", port = {port}" if port else "")
     return f': write it as [[modbus.tcp]] with {keys} and framing = "rtu"'
 
 
-def address_parameters(table: Table, key: str, default: str) -> list[Parameter]:
-    """The IPv4 address that `key` gives, and the port."""
-    found = table.text(key, default or None, required="" if default else "192.168.0.7")
-    host = "0.0.0.0" if found is None else found
+def host_parameters(table: Table) -> tuple[bool, list[Parameter]]:
+    """Where a client connects to. True: the host is found by name, else by its IPv4 address."""
+    text = table.text("host", required="192.168.0.7")
+    host = read_host(text) if text is not None else None
+    if text is not None and host is None:
+        shown = text if len(text) <= MAX_LINE else f"{text[:MAX_LINE]}..."
+        table.error(f"'{shown}' is not an address or a name: {what_to_write(text)}", "host")
+    port = _port_parameter(table)
+    if host is not None and host.ipv4 is None:
+        return True, [port, text_parameter(int(lib.MODBUS_PARAM_HOST), host.name, "host")]
+    address = host.ipv4 if host is not None and host.ipv4 is not None else 0
+    return False, [number_parameter(int(lib.MODBUS_PARAM_ADDRESS), address, "host"), port]
+
+
+def own_address_parameters(table: Table) -> list[Parameter]:
+    """Where a server listens: an IPv4 address of the controller, and the port."""
+    found = table.text("address", "0.0.0.0") or ""
     try:
-        address = int(ipaddress.IPv4Address(host))
+        address = int(ipaddress.IPv4Address(found))
     except ValueError:
-        of_host, colon, of_port = host.partition(":")
-        hint = f'write {key} = "{of_host}" and port = {of_port}'
+        of_host, colon, of_port = found.partition(":")
+        hint = f'write address = "{of_host}" and port = {of_port}'
         if not colon or not of_port.isdecimal():
             hint = 'write for example "192.168.0.7"'
-        table.error(f"'{host}' is not an address: {hint}", key)
+        table.error(f"'{found}' is not an IPv4 address: {hint}", "address")
         address = 0
+    return [number_parameter(int(lib.MODBUS_PARAM_ADDRESS), address, "address"), _port_parameter(table)]
+
+
+def _port_parameter(table: Table) -> Parameter:
     port = table.number("port", 1, 65535, int(lib.MODBUS_PORT))
-    return [
-        number_parameter(int(lib.MODBUS_PARAM_ADDRESS), address, key),
-        number_parameter(int(lib.MODBUS_PARAM_PORT), port or int(lib.MODBUS_PORT), "port"),
-    ]
+    return number_parameter(int(lib.MODBUS_PARAM_PORT), port or int(lib.MODBUS_PORT), "port")
