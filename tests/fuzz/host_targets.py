@@ -28,6 +28,7 @@ from plctool.gateway.frames import Decoder, Frame, FrameError, Kind, Reply, Requ
 from plctool.image.board import find_board
 from plctool.image.file import describe_image, parse_image
 from plctool.image.production import describe_production, production_pieces, write_production
+from plctool.io.canopen.eds import read_eds
 from plctool.link import bintag, file_services, io_services, l7, router, services, simplecom
 from plctool.link.connection import PATIENCE, Connection
 from plctool.link.session import Session
@@ -253,6 +254,12 @@ def description(data: bytes) -> None:
         check_with_tests(load([program]), load=lambda: load_io([program]))
 
 
+def eds(data: bytes) -> None:
+    """An EDS or DCF of a CANopen device."""
+    with suppress(UsageError):
+        read_eds("a.eds", data)
+
+
 def project(data: bytes) -> None:
     """plc.toml and its link."""
     file = in_file("plc.toml", data)
@@ -350,6 +357,7 @@ TARGETS = {
     "symbols": Target(symbols, symbol_files),
     "production": Target(production, production_files),
     "sources": Target(sources, source_files),
+    "eds": Target(eds, files("examples/canopen/*.eds", "tests/canopen/*.eds")),
     "project": Target(project, project_files),
     "library": Target(library, library_files),
     "source_archive": Target(source_archive, source_archives),

@@ -75,6 +75,7 @@ def parser() -> argparse.ArgumentParser:
     _add_file_commands(command)
     _add_device_commands(command)
     _add_io_commands(command)
+    _add_canopen_commands(command)
     command("demo", "run a demonstration of all of it on this machine")
     completion = command("completion", "print the script that makes a shell complete this command")
     completion.add_argument("shell", choices=["bash", "zsh", "fish"], metavar="bash|zsh|fish", help="your shell")
@@ -386,6 +387,13 @@ def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     param.add_argument("parameter", type=_text, metavar="NAME|ID[=VALUE]", help="set: with its value")
     param.add_argument("--type", metavar="TYPE", help="of one that the description does not have; default: UDINT")
     _add_link(param, symbols=True)
+
+
+def _add_canopen_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
+    action = _actions(command("canopen", "find, set up and watch CANopen devices; check EDS files"))
+
+    check = action("check", "print every diagnostic of an EDS or DCF")
+    check.add_argument("eds", type=usable_path, metavar="FILE.eds|.dcf")
 
 
 def _add_target(parser: argparse.ArgumentParser, text: str) -> None:

@@ -650,6 +650,12 @@ def _io_param(args: argparse.Namespace) -> int:
     return _on_device(args, operation, lambda d: f"{d['device']} {d['parameter']} = {d['text']}")
 
 
+def _canopen(args: argparse.Namespace) -> int:
+    from plctool.cli.canopen_commands import CANOPEN_ACTIONS
+
+    return CANOPEN_ACTIONS[args.what](args, partial(_show, args))
+
+
 def _gateway(args: argparse.Namespace) -> int:
     if args.what == "status":
         return _show(args, documents.gateways(args.port), output.gateways_text)
@@ -665,6 +671,7 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build": _build, "check": _check, "info": _info, "image": _image, "symbols": _symbols, "run": _run,
     "test": _test, "new": _new,
     "export": _export, "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
+    "canopen": _canopen,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "cycle": _cycle,
     "reset": _reset,
     "tasks": _tasks, "log": _log, "shell": _shell, "passwd": _passwd,
