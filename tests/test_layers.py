@@ -27,7 +27,7 @@ FLOORS = (
     ("io",),
     ("debug",),
     ("link",),
-    ("gateway",),
+    ("canopen", "gateway"),
     ("controller", "compiler", "sim_io"),
     ("sim_functions",),
     ("device", "sim"),
