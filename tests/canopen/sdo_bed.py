@@ -1,4 +1,4 @@
-"""A bus on virtual time with an SDO server behind it, whose frames can be lost, doubled or late."""
+"""A bus on virtual time with an SDO server, whose frames can be lost, doubled or late."""
 
 from __future__ import annotations
 

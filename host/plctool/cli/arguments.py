@@ -395,6 +395,99 @@ def _add_canopen_commands(command: Callable[..., argparse.ArgumentParser]) -> No
     check = action("check", "print every diagnostic of an EDS or DCF")
     check.add_argument("eds", type=usable_path, metavar="FILE.eds|.dcf")
 
+    scan = action("scan", "list the nodes with their state and identity")
+    _add_canopen_link(scan, "and for heartbeats", 1.2)
+
+    nmt = action("nmt", "change the state of a node or of all")
+    nmt.add_argument("command_name", choices=_NMT, metavar="|".join(_NMT))
+    nmt.add_argument("node_number", type=_canopen_node_or_all, metavar="NODE|all")
+    _add_canopen_link(nmt, "for the heartbeat that shows the state", 1.2)
+
+    sdo = action("sdo", "read or write an object of a node")
+    sdo.add_argument("verb", choices=["read", "write"], metavar="read|write")
+    sdo.add_argument("node_number", type=_canopen_node, metavar="NODE", help="1 to 127")
+    sdo.add_argument("object", type=_canopen_object, metavar="INDEX[:SUB]", help="in hex: 6041, 1018:01")
+    sdo.add_argument("value", nargs="?", type=_text, metavar="VALUE", help="to write, unless --file has it")
+    sdo.add_argument("--type", metavar="TYPE", help="U16, INTEGER32, REAL32, STRING and so on, if no EDS says it")
+    sdo.add_argument("--file", type=usable_path, metavar="FILE", help="write its bytes, or read into it")
+    sdo.add_argument("--no-block", action="store_true", help="do not try block transfer")
+    _add_eds(sdo)
+    _add_canopen_link(sdo, "for a reply", 1.0)
+
+    emcy = action("emcy", "print emergency messages")
+    emcy.add_argument("--node", dest="node_number", type=_canopen_node, metavar="NODE", help="only of this node")
+    _add_canopen_stream(emcy)
+    pdo = action("pdo", "print the values in the PDOs of a node")
+    pdo.add_argument("node_number", type=_canopen_node, metavar="NODE")
+    pdo.add_argument("--passive", action="store_true", help="send nothing: take the mapping from the EDS")
+    _add_eds(pdo)
+    _add_canopen_stream(pdo)
+    watch = action("watch", "print values of objects periodically")
+    watch.add_argument("node_number", type=_canopen_node, metavar="NODE")
+    watch.add_argument("objects", nargs="+", type=_canopen_object, metavar="INDEX[:SUB]")
+    watch.add_argument("--type", metavar="TYPE", help="of all of them, if no EDS says it")
+    watch.add_argument(
+        "--interval", type=_seconds, default=DEFAULT_INTERVAL, metavar="S", help=f"seconds; default: {DEFAULT_INTERVAL}"
+    )
+    _add_eds(watch)
+    _add_canopen_stream(watch)
+
+    lss = action("lss", "find nodes without a number; set numbers and bit rates")
+    lss.add_argument("lss_action", choices=["scan", "set-node", "set-bitrate"], metavar="scan|set-node|set-bitrate")
+    lss.add_argument("number", nargs="?", type=_count, metavar="NODE|KBIT", help="the new node number, or kbit/s")
+    lss.add_argument(
+        "identity", nargs="?", type=_text, metavar="VENDOR:PRODUCT:REVISION:SERIAL",
+        help="which device, as 'lss scan' lists it; default: the only one without a number",
+    )  # fmt: skip
+    lss.add_argument("--yes", action="store_true", help="set-bitrate: the device cannot be reached at the old one")
+    lss.add_argument(
+        "--question", type=_seconds, default=0.05, metavar="S", help="time for a reply of a scan; default: 0.05"
+    )
+    _add_canopen_link(lss, "for a reply to a setting", 1.0)
+
+
+_NMT = ("start", "stop", "preop", "reset", "reset-comm")
+
+
+def _add_eds(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--eds", type=usable_path, metavar="FILE", help="EDS or DCF with names, types and limits")
+
+
+def _add_canopen_stream(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--count", type=_count, metavar="N", help="lines; default: until Ctrl-C")
+    _add_canopen_link(parser, "for a reply", 1.0)
+
+
+def _add_canopen_link(parser: argparse.ArgumentParser, what: str, seconds: float) -> None:
+    link = parser.add_argument_group("bus")
+    can = TRANSPORTS["can"]
+    link.add_argument("--can", metavar=can.shape, help="any interface of python-can; default: as for other commands")
+    link.add_argument("--bitrate", metavar="N", help=can.options["bitrate"].help)
+    parser.add_argument(
+        "--timeout", type=_seconds, default=seconds, metavar="S", help=f"seconds to wait {what}; default: {seconds:g}"
+    )
+    flags = [kind.flag for kind in TRANSPORTS.values() if kind.flag]
+    others = {name.replace("-", "_"): None for name in [*flags, *_option_helps()]}
+    parser.set_defaults(**{name: None for name in others if name not in ("can", "bitrate")})
+
+
+def _canopen_node(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and 1 <= int(text[:4]) <= 127):
+        raise argparse.ArgumentTypeError(f"'{text}' is not the number of a node, 1 to 127")
+    return int(text)
+
+
+def _canopen_node_or_all(text: str) -> int:
+    return 0 if text == "all" else _canopen_node(text)
+
+
+def _canopen_object(text: str) -> tuple[int, int]:
+    """Index and sub-index of 6041, 0x6041, 1018:01."""
+    found = re.fullmatch(r"(?:0x)?([0-9a-f]{4})(?::(?:0x)?([0-9a-f]{1,2}))?", text, re.IGNORECASE)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"'{text}' is not an object; write its index in hex: 6041 or 1018:01")
+    return int(found[1], 16), int(found[2] or "0", 16)
+
 
 def _add_target(parser: argparse.ArgumentParser, text: str) -> None:
     target = parser.add_argument("--target", metavar="NAME", help=text)
