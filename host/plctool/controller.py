@@ -251,7 +251,7 @@ class Controller(ABC):
         task = None
         with suppress(DeviceError):  # a device may be built without task information
             task = next((t.name for i, t in enumerate(self.tasks()) if i == exception.task), None)
-        places = table.call_stack(exception.code_offset, exception.trace) if table else []
+        places = self._call_stack(table, exception) if table else []
         if not places:
             return ExceptionInfo(exception.code, exception.name, task)
         place, detail = places[0], ""
@@ -261,6 +261,14 @@ class Controller(ABC):
         return ExceptionInfo(
             exception.code, exception.name, task, place.pou, place.file, place.line, places[1:], detail
         )
+
+    def _call_stack(self, table: SymbolTable, exception: AppException) -> list[SourceLine]:
+        """Where it was raised, and the calls that led there, as far as the controller can be asked."""
+        with suppress(DeviceError, UsageError):
+            return table.whole_stack(
+                exception.code_offset, exception.trace, lambda symbols: self._read(table, symbols).values
+            )
+        return table.call_stack(exception.code_offset, exception.trace)
 
     @abstractmethod
     def tasks(self) -> list[TaskInfo]:

@@ -238,3 +238,102 @@ def test_an_exception_in_initialisation_names_unit_and_line(tmp_path, level: Lev
         found = built.symbols.call_stack(exception.code_offset, exception.trace)
     told = [(place.pou, place.file.rpartition("/")[2], place.line) for place in found]
     assert told == [("Z", "units.st", 3), *calls, ("Main", "main.st", 4)]
+
+
+CLEANED = """FUNCTION Ratio : INT
+VAR_INPUT a, b : INT; END_VAR
+Ratio := a / b;
+END_FUNCTION
+FUNCTION_BLOCK Cell
+VAR n : INT; END_VAR
+METHOD Run : INT
+VAR_INPUT by : INT; END_VAR
+Run := Ratio(n, by) + 1;
+END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION Spared : INT
+VAR_INPUT by : INT; END_VAR
+VAR exc : __SYSTEM.ExceptionCode; END_VAR
+__TRY
+    Spared := Ratio(1, by);
+__CATCH(exc)
+    Spared := 7;
+__ENDTRY
+END_FUNCTION
+PROGRAM Main
+VAR cell : Cell; cells : ARRAY[1..2] OF INT; cycle, x, ended : INT; exc : __SYSTEM.ExceptionCode; END_VAR
+cycle := cycle + 1;
+__TRY
+{0}
+__FINALLY
+    ended := ended + Spared(0);
+__ENDTRY
+x := x + 1;
+END_PROGRAM
+"""
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        ("x := Ratio(1, 2 - cycle);", [("Ratio", 3), ("Main", 25)]),
+        ("x := cell.Run(2 - cycle);", [("Ratio", 3), ("Cell.Run", 9), ("Main", 25)]),
+        ("x := cells[2 / (2 - cycle)];", [("Main", 25)]),
+        ("x := Spared(0);\ncells[cycle] := cells[cycle] + 1; x := cell.Run(2 - cycle);",
+         [("Ratio", 3), ("Cell.Run", 9), ("Main", 26)]),
+        ("__TRY\nx := Spared(2 - cycle);\nx := cell.Run(2 - cycle);\n__FINALLY\nended := Spared(0);\n__ENDTRY",
+         [("Ratio", 3), ("Cell.Run", 9), ("Main", 27)]),
+        ("__TRY\nx := cell.Run(0);\n__CATCH(exc)\nx := Ratio(1, 2 - cycle);\n__ENDTRY",
+         [("Ratio", 3), ("Main", 28)]),
+    ],
+)  # fmt: skip
+def test_an_exception_that_passes_finally_names_where_it_was_raised(
+    tmp_path, level: Level, body: str, expected: list[tuple[str, int]]
+) -> None:
+    path = tmp_path / "cleaned.st"
+    path.write_text(CLEANED.format(body))
+    built = compile_sources([path], level=level)
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        plc.run_cycles(1, check=False)
+        exception = plc.status().exception
+        assert exception is not None
+        found = [(exception.pou, exception.line), *((call.pou, call.line) for call in exception.calls)]
+        assert found == expected
+        assert plc.read("Main.ended") > 0
+
+
+@pytest.mark.parametrize("depth", [2, 7, 8, 9, 30])
+def test_of_a_long_way_through_calls_the_first_lines_and_the_last_are_kept(tmp_path, depth: int) -> None:
+    functions = [
+        f"FUNCTION F{n} : INT VAR_INPUT a : INT; END_VAR\nF{n} := {f'F{n - 1}(a) + 1' if n else '1 / a'};\nEND_FUNCTION"
+        for n in range(depth)
+    ]
+    main = (
+        f"PROGRAM Main VAR x, n : INT; END_VAR\n__TRY\nx := F{depth - 1}(x);\n__FINALLY\nn := 1;\n__ENDTRY END_PROGRAM"
+    )
+    path = tmp_path / "deep.st"
+    path.write_text("\n".join([*functions, main]))
+    built = compile_sources([path])
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1, check=False)
+        exception = plc.status().exception
+    assert exception is not None
+    assert (exception.pou, exception.line) == ("F0", 2)
+    calls = [(f"F{n}", 3 * n + 2) for n in range(1, depth)][: 8 - 2]
+    assert [(call.pou, call.line) for call in exception.calls] == [*calls, ("Main", 3 * depth + 3)]
+
+
+def test_a_program_without_a_way_out_of_a_try_has_no_trail(tmp_path) -> None:
+    path = tmp_path / "caught.st"
+    path.write_text("PROGRAM Main VAR x : INT; END_VAR\n__TRY\nx := 1 / x;\n__CATCH\nx := 2;\n__ENDTRY END_PROGRAM")
+    assert "%trail" not in compile_sources([path]).symbols.variables
+
+
+def test_the_trail_is_not_listed_among_the_variables(tmp_path) -> None:
+    path = tmp_path / "cleaned.st"
+    path.write_text(CLEANED.format("x := Ratio(1, 2);"))
+    symbols = compile_sources([path]).symbols
+    assert "%trail" in symbols.variables
+    assert not [s for s in symbols.find(["*"]) if "%" in s.name]

@@ -133,14 +133,10 @@ def differences(plc: Simulator, expected: dict[str, str], cycle: int) -> list[st
     ]
 
 
-def exception_of(plc: Simulator, symbols: SymbolTable) -> tuple[str, int] | None:
+def exception_of(plc: Simulator) -> tuple[str, int] | None:
     """Name and source line of the exception that stopped the program."""
-    exception = plc.raw_status().exception
-    if exception is None:
-        return None
-    assert exception.code_offset is not None
-    place = symbols.address_to_line(exception.code_offset)
-    return exception.name, place.line if place else 0
+    exception = plc.status().exception
+    return None if exception is None else (exception.name, exception.line)
 
 
 @cache
@@ -175,7 +171,7 @@ def run_program(script: Script, result: BuildResult) -> list[str]:
             now = {name: values[cycle] for name, values in per_cycle.items() if cycle < len(values)}
             wrong += differences(plc, now, cycle + 1)
         wrong += differences(plc, at_end, script.cycles)
-        seen = exception_of(plc, symbols)
+        seen = exception_of(plc)
     if seen != script.exception:
         wrong.append(f"exception is {seen}, not {script.exception}")
     return wrong

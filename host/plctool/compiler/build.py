@@ -212,6 +212,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         {n: constant_symbol(n, c.type, encode(base_of(c.type), c.value)) for n, c in program.constants.items()},
         linked.debug,
         bounds=lowered.bounds,
+        passed_lines=lowered.passed_lines,
         unkept=_unkept(lowered),
         internal=_internal(lowered),
     )

@@ -201,6 +201,7 @@ def _check_parsed(
         externals=program.external_functions(),
         io=world.io.description,
         may_recurse=program.may_recurse,
+        trail=program.trail,
     )
     if not world.diagnostics.errors:
         plan_images(typed, world.diagnostics)

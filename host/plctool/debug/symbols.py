@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from plctool.archives import MAX_BYTES, ArchiveError, inflate_all
 from plctool.debug.bounds import BoundsCheck, Read, what_was_outside
+from plctool.debug.passed_lines import TRAIL, PassedLine, passed_lines
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Symbol, Units, constant_symbol, shown, walk
 from plctool.errors import UsageError
@@ -79,7 +80,8 @@ class SymbolTable:
     what the code checks. `unkept`: variables of function blocks, by the name of the block, that live in registers.
     `stack`: what the deepest calls of a task need; None in a file of a version that did not say. `made_of`: the
     fingerprint of sources and options (`cli/fresh_image.py`), empty if `build` did not write the file. `internal`: the
-    variables of blocks of the standard library that are neither inputs nor outputs, by the name of the block."""
+    variables of blocks of the standard library that are neither inputs nor outputs, by the name of the block.
+    `passed_lines`: those that the trail of an exception names by their numbers."""
 
     image_crc: int
     target: str
@@ -100,6 +102,7 @@ class SymbolTable:
     stack: Need | None = None
     made_of: str = ""
     internal: dict[str, list[str]] = field(default_factory=dict)
+    passed_lines: list[PassedLine] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -256,6 +259,20 @@ class SymbolTable:
             places += [self._in_pou(o.pou, i.call_file, i.call_line) for i, o in pairwise(scopes) if i.call_line]
         return places
 
+    def whole_stack(self, code_offset: int | None, trace: Trace, read: Read) -> list[SourceLine]:
+        """The same, beginning where an exception was raised that a `__TRY` let out. `read`: what is in memory."""
+        places = self.call_stack(code_offset, trace)
+        if TRAIL not in self.variables or not places:
+            return places
+        (content,) = read([self.variables[TRAIL]])
+        if content is None:
+            return places
+        lines = passed_lines(self.passed_lines, self.variables[TRAIL].decode(content))
+        passed = [self._in_pou(*line) for line in lines]
+        if not passed or passed[-1] != places[0]:  # it was raised where the program stopped
+            return places
+        return [*passed[:-1], *places]
+
     def _is_call(self, code_offset: int, scopes: list[Scope]) -> bool:
         """Whether a call on the stack is one of the source, and not how the compiler calls the parts of a POU."""
         if scopes:
@@ -316,6 +333,7 @@ class SymbolTable:
             "unkept": self.unkept,
             "made_of": self.made_of,
             "internal": self.internal,
+            "passed_lines": self.passed_lines,
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))
@@ -351,6 +369,7 @@ class SymbolTable:
                 _read_need(document.get("stack")),
                 document.get("made_of", ""),
                 document.get("internal", {}),
+                [PassedLine(pou, file, line) for pou, file, line in document.get("passed_lines", [])],
             )
         except (ArchiveError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None

@@ -31,6 +31,7 @@ from plctool.compiler.internal import note_position
 from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
 from plctool.debug.bounds import BoundsCheck
+from plctool.debug.passed_lines import PassedLine
 from plctool.errors import UsageError
 from plctool.iec.areas import EXCLUSIVE_AREAS, Area
 from plctool.iec.types import BOOL
@@ -45,7 +46,8 @@ class Lowered:
     """LLVM IR, in parts, and what an image of it needs. `tasks`: entry symbols
     in the order of the program's tasks; `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `pous`: by
     symbol, all that are part of it; `imports`: in the order of their slots; `bounds`: what is checked;
-    `transient`: variables of blocks that are not kept in memory."""
+    `transient`: variables of blocks that are not kept in memory; `passed_lines`: by the numbers in the trail of an
+    exception, from 1."""
 
     parts: list[Part]
     tasks: list[str]
@@ -54,11 +56,13 @@ class Lowered:
     imports: list[External]
     bounds: list[BoundsCheck]
     transient: TransientVariables
+    passed_lines: list[PassedLine]
 
 
 def lower(program: TypedProgram, options: Options) -> Lowered:
     """Lowers what the tasks of a checked program reach."""
     unit = Unit(options, program.area_sizes, program.defaults)
+    unit.trail_variable = program.trail
     signatures = block_signatures(program, options)
     unit.handed, unit.transient, unit.closed = signatures.handed, signatures.transient, signatures.closed
     tasks = [_task_entry(unit, number, task) for number, task in enumerate(program.tasks)]
@@ -96,7 +100,7 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
         unit.module.add_helper(string_function(name, unit.target, unit.strings))
     pous = {name: pou for (pou, _), name in unit.pous.items()}
     bounds = [*dict.fromkeys(unit.bounds)]
-    return Lowered(parts(unit.module), tasks, functions, pous, unit.imports, bounds, unit.transient)
+    return Lowered(parts(unit.module), tasks, functions, pous, unit.imports, bounds, unit.transient, unit.trail.lines)
 
 
 def _task_entry(unit: Unit, number: int, task: Task) -> str:

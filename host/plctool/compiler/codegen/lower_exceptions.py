@@ -61,13 +61,15 @@ class Finally(Detour):
 
     def raise_again(self, frame: Frame) -> None:
         fn, debug = frame.fn, frame.fn.debug
-        pending = self.pending = self.pending or fn.slot("i32")
-        fn.do(f"store i32 {fn.value(f'load i32, ptr {frame.raised}')}, ptr {pending}")
+        assert frame.raised is not None
+        raised_slot = frame.raised
+        pending = self.pending = self.pending or frame.exception_slot()
+        frame.copy_exception(pending, raised_slot)
         frame.set_raised(number(0))
 
         def raised() -> None:
             fn.debug = debug
-            frame.set_raised(fn.value(f"load i32, ptr {pending}"))
+            frame.copy_exception(raised_slot, pending)
             self.outer.raise_again(frame)
 
         self.go(frame, raised)

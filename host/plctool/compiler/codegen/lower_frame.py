@@ -17,9 +17,11 @@ from plctool.compiler.codegen.ir import NULL, FixedPointer, Function, Value, num
 from plctool.compiler.codegen.lengths import KnownLengths, Lengths
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, REALS, Check, Form, Unit, value_type
 from plctool.compiler.codegen.memory import Memory
+from plctool.compiler.codegen.trail import SIZE as TRAIL_SIZE
 from plctool.compiler.internal import note_position
 from plctool.compiler.typed import Dispatch, Expr, External, Label, Place, Pos, Pou, Statement, Variable
 from plctool.core import ffi, lib
+from plctool.debug.passed_lines import PassedLine
 from plctool.iec.areas import Area
 from plctool.iec.types import DINT, MAX_ALIGN, Elementary, StringType, Type, alignment_at, base_of, is_scalar
 
@@ -85,7 +87,7 @@ class Handler(ABC):
 
     @property
     def has_lines(self) -> bool:
-        """Whether it stops the task, so that the line where it was raised is reported."""
+        """Whether the line where it was raised is reported, because it stops the task or may do so."""
         return False
 
     @abstractmethod
@@ -116,6 +118,8 @@ class _Stop(Handler):
         self._call(frame, number(code))
 
     def raise_again(self, frame: Frame) -> None:
+        frame.extend_trail()
+        frame.publish_trail()
         self._call(frame, frame.fn.value(f"load i32, ptr {frame.raised}"))
 
     @staticmethod
@@ -125,18 +129,27 @@ class _Stop(Handler):
 
 
 class _Caller(Handler):
-    """The function that called this one."""
+    """The function that called this one. `traced`: the exception notes its way."""
+
+    def __init__(self, traced: bool) -> None:
+        self._traced = traced
+
+    @property
+    def has_lines(self) -> bool:
+        return self._traced
 
     def raise_code(self, frame: Frame, code: int) -> None:
         frame.set_raised(number(code))
+        frame.begin_trail()
         frame.fn.branch(_GIVEN_UP)
 
     def raise_again(self, frame: Frame) -> None:
+        frame.extend_trail()
         frame.fn.branch(_GIVEN_UP)
 
 
 _GIVEN_UP = "given.up"
-_STOP, _CALLER = _Stop(), _Caller()
+_STOP, _CALLER, _TRACED_CALLER = _Stop(), _Caller(traced=False), _Caller(traced=True)
 
 
 class Frame:
@@ -148,8 +161,9 @@ class Frame:
         self.fn = fn
         self.pou = pou
         self.form = form
-        self.handler: Handler = _CALLER if form is Form.RAISING else _STOP
-        # Where the number of an exception is, 0 without one.
+        caller = _CALLER if unit.trail_variable is None else _TRACED_CALLER
+        self.handler: Handler = caller if form is Form.RAISING else _STOP
+        # Where the number of an exception is, 0 without one; its trail comes after it.
         self.raised: Value | None = RAISED if form is Form.RAISING else None
         self.locals: dict[Variable, Ref] = {}
         self.shadows: dict[Variable, Value] = {}  # FOR variables that live in a register inside their loop
@@ -255,9 +269,49 @@ class Frame:
     def expect_exceptions(self) -> None:
         """Makes room for the number of an exception, before a __TRY."""
         if self.raised is None:
-            self.raised = self.fn.slot("i32")
+            self.raised = self.exception_slot()
         if self.handler is _STOP:
             self.set_raised(number(0))
+
+    def exception_slot(self) -> Value:
+        """Room on the stack for the number of an exception, and for its trail if the program has them."""
+        return self.fn.slot("i32") if self.unit.trail_variable is None else self.fn.alloca(TRAIL_SIZE, _WORD)
+
+    def copy_exception(self, target: Value, source: Value) -> None:
+        """Copies an exception from one slot to another."""
+        if self.unit.trail_variable is None:
+            self.fn.do(f"store i32 {self.fn.value(f'load i32, ptr {source}')}, ptr {target}")
+        else:
+            self.fn.do(
+                f"call void @llvm.memcpy.p0.p0.{self.pointer_int}(ptr align {_WORD} {target}, "
+                f"ptr align {_WORD} {source}, {self.pointer_int} {TRAIL_SIZE}, i1 false)"
+            )
+
+    def begin_trail(self) -> None:
+        """Notes the line of what is written as the one that raised."""
+        line = self._passed_line()
+        if line is not None and self.raised is not None:
+            self.unit.trail.begin(self.fn, self.raised, line)
+
+    def extend_trail(self) -> None:
+        """Notes the line of what is written as one of a call that returned an exception."""
+        line = self._passed_line()
+        if line is not None and self.raised is not None:
+            self.unit.trail.extend(self.fn, self.raised, line)
+
+    def publish_trail(self) -> None:
+        """Copies the trail to the variable from which the host reads it."""
+        variable = self.unit.trail_variable
+        if variable is not None and self.raised is not None:
+            target = self.fn.value(f"getelementptr i8, ptr {self.area_base(variable.area)}, i32 {variable.offset}")
+            self.unit.trail.publish(self.fn, self.raised, target)
+
+    def _passed_line(self) -> PassedLine | None:
+        """Where an exception is noted that passes here; None without a line, or when the program has no trails."""
+        found = self.unit.source_line(self.fn.debug)
+        if found is None or self.pou is None or self.unit.trail_variable is None:
+            return None
+        return PassedLine(self.pou.name, *found)
 
     def set_raised(self, code: Value) -> None:
         """Notes the number of an exception; 0: there is none."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from plctool.compiler.codegen.closed import Closed
 from plctool.compiler.codegen.ir import Module, escape
 from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
+from plctool.compiler.codegen.trail import Trail
 from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable, runtime_function
 from plctool.core import ffi, lib
 from plctool.debug.bounds import BoundsCheck
@@ -139,9 +140,12 @@ class Unit:
         self.dispatchers: dict[tuple[Dispatch, Form], str] = {}  # symbols of what chooses among targets
         self.files: dict[str, int] = {}
         self.bounds: list[BoundsCheck] = []  # that are in the code
+        self.trail_variable: Variable | None = None  # where the way of an exception is left
+        self.trail = Trail()
         self._import_slots: dict[str, int] = {}
         self._symbols: set[str] = set()
         self._locations: dict[tuple[int, str, int], str] = {}
+        self._source_lines: dict[str, tuple[str, int]] = {}
         self._scopes: dict[tuple[int, str], int] = {}  # the parts of functions that come from a file
         self._struct_symbols: dict[StructType, str] = {}
         self._subroutine_type = -1
@@ -330,7 +334,13 @@ class Unit:
             inner = self._scope_in(pos.file, scope)
             text = f", !dbg !{self.module.metadata(f'!DILocation(line: {pos.line}, scope: !{inner})')}"
             self._locations[key] = text
+            self._source_lines[text] = (pos.file, pos.line)
         return text
+
+    def source_line(self, location: str) -> tuple[str, int] | None:
+        """File and line of a `, !dbg` suffix; None for none, or the line 0."""
+        found = self._source_lines.get(location)
+        return found if found and found[1] else None
 
     def _scope_in(self, file: str, scope: int) -> int:
         """The part of a scope that comes from another file than the function: initial values come from everywhere."""

@@ -26,9 +26,10 @@ from plctool.compiler.semantics.rules.control import report_unused, write_body
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc_statements import statements_of
 from plctool.compiler.semantics.symbols import TypeSymbol
+from plctool.compiler.semantics.trail import reserve_trail
 from plctool.compiler.semantics.world import Declared, World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pou
+from plctool.compiler.typed import Pou, Variable
 
 
 class Program:
@@ -48,6 +49,7 @@ class Program:
         self.startup: Pou | None = None  # calls FB_Init
         self.shutdown: Pou | None = None  # calls FB_Exit
         self.may_recurse = False
+        self.trail: Variable | None = None
         world.names.declared_instance = self.programs.instance
         world.declared = Declared(
             type_of=self.types.type_of_symbol,
@@ -90,6 +92,7 @@ class Program:
             report_unused(scope, in_tests)
         write_pools(world)
         self.startup, self.shutdown = construct(world)
+        self.trail = reserve_trail(world)
         world.pous += world.dispatches.queries.pous()
         self._classes.find_targets(
             v for vs in (world.allocation.variables, *(p.locals for p in world.pous)) for v in vs
