@@ -76,6 +76,25 @@ def test_project(path: Path) -> None:
         assert image_of(again) == image_of(original)
 
 
+def test_a_task_without_priority_keeps_the_lowest() -> None:
+    program = "PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\n"
+    task = "CONFIGURATION C TASK T(INTERVAL := T#1ms); PROGRAM P WITH T : Main; END_CONFIGURATION\n"
+    sources = [Source("a.st", program + task)]
+    written = exported(sources)
+    assert not written.diagnostics
+    standard = PLAIN.sub("", written.text)
+    assert standard != written.text
+    assert image_of(check_sources(read_project("p.xml", standard))) == image_of(check_sources(sources))
+
+
+def test_a_priority_that_is_a_constant_is_named_as_lost() -> None:
+    program = "VAR_GLOBAL CONSTANT HIGH : INT := 3; END_VAR PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\n"
+    task = "CONFIGURATION C TASK T(INTERVAL := T#1ms, PRIORITY := HIGH); PROGRAM P WITH T : Main; END_CONFIGURATION\n"
+    written = exported([Source("a.st", program + task)])
+    assert "PRIORITY" in " ".join(d.message for d in written.diagnostics)
+    assert 'priority="31"' in written.text
+
+
 def test_globals_of_a_file_with_units_keep_their_names(tmp_path: Path) -> None:
     program = "PROGRAM Main hours := hours + 1; units.days := GVL.years; END_PROGRAM\n"
     (tmp_path / "units.st").write_text(f"VAR_GLOBAL PERSISTENT hours : UDINT; days : INT; END_VAR {program}")

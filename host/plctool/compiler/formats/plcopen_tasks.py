@@ -9,8 +9,9 @@ import re
 
 from plctool.compiler.formats import plcopen_types as types
 from plctool.compiler.formats.text import Findings, Text
-from plctool.compiler.formats.twincat import LOWEST_PRIORITY, identifier
+from plctool.compiler.formats.twincat import identifier
 from plctool.compiler.formats.xml_tree import Element
+from plctool.iec.tasks import LOWEST_PRIORITY
 
 _ISO = re.compile(r"P(?:(\d+)D)?(?:T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?)?", re.IGNORECASE)
 _CLOCK = re.compile(r"(\d+):(\d+):(\d+(?:\.\d+)?)")

@@ -11,8 +11,8 @@ from plctool.compiler.formats.text import Findings, Text
 from plctool.compiler.formats.units import unit_keyword
 from plctool.compiler.formats.xml_tree import Element, XmlError, read_xml
 from plctool.compiler.source import Source
+from plctool.iec.tasks import LOWEST_PRIORITY
 
-LOWEST_PRIORITY = 31
 _TEXT = frozenset(("ST", "STNonEdit"))
 _MEMBERS = {"Method": "METHOD", "Property": "PROPERTY", "Action": "ACTION"}
 _DRAWN = {"NWL": "LD, FBD or IL", "SFC": "SFC", "LD": "LD", "FBD": "FBD"}

@@ -36,6 +36,7 @@ from plctool.compiler.plcopen_export.outline import UNITS, Outline, Part, outlin
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.lexer import Lexer, Token
 from plctool.compiler.typed import Pos
+from plctool.iec.tasks import LOWEST_PRIORITY
 from plctool.version import plctool_version
 
 _KINDS = {"FUNCTION": "function", "FUNCTION_BLOCK": "functionBlock", "PROGRAM": "program"}
@@ -398,7 +399,10 @@ class _File:
                 task.set(name, self._declarations.slice(value))
             else:
                 self._only_text(inside[start].pos, f"{inside[start].text} of a task")
-        task.set("priority", task.get("priority", "0"))
+        if not task.get("priority", "").isdecimal():  # the name of a constant, or none: then it is the lowest here
+            if task.get("priority") is not None:
+                self._only_text(tokens[1].pos, "a PRIORITY that is not a number")
+            task.set("priority", str(LOWEST_PRIORITY))
         return task
 
 

@@ -33,11 +33,11 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.errors import listed
+from plctool.iec.tasks import LOWEST_PRIORITY
 from plctool.iec.types import BOOL, LTIME, TIME, StringType
 
 # ---- the properties of a TASK ----
 
-LOWEST_PRIORITY = 31
 _LOWEST_ELSEWHERE = 65_535  # of OpenPLC and Beremiz, where it is a UINT
 MAX_DURATION_US = 0x7FFF_FFFF
 MAX_SENSITIVITY = 0xFFFF
