@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import struct
 from datetime import datetime, timedelta
+from decimal import Decimal, localcontext
+from fractions import Fraction
 from functools import partial
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from property_support import (
     BITS,
@@ -218,6 +221,58 @@ DECIMAL = st.from_regex(r"-?[0-9]{1,10}(\.[0-9]{1,9})?(E[+-]?[0-9]{1,3})?", full
 @given(st.lists(DECIMAL, min_size=EXPRESSIONS, max_size=EXPRESSIONS))
 def test_decimal_strings_read_as_the_nearest_real(texts: list[str]) -> None:
     check([Term(f"STRING_TO_LREAL('{t}')", "LREAL", float(t)) for t in texts])
+
+
+MANY_DIGITS = st.from_regex(r"-?[0-9]{1,30}(\.[0-9]{1,30})?(E[+-]?[0-9]{1,2})?", fullmatch=True)
+
+
+def nearest_real(text: str) -> float:
+    """The REAL nearest to a decimal number, the one with an even mantissa of two: without an LREAL between."""
+    wanted, guess = Fraction(text), rounded(float(text), "REAL")
+    if abs(wanted) >= (2 - Fraction(2) ** -24) * Fraction(2) ** 127:
+        return math.copysign(math.inf, guess)
+    (bits,) = struct.unpack("<i", struct.pack("<f", abs(guess)))
+    near = [b for b in (bits - 1, bits, bits + 1) if b >= 0]
+    values = {b: Fraction(b & 0x7FFFFF | (b >> 23 > 0) << 23) * Fraction(2) ** (max(b >> 23, 1) - 150) for b in near}
+    best = min(near, key=lambda b: (abs(values[b] - abs(wanted)), b & 1))
+    return math.copysign(struct.unpack("<f", struct.pack("<i", best))[0], guess)
+
+
+@st.composite
+def half_way_texts(draw: st.DrawFn) -> str:
+    """A number half-way between two REAL or LREAL ones, or beside it by so little that only its last digits show it."""
+    precision, exponent = draw(st.sampled_from([24, 53])), draw(st.integers(-60, 60))
+    half_way = Fraction(2 * draw(st.integers(1 << (precision - 1), (1 << precision) - 1)) + 1) * Fraction(2) ** exponent
+    with localcontext(prec=400):
+        digits = f"{Decimal(half_way.numerator) / Decimal(half_way.denominator):f}"
+    beside = draw(st.sampled_from(["", "0000", "1", "0" * 20 + "1", "0" * 60 + "1"]))
+    return digits + ("" if "." in digits else ".0") + beside
+
+
+@PROGRAM
+@given(st.lists(MANY_DIGITS | half_way_texts(), min_size=EXPRESSIONS, max_size=EXPRESSIONS))
+@example(["1.00000005960464477539062500001", "1.000000059604644775390625", "1.00000017881393432617187499999"])
+def test_strings_of_many_digits_read_as_the_nearest_real(texts: list[str]) -> None:
+    lreals = [Term(f"STRING_TO_LREAL('{t}')", "LREAL", float(t)) for t in texts]
+    check([*lreals, *(Term(f"STRING_TO_REAL('{t}')", "REAL", nearest_real(t)) for t in texts)])
+
+
+def test_the_longest_strings_read_as_the_nearest_real() -> None:
+    """Also at the ends of the range, where a number has the most digits."""
+    smallest, largest = Fraction(2) ** -1075, (2 - Fraction(2) ** -53) * Fraction(2) ** 1023
+    with localcontext(prec=250):
+        numbers = [
+            Decimal(f.numerator) / Decimal(f.denominator) for f in (smallest, smallest * 3, largest, largest / 3)
+        ]
+    texts = [f"{number:.150E}" for number in numbers] + [
+        "9" * 250 + "E-200",
+        "0." + "0" * 200 + "1E200",
+        "7E-46",
+        "1E-400",
+    ]
+    terms = [Term(f"STRING_TO_LREAL('{t}')", "LREAL", float(t)) for t in texts]
+    reals = ["7E-46", "7.1E-46", "3.4028235677973366E38", "3.4028235677973365E38", "1E-400", "0." + "3" * 240]
+    check([*terms, *(Term(f"STRING_TO_REAL('{t}')", "REAL", nearest_real(t)) for t in reals)])
 
 
 # ---- wide strings and limits of length ------------------------------------------------------------------------------
