@@ -32,6 +32,11 @@ def codes(folder: Path, statement: str, dialect: str | None = None) -> list[str]
         ("r := i * 3;", "widening"),
         ("b := i + 1 > d;", "widening"),
         ("b := i + i > 40000;", "always"),
+        ("i := (i + 100) MOD j;", "wrap"),
+        ("i := (i + j) MOD 8;", "wrap"),
+        ("i := (i * 2) MOD 8;", "wrap"),
+        ("i := (i + 1) / j;", "wrap"),
+        ("w := (w - 1) MOD 8;", "wrap"),
     ],
 )
 def test_one_cause_gets_one_warning_where_results_wrap(tmp_path: Path, statement: str, code: str) -> None:
@@ -44,6 +49,8 @@ def test_one_cause_gets_one_warning_where_results_wrap(tmp_path: Path, statement
     [
         "i := i + 1;", "d := d + 1;", "b := d + 1 > e;", "b := s * 2 > 5;", "i := s * 100 / 3;", "d := s + s;",
         "b := (i AND 15) + 1 > j;", "d := INT_TO_DINT(i) * 100;", "i := i / 2 * 3;", "b := i MOD 10 + 1 = j;",
+        "i := (i + 1) MOD 8;", "i := (1 + i) MOD j;", "i := (i - 1) MOD 8;", "u := (u + 2) MOD 10;",
+        "w := (w + 1) MOD 8;",
     ],
 )  # fmt: skip
 def test_results_that_fit_or_wrap_on_purpose_are_silent(tmp_path: Path, statement: str) -> None:

@@ -264,6 +264,7 @@ def _rounds(e: Binary, division: Binary) -> bool:
 
 # ---- sums and products that wrap below 32 bits before something looks at them ----
 
+_LONGEST_STEP = 16  # of an index in a ring
 _GROWING = {BinaryOp.ADD: "sum", BinaryOp.SUB: "difference", BinaryOp.MUL: "product"}
 
 
@@ -277,6 +278,16 @@ def wrapping(e: Expr) -> str:
         return ""
     narrow = base.kind in NUMBERS and base.bits < SIGNED[32].bits
     return _GROWING[e.op] if narrow and may_wrap(e) else ""
+
+
+def is_next_index(e: Expr) -> bool:
+    """True for `x + 1` and the like, which before a MOD is nearly always the next index of a ring and far from the
+    limits of its type. The previous index, `x - 1`, does wrap at 0 in an unsigned type."""
+    base = elementary(e.type)
+    if not isinstance(e, Binary) or base is None or e.op not in (BinaryOp.ADD, BinaryOp.SUB):
+        return False
+    steps = [side.value for side in (e.left, e.right) if isinstance(side, Const) and isinstance(side.value, int)]
+    return len(steps) == 1 and 0 <= steps[0] <= _LONGEST_STEP and (base.signed or e.op is BinaryOp.ADD)
 
 
 # ---- NOT of a number that is then compared, as in `NOT s = 5` ----

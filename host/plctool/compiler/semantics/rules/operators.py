@@ -22,7 +22,7 @@ from plctool.compiler.semantics.conversions import (
     scaled,
     whole_value,
 )
-from plctool.compiler.semantics.pitfalls import always, lost_in_constants, negated_number, wrapping
+from plctool.compiler.semantics.pitfalls import always, is_next_index, lost_in_constants, negated_number, wrapping
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.rules.literals import match_literals, untyped_bits
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
@@ -171,7 +171,7 @@ def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expe
         return _build(c, op, left, right, t, offset)
     if c.dialect.computes_in_32_bits and is_widened(op, left, right, t):
         return cut(_build(c, op, *in_32_bits(op, left, right), offset), t)
-    if op in (BinaryOp.DIV, BinaryOp.MOD) and is_narrow(t):
+    if op in (BinaryOp.DIV, BinaryOp.MOD) and is_narrow(t) and not (op is BinaryOp.MOD and is_next_index(left)):
         _report_wrapping(c, left, right, "divided")
     return _build(c, op, _as_operand(c, left, t), _as_operand(c, right, t), t, offset)
 
