@@ -360,8 +360,12 @@ static void a_half_that_cannot_be_read_leaves_it(void)
 
 static void nothing_logs_in_while_it_is_unknown_whether_there_is_one(void)
 {
+    APP_BYTES image;
+
+    build_counter(&image, 1);
     SimFlashSetMapped(0);
     start_with(first);
+    CHECK_EQUAL(download(&image), ERR_OK);
     make_unreadable(SysFileGetArea(FILE_COMMIT));
     CHECK(log_has("Password cannot be read: no login without a reset of it"));
     CHECK(!gets_in_without() && !gets_in(first) && !gets_in(second));
@@ -374,9 +378,13 @@ static void nothing_logs_in_while_it_is_unknown_whether_there_is_one(void)
 /* The sector can be programmed again, or only the other one can. */
 static void a_reset_of_the_password_gives_up_what_cannot_be_read(void)
 {
+    APP_BYTES image;
+
+    build_counter(&image, 1);
     for (RTS_UI32 half = 0; half < 3; half++) {
         SimFlashSetMapped(0);
         start_with(first);
+        CHECK_EQUAL(download(&image), ERR_OK);
         make_unreadable(half < 2 ? log_half(half) : SysFileGetArea(FILE_COMMIT));
         SimStop();
         CHECK_EQUAL(AppPasswordReset(), half < 2 ? ERR_OK : ERR_DEVICE);

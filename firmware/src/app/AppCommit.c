@@ -217,6 +217,7 @@ static void lock(void)
 void AppCommitOpen(void)
 {
     RTS_RESULT result;
+    bool known;
 
     (void)FlashLogOpen(&state.log, FILE_COMMIT);
     forget_record();
@@ -224,8 +225,7 @@ void AppCommitOpen(void)
     result = read_record();
     if (result != ERR_OK && result != ERR_NO_OBJECT)
         state.log.opened = result;
-    if (result != ERR_OK && state.log.opened != ERR_OK)
-        lock();
+    known = result == ERR_OK || state.log.opened == ERR_OK;
     if (result == ERR_OK && FlashLogIsMarked(&state.log, COMMIT_RECORD_SIZE))
         state.commit.begun = 0;
     if (!take_seals() || (state.commit.active >= SLOT_COUNT && state.commit.active != SLOT_NONE)) {
@@ -235,6 +235,8 @@ void AppCommitOpen(void)
     }
     if (result != ERR_OK)
         report_loss();
+    if (!known && state.commit.active != SLOT_NONE) /* else there is nothing to keep, and nothing is taken */
+        lock();
 }
 
 void AppCommitTakeBack(RTS_UI32 slot)
