@@ -31,7 +31,7 @@ FLOORS = (
     ("controller", "compiler", "sim_io"),
     ("sim_functions",),
     ("device", "sim"),
-    ("", "sim_plant"),
+    ("", "controller_documents", "sim_plant"),
     ("port_check", "st_tests", "templates", "testing", "trace_file"),
     ("cli", "pytest_plugin"),
     ("__main__",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event
@@ -13,7 +13,11 @@ from plctool.cli import io_documents
 from plctool.cli.io_documents import Document
 from plctool.cli.overwriting import check_no_way_out, check_not_read, check_output
 from plctool.cli.plants import attached, files_of_plant, plan_faults
-from plctool.errors import EXIT_INTERRUPTED, DeviceError, LinkError, PlcError, UsageError
+from plctool.controller_documents import exception_document as exception_document
+from plctool.controller_documents import log as log
+from plctool.controller_documents import program_document, status_document
+from plctool.controller_documents import tasks as tasks
+from plctool.errors import EXIT_INTERRUPTED, LinkError, PlcError, UsageError
 from plctool.files import STDOUT, read_image, write_atomically, write_output
 
 if TYPE_CHECKING:
@@ -23,7 +27,7 @@ if TYPE_CHECKING:
     from plctool.compiler.missing_names import Missing, Use
     from plctool.compiler.program_files import ProgramFiles
     from plctool.compiler.source import Source
-    from plctool.controller import Controller, ExceptionInfo, OtherTool, PlcStatus
+    from plctool.controller import Controller, OtherTool
     from plctool.debug.symbols import SymbolTable
     from plctool.device import Plc
     from plctool.io.faults import Fault
@@ -407,7 +411,7 @@ def run(
     """
     if trace:
         check_output(trace.path, _inputs(program, plant), "-o trace.csv")
-    with _simulator(program) as plc:
+    with simulator(program) as plc:
         table = plc.symbols()
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
@@ -439,7 +443,8 @@ def _inputs(program: Path | Built, plant: Path | None) -> Iterator[Path]:
         yield from files_of_plant(plant)
 
 
-def _simulator(program: Path | Built) -> Simulator:
+def simulator(program: Path | Built) -> Simulator:
+    """A simulator that runs a program."""
     from plctool.sim import Simulator
 
     if isinstance(program, Path):
@@ -461,7 +466,7 @@ def _run_traced(plc: Simulator, cycles: int | None, time_ms: float | None, trace
 
 def bench(program: Path | Built, cycles: int) -> Document:
     """Real time per cycle of each task."""
-    with _simulator(program) as plc:
+    with simulator(program) as plc:
         tasks = []
         for index, task in enumerate(plc.tasks()):
             code_ns, cycle_ns = plc.bench(index, cycles)
@@ -587,36 +592,7 @@ def reset(plc: Plc, option: str) -> Document:
 def status(plc: Plc) -> Document:
     """Returns the state of the program, with the name and version that plc.toml gave it."""
     status = plc.status()
-    return status_document(status) | {"program": _program(plc) if status.image_crc else None}
-
-
-def _program(plc: Plc) -> Document | None:
-    """Returns name and version of the program; None from a firmware without application information."""
-    with suppress(DeviceError):
-        info = plc.info()
-        return {"name": info.get("project", ""), "version": info.get("version", "")}
-    return None
-
-
-def status_document(status: PlcStatus) -> Document:
-    from plctool.link.services import AppState
-
-    return {
-        "state": str(status.state),
-        "image_crc": None if status.state is AppState.NONE else f"{status.image_crc:08X}",
-        "exception": None if status.exception is None else exception_document(status.exception),
-        "forced": status.forced,
-    }
-
-
-def exception_document(exception: ExceptionInfo) -> Document:
-    """For machines."""
-    return {**vars(exception), "calls": [vars(call) for call in exception.calls]}
-
-
-def tasks(plc: Controller) -> Document:
-    """Statistics of the tasks."""
-    return {"tasks": [vars(task) for task in plc.tasks()]}
+    return status_document(status) | {"program": program_document(plc) if status.image_crc else None}
 
 
 def read(plc: Controller, names: Sequence[str]) -> tuple[Document, Texts]:
@@ -670,31 +646,6 @@ def passwd(plc: Plc, password: str | None) -> Document:
     """Sets or removes the password; whether there is one now."""
     plc.set_password(password)
     return {"password": password is not None}
-
-
-def log(plc: Controller) -> Document:
-    """The log; the exception that holds the program at present comes with its source line."""
-    from plctool.core import lib
-
-    names = {lib.LOG_INFO: "info", lib.LOG_WARNING: "warning", lib.LOG_ERROR: "error", lib.LOG_EXCEPTION: "exception",
-             lib.LOG_DEBUG: "debug"}  # fmt: skip
-    entries: list[Document] = [
-        {
-            "handle": entry.handle,
-            "time_s": entry.time_ns / 1e9,
-            "component": entry.component,
-            "class": names.get(entry.log_class, f"0x{entry.log_class:X}"),
-            "error": entry.error,
-            "text": entry.text,
-        }
-        for entry in plc.log()
-    ]
-    exception = plc.status().exception
-    last = next((e for e in reversed(entries) if e["class"] == "exception"), None)
-    if exception and exception.file and last:
-        known = exception_document(exception)
-        last |= {name: known[name] for name in ("pou", "file", "line", "calls", "detail")}
-    return {"entries": entries}
 
 
 # ---- on a link -------------------------------------------------------------------------------------------------------
