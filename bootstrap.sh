@@ -1,7 +1,8 @@
 #!/bin/sh
 # bootstrap.sh VENV     makes a virtual environment, with what it needs from Debian: a C compiler, Python's headers and venv
 # bootstrap.sh --tests  installs what some tests need: cross compilers and QEMU, for Cortex-M, RISC-V and AArch64, and
-#                       programs of others that speak Modbus, and QEMU for a Linux kernel with hardware that is simulated
+#                       programs of others that speak Modbus, QEMU for a Linux kernel with hardware that is simulated, and
+#                       a browser for the page
 # bootstrap.sh --fuzz   installs clang, with which libFuzzer runs the fuzz targets
 #
 # Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the others what
@@ -27,6 +28,8 @@ if [ "$1" = --tests ]; then
     command -v qemu-system-x86_64 >/dev/null || set -- "$@" qemu-system-x86
     command -v xz >/dev/null || set -- "$@" xz-utils
     command -v mbpoll >/dev/null || set -- "$@" mbpoll
+    command -v chromium >/dev/null || set -- "$@" chromium
+    command -v chromedriver >/dev/null || set -- "$@" chromium-driver
     ls /usr/lib/*/libmodbus.so.5 >/dev/null 2>&1 || set -- "$@" libmodbus5
     [ $# = 0 ] || install "$@" || echo "Some tests are left out; for them: sudo apt-get install $*" >&2
     exit 0

@@ -32,7 +32,7 @@ FLOORS = (
     ("sim_functions",),
     ("device", "sim"),
     ("", "controller_documents", "sim_plant"),
-    ("port_check", "st_tests", "templates", "testing", "trace_file"),
+    ("port_check", "st_tests", "templates", "testing", "trace_file", "ui"),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )

@@ -17,6 +17,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -74,6 +75,9 @@ class Reader:
         if words[0] == "plcrt":
             self.start_runtime(words[1:])
             return
+        if words[:2] == ["plctool", "ui"]:
+            self.open_page(words[1:])
+            return
         assert words[0] == "plctool", f"this test does not know how to run: {line}"
         done = subprocess.run(
             [sys.executable, "-m", "plctool", *words[1:]], cwd=self.folder, env=self.env | environment,
@@ -103,6 +107,20 @@ class Reader:
             assert self.plant.poll() is None
             self.plant.kill()
             self.plant.communicate()
+
+    def open_page(self, words: list[str]) -> None:
+        """Opens the address that is printed, and ends the page by Ctrl-C."""
+        page = subprocess.Popen(
+            ends_with_us([sys.executable, "-m", "plctool", *words]), cwd=self.folder, env=self.env,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert page.stdout
+        address = page.stdout.readline().strip()
+        with urllib.request.urlopen(address, timeout=60) as reply:
+            assert b"<title>plctool</title>" in reply.read()
+        page.send_signal(signal.SIGINT)
+        page.communicate(timeout=60)
+        assert page.returncode == 0
 
     def start_runtime(self, options: list[str]) -> None:
         self.stop_runtime()

@@ -313,6 +313,24 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     )
     _add_link(watch, symbols=True)
 
+    page = command("ui", "show a page in a browser: live values, write, force, tasks, log, inputs and outputs")
+    page.add_argument(
+        "--sim", dest="image", type=usable_path, nargs="?", const=Path(), metavar="IMAGE|PROJECT",
+        help="of a program that runs in this process instead; without a name, of the project of the current folder",
+    )  # fmt: skip
+    page.add_argument(
+        "--plant", type=usable_path, metavar="FILE", help="of --sim: what the inputs and outputs are connected to"
+    )
+    page.add_argument(
+        "--port-number",
+        type=_port_number,
+        default=0,
+        metavar="N",
+        help="of the page on this machine; default: a free one",
+    )
+    page.add_argument("--open", action="store_true", help="open the page in the browser of this machine")
+    _add_link(page, symbols=True)
+
     gateway = command("gateway", "show or end the processes that share a serial line among tools")
     gateway.add_argument(
         "what", choices=["status", "stop"], metavar="status|stop",
@@ -621,6 +639,12 @@ def _text(text: str) -> str:
 def _count(text: str) -> int:
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return int(text)
+
+
+def _port_number(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 1 to 65535")
     return int(text)
 
 

@@ -615,6 +615,31 @@ def _watch_live(args: argparse.Namespace) -> int:
     return EXIT_OK
 
 
+def _ui(args: argparse.Namespace) -> int:
+    from plctool.cli.page import check_installed, device_page, simulated_page
+
+    check_installed()
+    if args.plant is not None and args.image is None:
+        raise UsageError("--plant is for --sim; a device has a plant of its own.", "usage")
+    from plctool.ui.server import serve
+
+    if args.image is not None:
+        target = simulated_page(_program_to_run(args), args.plant)
+    else:
+        target = device_page(str(link_of(args)), lambda: _connect(args))
+
+    def announce(address: str) -> None:
+        _show(args, {"url": address}, lambda d: f"{d['url']}\nCtrl-C ends it.")
+        if args.open:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    with suppress(KeyboardInterrupt):
+        serve(target, target.open(), args.port_number, announce)
+    return EXIT_OK
+
+
 def _io(args: argparse.Namespace) -> int:
     return IO_ACTIONS[args.what](args)
 
@@ -676,7 +701,7 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "reset": _reset,
     "tasks": _tasks, "log": _log, "shell": _shell, "passwd": _passwd,
     "files": _files, "source": _source, "port-check": _port_check,
-    "read": _read, "write": _write, "force": _force, "unforce": _unforce, "forced": _forced, "watch": _watch,
+    "read": _read, "write": _write, "force": _force, "unforce": _unforce, "forced": _forced, "watch": _watch, "ui": _ui,
     "gateway": _gateway, "completion": _completion, "man": _man,
 }  # fmt: skip
 

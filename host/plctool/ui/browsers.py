@@ -1,0 +1,176 @@
+"""The browsers that show the page: what each wants to see and has been sent. Everything here runs in the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from plctool.controller import Controller
+from plctool.errors import PlcError, UsageError
+from plctool.ui.live import Live, Wanted
+from plctool.ui.messages import Request, id_of, parse
+from plctool.ui.variables import Tree
+
+MAX_BROWSERS = 16
+_TRY_AGAIN_LATER = 1013  # of RFC 6455's registry of close codes
+_TOO_MANY = f"{MAX_BROWSERS} pages are open already; close one."
+
+
+class Hub:
+    """All browsers of a page. `publish` gets what the controller's thread has read."""
+
+    def __init__(self) -> None:
+        self.live: Live  # set before the first browser comes
+        self.topics: dict[str, Any] = {}
+        self.values: dict[str, Any] = {}
+        self.tree: Tree | None = None
+        self._browsers: set[Browser] = set()
+
+    def publish(self, topic: str, content: Any) -> None:
+        if topic == "values":
+            self.values = content
+        elif topic == "symbols":
+            table = content["table"]
+            self.tree = None if table is None else Tree(table)
+            self.values = {}
+            self._replace(topic, {name: value for name, value in content.items() if name != "table"})
+        else:
+            self._replace(topic, content)
+        for browser in self._browsers:
+            browser.news.set()
+
+    def _replace(self, topic: str, content: Any) -> None:
+        """What is the same stays the same object, so that it is not sent again."""
+        if topic not in self.topics or self.topics[topic] != content:
+            self.topics[topic] = content
+
+    def changed(self) -> None:
+        """A browser wants something else."""
+        names: set[str] = set()
+        views: set[str] = set()
+        for browser in self._browsers:
+            names |= browser.names
+            views |= browser.views
+        self.live.want(Wanted(len(self._browsers), frozenset(names), frozenset(views)))
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Serves one browser until it leaves."""
+        await socket.accept()
+        if len(self._browsers) >= MAX_BROWSERS:
+            await socket.close(_TRY_AGAIN_LATER, _TOO_MANY)
+            return
+        browser = Browser(self, socket)
+        self._browsers.add(browser)
+        self.changed()
+        sending = asyncio.create_task(browser.send_news())
+        try:
+            await browser.receive()
+        finally:
+            self._browsers.discard(browser)
+            self.changed()
+            sending.cancel()
+            with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
+                await sending
+
+
+class Browser:
+    """One browser. A slow one gets the newest values only: there is no queue."""
+
+    def __init__(self, hub: Hub, socket: WebSocket) -> None:
+        self._hub = hub
+        self._socket = socket
+        self.names: set[str] = set()
+        self.views: set[str] = set()
+        self.news = asyncio.Event()
+        self.news.set()
+        self._sent: dict[str, Any] = {}
+        self._sent_values: dict[str, Any] = {}
+        self._sending = asyncio.Lock()  # replies and news come from two tasks
+
+    async def _send(self, message: dict[str, Any]) -> None:
+        async with self._sending:
+            await self._socket.send_text(json.dumps(message, allow_nan=False))
+
+    # ---- news ----
+
+    async def send_news(self) -> None:
+        """Sends what has changed since it was sent last, again and again."""
+        while True:
+            await self.news.wait()
+            self.news.clear()
+            for topic, content in list(self._hub.topics.items()):
+                if self._sent.get(topic) is not content:
+                    self._sent[topic] = content
+                    await self._send({"is": topic, "content": content})
+            values = self._hub.values
+            changed = {n: values[n] for n in self.names if n in values and self._sent_values.get(n) != values[n]}
+            if changed:
+                self._sent_values |= changed
+                await self._send({"is": "values", "content": changed})
+
+    # ---- requests ----
+
+    async def receive(self) -> None:
+        """Answers its messages, one after the other, until it leaves."""
+        while True:
+            try:
+                text = await self._socket.receive_text()
+            except (WebSocketDisconnect, KeyError):  # or it sent bytes
+                return
+            await self._send(await self._reply(text))
+
+    async def _reply(self, text: str) -> dict[str, Any]:
+        try:
+            request = parse(text)
+            return {"is": "reply", "id": request.id, "result": await self._answer(request)}
+        except PlcError as error:
+            return {"is": "reply", "id": id_of(text), "error": error.message}
+
+    async def _answer(self, request: Request) -> Any:
+        fields = request.fields
+        if request.verb == "show":
+            return self._show(set(fields["names"]), set(fields["views"]))
+        if request.verb == "children":
+            return await asyncio.to_thread(self._tree().children, fields["path"], fields["start"])
+        if request.verb == "search":
+            return await asyncio.to_thread(self._tree().search, fields["text"])
+        result = await asyncio.wrap_future(self._hub.live.do(lambda plc: _OPERATIONS[request.verb](plc, **fields)))
+        self._hub.changed()  # and what it has changed is read at once
+        return result
+
+    def _show(self, names: set[str], views: set[str]) -> None:
+        self._sent_values = {name: value for name, value in self._sent_values.items() if name in names}
+        for view in views - self.views:
+            self._sent.pop(view, None)
+        self.names, self.views = names, views
+        self._hub.changed()
+        self.news.set()
+
+    def _tree(self) -> Tree:
+        if self._hub.tree is None:
+            raise UsageError("The symbols of the program are not known.", "no-symbols")
+        return self._hub.tree
+
+
+def _write(plc: Controller, name: str, text: str) -> None:
+    plc.write({name: plc.symbols().resolve(name).parse(text)})
+
+
+def _force(plc: Controller, name: str, text: str) -> None:
+    plc.force({name: plc.symbols().resolve(name).parse(text)})
+
+
+_OPERATIONS: dict[str, Callable[..., None]] = {
+    "write": _write,
+    "force": _force,
+    "unforce": lambda plc, name: plc.unforce([name]),
+    "unforce_all": lambda plc: plc.unforce(),
+    "start": lambda plc: plc.start(),
+    "stop": lambda plc: plc.stop(),
+    "reset": lambda plc: plc.reset("warm"),
+}

@@ -1,0 +1,217 @@
+"""The page in a headless Chromium. Left out, with the reason, where there is none (`./bootstrap.sh --tests`)."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import Page
+from selenium import webdriver
+from selenium.common.exceptions import JavascriptException, WebDriverException
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.remote.webelement import WebElement
+
+from plctool.testing.waiting import eventually
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None or DRIVER is None, reason="chromium or chromedriver is not installed: ./bootstrap.sh --tests"
+)
+FLAGS = (
+    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
+    "--window-size=1200,800",
+)  # fmt: skip
+ROW = """
+return [...document.querySelectorAll('.row')].find((row) => row.querySelector('.label').textContent === arguments[0])
+"""
+PART = """
+const rows = [...document.querySelectorAll('.row')];
+const row = rows.find((row) => row.querySelector('.label').textContent === arguments[0]);
+const part = row?.querySelector(arguments[1]);
+return part && !part.hidden ? part.textContent : '';
+"""
+
+
+class Shown:
+    """The page in a browser. Rows are made anew when the list changes, so they are looked up each time."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def row(self, label: str) -> WebElement | None:
+        found: WebElement | None = self.driver.execute_script(ROW, label)
+        return found
+
+    def part(self, label: str, of: str) -> str:
+        """The text of a part of a row; "" without that row, or if it is hidden."""
+        return str(self.driver.execute_script(PART, label, of))
+
+    def click(self, label: str, of: str) -> None:
+        def clicked() -> bool:
+            row = self.row(label)
+            if row is None:
+                return False
+            self.driver.execute_script("arguments[0].querySelector(arguments[1]).click()", row, of)
+            return True
+
+        self.eventually(clicked)
+
+    def eventually(self, question: Callable[[], Any]) -> Any:
+        def asked() -> Any:
+            try:
+                return question()
+            except JavascriptException:
+                return False
+
+        return eventually(asked)
+
+    def by_id(self, name: str) -> WebElement:
+        return self.driver.find_element(By.ID, name)
+
+    def edit(self, label: str, text: str, button: str) -> None:
+        self.click(label, ".value")
+        self.eventually(lambda: self.by_id("edit").get_attribute("open"))
+        field = self.by_id("edit-text")
+        field.clear()
+        field.send_keys(text)
+        self.by_id(button).click()
+
+
+@pytest.fixture(scope="module")
+def driver(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM or ""
+    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('chromium')}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    try:
+        made = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    except WebDriverException as error:
+        pytest.skip(f"chromium does not start here: {error.msg}")
+    yield made
+    made.quit()
+
+
+@pytest.fixture
+def shown(driver: webdriver.Chrome, page: Page) -> Iterator[Shown]:
+    driver.get(page.url)
+    made = Shown(driver)
+    made.eventually(lambda: made.by_id("state").text == "Running")
+    made.eventually(lambda: made.row("Main"))
+    made.click("Main", ".label")
+    made.eventually(lambda: made.row("still"))
+    yield made
+    assert [entry for entry in driver.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+def test_values_live_in_the_tree(shown: Shown) -> None:
+    first = shown.eventually(lambda: shown.part("n", ".value"))
+    shown.eventually(lambda: shown.part("n", ".value") != first)
+    assert shown.part("still", ".value") == "5"
+
+
+def test_markup_in_values_is_text(shown: Shown) -> None:
+    shown.eventually(lambda: shown.part("text", ".value") == "'<b>bold</b>'")
+    assert shown.driver.find_elements(By.TAG_NAME, "b") == []
+    shown.by_id("search").send_keys("<i>x</i>")
+    shown.eventually(lambda: "No variable has “<i>x</i>” in its name." in shown.by_id("tree").text)
+    assert shown.driver.find_elements(By.CSS_SELECTOR, "#tree i") == []
+
+
+def test_a_value_is_written_and_forced_in_the_dialog(shown: Shown) -> None:
+    shown.edit("still", "123", "edit-write")
+    shown.eventually(lambda: shown.part("still", ".value") == "123")
+    shown.edit("still", "9", "edit-force")
+    shown.eventually(lambda: shown.part("still", ".mark") == "forced")
+    shown.eventually(lambda: shown.by_id("forced").text.startswith("Forced: Main.still"))
+    shown.click("still", ".value")
+    shown.by_id("edit-unforce").click()
+    shown.eventually(lambda: shown.part("still", ".mark") == "")
+    shown.edit("still", "5", "edit-write")
+    shown.eventually(lambda: shown.part("still", ".value") == "5")
+
+
+def test_a_refused_value_is_explained_in_the_dialog(shown: Shown) -> None:
+    shown.edit("still", "99999", "edit-write")
+    shown.eventually(lambda: "99999" in shown.by_id("edit-error").text)
+    shown.by_id("edit-cancel").click()
+    shown.eventually(lambda: not shown.by_id("edit").get_attribute("open"))
+
+
+def test_the_keyboard_is_enough(shown: Shown) -> None:
+    body = shown.driver.find_element(By.TAG_NAME, "body")
+    body.send_keys("/")
+    shown.driver.switch_to.active_element.send_keys("main.still")
+    shown.eventually(lambda: shown.row("Main.still"))
+    shown.driver.switch_to.active_element.send_keys(Keys.ARROW_DOWN)
+    shown.driver.switch_to.active_element.send_keys(" ")
+    shown.eventually(lambda: "Main.still" in shown.by_id("legend").text)
+    shown.driver.switch_to.active_element.send_keys(Keys.ENTER)
+    shown.eventually(lambda: shown.by_id("edit").get_attribute("open"))
+    shown.driver.switch_to.active_element.send_keys(Keys.ESCAPE)
+    shown.eventually(lambda: not shown.by_id("edit").get_attribute("open"))
+
+
+def test_long_lists_are_drawn_in_parts(shown: Shown) -> None:
+    shown.click("list", ".label")
+    shown.eventually(lambda: shown.row("[1]"))
+    assert len(shown.driver.find_elements(By.CSS_SELECTOR, ".row")) < 60
+    shown.driver.execute_script("document.querySelector('#tree').scrollTop = 1e6")
+    shown.eventually(lambda: shown.row("text"))
+
+
+def test_the_program_is_stopped_after_a_question(shown: Shown) -> None:
+    shown.by_id("stop").click()
+    assert shown.by_id("ask").text.startswith("Stop the program?")
+    shown.by_id("ask-yes").click()
+    shown.eventually(lambda: shown.by_id("state").text == "Stopped")
+    shown.by_id("start").click()
+    shown.by_id("ask-yes").click()
+    shown.eventually(lambda: shown.by_id("state").text == "Running")
+
+
+def test_an_exception_is_shown_in_its_source(shown: Shown) -> None:
+    shown.edit("divisor", "0", "edit-write")
+    shown.eventually(lambda: "ratio := 100 / divisor;" in shown.by_id("exception").text)
+    assert shown.driver.find_element(By.CSS_SELECTOR, ".here").text.endswith("ratio := 100 / divisor;")
+    shown.by_id("reset").click()
+    shown.by_id("ask-yes").click()
+    shown.eventually(lambda: shown.by_id("state").text == "Stopped")
+    shown.by_id("start").click()
+    shown.by_id("ask-yes").click()
+    shown.eventually(lambda: shown.by_id("state").text == "Running")
+
+
+@pytest.mark.parametrize("view", ["tasks", "log", "io"])
+def test_each_view_shows_what_it_has(shown: Shown, view: str) -> None:
+    words = {"tasks": "Fast", "log": "Application", "io": "The program has no inputs and outputs but memory."}
+    shown.by_id(f"tab-{view}").click()
+    shown.eventually(lambda: words[view] in shown.by_id(view).text)
+
+
+def test_nothing_is_wider_than_a_phone(shown: Shown) -> None:
+    phone = {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
+    shown.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
+    try:
+        for view in ("tasks", "log", "io", "variables"):
+            shown.by_id(f"tab-{view}").click()
+            shown.eventually(lambda: shown.driver.execute_script("return document.documentElement.scrollWidth <= 360"))
+    finally:
+        shown.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_the_end_of_plctool_is_shown(driver: webdriver.Chrome, folder: Path) -> None:
+    page = Page(folder, "--sim", "app.cdl")
+    driver.get(page.url)
+    shown = Shown(driver)
+    shown.eventually(lambda: shown.by_id("state").text == "Running")
+    page.end()
+    shown.eventually(lambda: shown.by_id("state").text == "Not connected")
+    assert "plctool has ended" in shown.by_id("lost").text
+    driver.get("about:blank")
+    driver.get_log("browser")
