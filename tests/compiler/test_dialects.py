@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from plcopen_support import data, errors, pou, project, st, variables
 
 from plctool import Simulator
 from plctool.compiler import CompileError, compile_sources
+from plctool.compiler.front import check_sources
+from plctool.compiler.source import Source
 from plctool.errors import UsageError
-from plctool.iec.dialect import DIALECTS, OWN
+from plctool.iec.dialect import DIALECTS, OWN, find_dialect
 from plctool.st_tests import run_tests
 
 NAMES = [None, *DIALECTS]
@@ -203,12 +206,16 @@ def test_unit_tests_have_the_rules_of_the_dialect(tmp_path: Path) -> None:
     (tmp_path / "t.st").write_text(
         "TEST 'halves'\nVAR x : REAL := 2.5; END_VAR\nASSERT_EQ(REAL_TO_BYTE(x), BYTE#3);\nEND_TEST\n"
     )
-    assert [run_tests([tmp_path], dialect=dialect).document()["passed"] for dialect in NAMES] == [0, 0, 1, 1]
+    assert [run_tests([tmp_path], dialect=dialect).document()["passed"] for dialect in NAMES] == [0, 0, 1, 1, 0]
 
 
 def test_unknown_dialects_are_refused_in_words(tmp_path: Path) -> None:
     (tmp_path / "m.st").write_text("PROGRAM Main\nEND_PROGRAM\n")
-    for wrong, hint in (("codesis", "did you mean codesys"), ("x", "iec, codesys, twincat"), ("", "iec, codesys")):
+    for wrong, hint in (
+        ("codesis", "did you mean codesys"),
+        ("x", "iec, codesys, twincat, openplc"),
+        ("", "iec, codesys"),
+    ):
         with pytest.raises(UsageError, match=hint):
             compile_sources([tmp_path], dialect=wrong)
 
@@ -219,6 +226,8 @@ def table_of_rules() -> list[list[str]]:
     return [
         ["", *(dialect.name or "default" for dialect in systems)],
         ["numbers and enumerations mixed", *("error" if "enum" in d.errors else "warning" for d in systems)],
+        ["a letter of another size in an address", *("error" if "address" in d.errors else "warning" for d in systems)],
+        ["a VAR of a block is written from outside", *("warning" if d.writes_locals else "error" for d in systems)],
         ["FOR computes its end and step", *("each turn" if d.limits_each_turn else "once" for d in systems)],
         ["`REAL_TO_BYTE(2.5)`, halves", *("3, away from zero" if d.reals_wrap else "2, to even" for d in systems)],
         ["`REAL_TO_BYTE(300.0)`", *("44, the low bits" if d.reals_wrap else "255, the limit" for d in systems)],
@@ -231,3 +240,55 @@ def test_documentation_has_the_table_of_the_compiler() -> None:
     rows = [row for row in found if not re.fullmatch("-*", row[0]) or not row[0]]
     expected = table_of_rules()
     assert rows[: len(expected)] == expected
+
+
+STATION = """FUNCTION_BLOCK Station
+VAR start : BOOL; END_VAR
+VAR_OUTPUT runs : BOOL; END_VAR
+runs := start;
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR s : Station; END_VAR
+s.start := TRUE;
+s();
+END_PROGRAM
+"""
+CONFIGURATION = """CONFIGURATION Config0
+  RESOURCE Res0 ON PLC
+    TASK task0(INTERVAL := T#20ms,PRIORITY := 0);
+    PROGRAM instance0 WITH task0 : Main;
+  END_RESOURCE
+END_CONFIGURATION
+"""
+
+
+@pytest.mark.parametrize("dialect", NAMES)
+def test_a_variable_of_a_block_is_written_from_outside_in_the_dialect_of_openplc_only(dialect: str | None) -> None:
+    found = check_sources([Source("main.st", STATION)], dialect=find_dialect(dialect)).diagnostics
+    assert [(d.line, d.severity) for d in found if d.line == 8] == (
+        [(8, "warning")] if dialect == "openplc" else [(8, "error")]
+    )
+
+
+def test_what_openplc_editor_writes_has_its_rule_without_a_dialect(tmp_path: Path) -> None:
+    (tmp_path / "program.st").write_text(STATION + CONFIGURATION)
+    with Simulator.from_sources(tmp_path) as plc:
+        plc.run_cycles(2)
+        assert plc.read("instance0.s.runs") is True
+
+
+def test_xml_of_openplc_editor_has_its_rule_and_that_of_codesys_has_not(tmp_path: Path) -> None:
+    block = pou("Station", st("runs := start;"), variables("outputVars", "runs:BOOL"), "functionBlock")
+    block = block.replace("</outputVars>", "</outputVars>" + variables("localVars", "start:BOOL"))
+    main = pou("Main", st("s.start := TRUE; s();"), variables("localVars", "s:Station"))
+    assert errors(tmp_path, project(block + main)) == []
+    ((_, message),) = errors(tmp_path, project(block + main, added=data("x", "")))
+    assert "local variable of Station" in message
+
+
+def test_an_output_of_a_block_is_never_written_from_outside() -> None:
+    text = STATION.replace("s.start := TRUE", "s.runs := TRUE")
+    found = check_sources([Source("main.st", text)], dialect=find_dialect("openplc")).diagnostics
+    assert [d.message for d in found if d.severity == "error"] == [
+        "runs is an output of Station and cannot be assigned to"
+    ]

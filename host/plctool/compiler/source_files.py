@@ -143,12 +143,19 @@ def _files(path: Path, root: Path | None) -> list[Path]:
         return find_sources(path, root)
     if root is not None:
         check_inside(path, root)
-    suffix, root = path.suffix.lower(), root or path.parent
+    suffix, root = path.suffix.lower(), root or _folder_of_project(path)
     if suffix == twincat_projects.PLC_PROJECT:
         return _files_of_project(path, root)
     if suffix in twincat_projects.CONTAINERS:
         return _files_of_project(twincat_projects.plc_project(path, lambda file: _text_inside(file, root)), root)
     return [path]
+
+
+def _folder_of_project(file: Path) -> Path:
+    """Returns the folder of the project that a file named by the user is of. TwinCAT keeps independent project files
+    two folders below it, in _Config/PLC."""
+    folder = file.parent
+    return folder.parent.parent if folder.parts[-2:] == ("_Config", "PLC") else folder
 
 
 def _files_of_project(project: Path, root: Path) -> list[Path]:
