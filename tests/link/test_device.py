@@ -53,12 +53,12 @@ def test_flash_brings_the_image_and_starts_it(controller: Controller) -> None:
     assert result.seconds > 0
 
 
-def test_flash_asks_and_starts_without_waiting_in_between(controller: Controller) -> None:
+def test_flash_starts_by_its_last_block_and_asks_what_became_of_it(controller: Controller) -> None:
     controller.plc.flash(controller.image)
     app = lib.SG_APPLICATION
-    status, start = (app, lib.SRV_APP_READ_STATUS), (app, lib.SRV_APP_START)
-    download, login = (app, lib.SRV_APP_DOWNLOAD_COMPACT), (app, lib.SRV_APP_LOGIN)
-    assert controller.fake.requests[1:] == [status, download, download, login, start, status]
+    status, download = (app, lib.SRV_APP_READ_STATUS), (app, lib.SRV_APP_DOWNLOAD_COMPACT)
+    assert controller.fake.requests[1:] == [status, download, download, status]
+    assert controller.plc.status().state == "run"
 
 
 def test_flash_takes_bytes_as_well(controller: Controller) -> None:
@@ -119,13 +119,13 @@ def test_a_missing_file_is_named(controller: Controller, tmp_path: Path) -> None
 def test_another_image_on_the_device_than_sent_is_an_error(controller: Controller) -> None:
     finish = controller.fake._finish_download
 
-    def swap() -> tuple[int, str]:
-        result = finish()
+    def swap(start: bool) -> tuple[int, str]:
+        result = finish(start)
         controller.fake.image = make_application("2")[0]
         return result
 
     controller.fake._finish_download = swap  # type: ignore[method-assign]
-    with pytest.raises(DeviceError, match="flash again"):
+    with pytest.raises(DeviceError, match="has the previous one"):
         controller.plc.flash(controller.image)
 
 
