@@ -29,6 +29,7 @@ FLOORS = (
     ("link",),
     ("canopen", "gateway"),
     ("controller", "compiler", "sim_io"),
+    ("fmt",),
     ("sim_functions",),
     ("device", "sim"),
     ("", "controller_documents", "sim_plant"),

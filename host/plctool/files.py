@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from plctool.errors import UsageError
 
-STDOUT = Path("-")  # in place of the path of an output
+STDIN = STDOUT = Path("-")  # in place of the path of an input, an output
 MAX_TEXT = 32 << 20
 MAX_SETTINGS = 1 << 20
 MAX_BINARY = 256 << 20

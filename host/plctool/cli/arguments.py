@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from plctool.errors import UsageError, did_you_mean
-from plctool.files import file_path, usable_path
+from plctool.files import STDIN, file_path, usable_path
 from plctool.iec.dialect import DIALECTS
 from plctool.image.targets import DEFAULT_TARGET, TARGETS
 from plctool.link.transports import TRANSPORTS, Value
@@ -110,6 +110,19 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     check.add_argument("--junit", type=file_path, metavar="FILE", help="write a report in JUnit's format as well")
     _add_warnings(check)
     _add_io_files(check)
+
+    fmt = command("fmt", "format Structured Text: one style, the program stays the same")
+    fmt.add_argument(
+        "sources", nargs="*", type=_input, metavar="FILE.st|DIR|-",
+        help="for a folder, all sources in it; -: from the standard input to the standard output; without any, the "
+        "project of the current folder (plc.toml)",
+    )  # fmt: skip
+    fmt.add_argument("--check", action="store_true", help="write nothing; exit code 1 if a file is not formatted")
+    fmt.add_argument("--diff", action="store_true", help="the same, and print what would change")
+    fmt.add_argument(
+        "--lines", action="append", default=[], type=_lines, metavar="A:B",
+        help="only lines A to B, from 1, of one file; may be repeated",
+    )  # fmt: skip
 
     info = command("info", "describe an image, or the programs in a .bin or .hex of 'plctool image'")
     _add_image(info)
@@ -634,6 +647,19 @@ def _text(text: str) -> str:
     except UnicodeError:
         shown = text.encode("ascii", "backslashreplace").decode()
         raise UsageError(f"{shown} is not UTF-8; type it in the encoding of this terminal.", "usage") from None
+
+
+def _input(text: str) -> Path:
+    """A path, or - for the standard input."""
+    return STDIN if text == str(STDIN) else usable_path(text)
+
+
+def _lines(text: str) -> tuple[int, int]:
+    """The first and the last line of a range."""
+    found = re.fullmatch(r"(\d{1,9}):(\d{1,9})", text, re.ASCII)
+    if found is None or not 1 <= int(found[1]) <= int(found[2]):
+        raise UsageError(f"--lines {text} is not a range of lines; write for example --lines 10:20.", "usage")
+    return int(found[1]), int(found[2])
 
 
 def _count(text: str) -> int:

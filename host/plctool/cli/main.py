@@ -20,7 +20,7 @@ from plctool.cli.io_documents import Document
 from plctool.cli.links import all_serial_ports, find_link, link_of
 from plctool.cli.unknown_commands import check_command
 from plctool.errors import EXIT_INTERRUPTED, InternalError, PlcError, UsageError
-from plctool.files import STDOUT, path_error
+from plctool.files import STDIN, STDOUT, path_error, write_output
 from plctool.link.transports import Link
 from plctool.printable import one_line
 from plctool.project import IMAGE_SUFFIX
@@ -80,6 +80,29 @@ def _check(args: argparse.Namespace) -> int:
     document, texts = documents.check(settings, documents.CheckReports(args.sarif, args.junit))
     _show(args, document, lambda d: "\n".join(texts), colours=True)
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
+
+
+def _fmt(args: argparse.Namespace) -> int:
+    from plctool.cli import fmt_documents
+    from plctool.cli.projects import needed_project
+
+    writes = not (args.check or args.diff)
+    if STDIN in args.sources:
+        if len(args.sources) > 1:
+            raise UsageError("- stands alone: plctool fmt - < main.st", "usage")
+        document, text = fmt_documents.format_input(sys.stdin.buffer, args.lines, writes=writes)
+        if writes and not args.json:
+            write_output(STDOUT, text)
+            return EXIT_OK
+    else:
+        document = fmt_documents.format_files(args.sources or [needed_project()], args.lines, writes=writes)
+    for message in fmt_documents.complaints(document):
+        if not args.json:
+            output.say(f"plctool: {one_line(message)}", sys.stderr)
+    _show(args, document, partial(fmt_documents.shown_text, diff=args.diff))
+    if fmt_documents.complaints(document):
+        return EXIT_USAGE
+    return EXIT_FAILED if not writes and document["changed"] else EXIT_OK
 
 
 def _new(args: argparse.Namespace) -> int:
@@ -694,7 +717,7 @@ IO_ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
 
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build": _build, "check": _check, "info": _info, "image": _image, "symbols": _symbols, "run": _run,
-    "test": _test, "new": _new,
+    "test": _test, "new": _new, "fmt": _fmt,
     "export": _export, "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
     "canopen": _canopen,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "cycle": _cycle,

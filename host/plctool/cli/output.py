@@ -20,8 +20,8 @@ from plctool.printable import one_line, printable
 
 _LOG_COLUMN = 27  # where the text of a log entry begins
 _DIAGNOSTIC = re.compile(r"^(.+?:\d+:\d+:) (error|warning):(?= )|^(\s*\^)$|^  (pass|FAIL)(?=  )", re.MULTILINE)
-_OF_SEVERAL_LINES = ("answer", "script", "page")
-"""The strings of documents whose line breaks are shown: of a shell, a script and a manual page."""
+_OF_SEVERAL_LINES = ("answer", "script", "page", "diff", "formatted_text")
+"""The strings of documents whose line breaks are shown: of a shell, a script, a manual page and sources."""
 _BOLD, _RED, _MAGENTA, _GREEN, _PLAIN = "\33[1m", "\33[1;31m", "\33[1;35m", "\33[1;32m", "\33[0m"
 
 

@@ -15,7 +15,7 @@ _LATER = {
 }
 _OTHER_NAMES = {
     "compile": "build", "make": "build", "simulate": "run", "download": "flash", "monitor": "watch",
-    "upload": "flash, or source get", "init": "new", "create": "new",
+    "upload": "flash, or source get", "init": "new", "format": "fmt", "create": "new",
 }  # fmt: skip
 """What commands are called elsewhere."""
 

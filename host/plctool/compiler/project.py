@@ -30,6 +30,7 @@ from plctool.project import DEFAULT_IMAGE, IMAGE_SUFFIX, PROJECT_FILE
 _LEVELS: dict[object, Level] = {0: 0, 1: 1, 2: 2, 3: 3, "s": "s"}
 _INFORMATION = ("name", "version", "author", "description")
 _OPTIONS = ("optimisation", "checks", "debug", "dialect", "no-warn", "werror")
+LINE_LENGTHS = (60, 400)  # the least and the most that the formatter takes
 _MAX_TEXT = 255  # characters of what the image says about the project
 _PATTERN = re.compile(r"[*?\[]")
 _OPTION_OF = {"libraries": "--library", "io": "--io", "device": "--device", "output": "-o"}
@@ -57,6 +58,7 @@ class Project:
     dialect: str | None = None
     link: str | None = None  # cli/links.py checks what it says
     link_line: int = 0
+    line_length: int | None = None  # of formatted sources
 
 
 def read_project(file: Path) -> Project:
@@ -68,7 +70,9 @@ def _project(file: Path, table: Table) -> Project:
     folder = file.parent
     options = table.table("options") or table.empty("options")
     information = table.table("information") or table.empty("information")
+    formatter = table.table("format") or table.empty("format")
     table.belongs("it goes into [information]", *_INFORMATION)
+    table.belongs("it goes into [format]", "line-length")
     table.belongs(f"{listed(_INFORMATION, 'and')} go into [information]", "project")
     table.belongs("it goes into [options]", *_OPTIONS)
     project = Project(
@@ -89,7 +93,9 @@ def _project(file: Path, table: Table) -> Project:
         options.choice("dialect", {name: name for name in DIALECTS}),
         table.text("link"),
         table.value_pos("link").line,
+        formatter.number("line-length", *LINE_LENGTHS, unit="characters"),
     )
+    formatter.close()
     options.close()
     information.close()
     return project

@@ -103,8 +103,15 @@ class Source:
         line = bisect_right(starts, offset)
         return Pos(self.path, line, offset - starts[line - 1] + 1)
 
+    def is_copied(self, offset: int) -> bool:
+        """True if the character at `offset` stands so in the file."""
+        return not self.pieces or self._piece(offset).copied
+
+    def _piece(self, offset: int) -> Piece:
+        return self.pieces[max(0, bisect_right(self._offsets, offset) - 1)]
+
     def _pos_in_pieces(self, offset: int) -> Pos:
-        piece = self.pieces[max(0, bisect_right(self._offsets, offset) - 1)]
+        piece = self._piece(offset)
         more = offset - piece.offset if piece.copied else 0
         return Pos(piece.path or self.path, piece.line, piece.column + more)
 

@@ -30,6 +30,8 @@ from plctool.project import LIBRARY_FILE
 _UNIT = re.compile(r"^\s*(?:PROGRAM|FUNCTION|FUNCTION_BLOCK|TYPE|VAR_GLOBAL|INTERFACE)\b", re.IGNORECASE | re.MULTILINE)
 """The beginning of a unit of Structured Text."""
 
+_ENCODINGS = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
+
 Reader = Callable[[str, str], list[Source]]
 """Makes sources from the path and the text of a file."""
 
@@ -57,8 +59,11 @@ def _variables(path: str, text: str) -> list[Source]:
     return [global_lists.read_list(path, text)]
 
 
+TEXTS = (".st", ".iecst", ".scl", ".fun", ".typ")
+"""Suffixes of files that are Structured Text as it is."""
+
 READERS: dict[str, Reader] = {
-    **dict.fromkeys((".st", ".iecst", ".scl", ".fun", ".typ"), _structured_text),
+    **dict.fromkeys(TEXTS, _structured_text),
     ".var": _variables,
     ".exp": _export,
     ".xml": _xml,
@@ -250,10 +255,19 @@ def _is_generated(path: Path, found: Container[Path]) -> bool:
 
 
 def decode(data: bytes) -> str:
-    """The text of a file: UTF-16 with its mark, UTF-8, or else one byte per character, as older systems write it."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16", "replace")
+    """The text of a file."""
+    mark, encoding = encoding_of(data)
+    return data[len(mark) :].decode(encoding, "replace")
+
+
+def encoding_of(data: bytes) -> tuple[bytes, str]:
+    """The byte order mark of a file and its encoding: UTF-16 with its mark, UTF-8, or else one byte per character, as
+    older systems write it."""
+    for mark, encoding in _ENCODINGS.items():
+        if data.startswith(mark):
+            return mark, encoding
     try:
-        return data.decode("utf-8-sig")
+        data.removeprefix(codecs.BOM_UTF8).decode("utf-8")
     except UnicodeDecodeError:
-        return data.decode("latin-1")
+        return b"", "latin-1"
+    return codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b"", "utf-8"

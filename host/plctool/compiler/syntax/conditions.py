@@ -36,6 +36,11 @@ _VARIABLES = re.compile(rf"((?:{NAME}\s*,\s*)*{NAME})\s*(?:AT\s*%[\w.*]+\s*)?:(?
 _NAME = re.compile(NAME, re.ASCII)
 
 
+def is_directive(pragma: str) -> bool:
+    """True for a pragma that belongs to conditional compilation."""
+    return _DIRECTIVE.fullmatch(pragma) is not None
+
+
 def names_asked_for(texts: Sequence[str], library: Callable[[], Iterable[str]]) -> frozenset[str]:
     """What `defined(pou: NAME)` finds in the sources of a program and in the library, in capitals; nothing when nothing
     asks. Branches that are left out count as well."""
