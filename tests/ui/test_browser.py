@@ -38,7 +38,7 @@ return part && !part.hidden ? part.textContent : '';
 
 
 class Shown:
-    """The page in a browser. Rows are made anew when the list changes, so they are looked up each time."""
+    """The page in a browser. Rows are made again when the list changes, so they are looked up each time."""
 
     def __init__(self, driver: webdriver.Chrome) -> None:
         self.driver = driver

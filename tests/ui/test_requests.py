@@ -1,4 +1,4 @@
-"""What browsers ask for, and what they are told; also those that are none."""
+"""Requests of browsers and the replies, hostile ones included."""
 
 from __future__ import annotations
 

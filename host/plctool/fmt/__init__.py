@@ -1,4 +1,4 @@
-"""The formatter of Structured Text, behind `plctool fmt`: moves white space, writes keywords in capitals, changes
+"""The formatter of Structured Text (`plctool fmt`): moves white space, writes keywords in capitals, changes
 nothing else.
 
 scan.py reads tokens and what stands between them, lines.py splits them into lines, spacing.py and layout.py write a

@@ -32,7 +32,7 @@ _HEADERS = {
 
 
 def new_token() -> str:
-    """Returns a token that nobody can guess."""
+    """Returns a token that cannot be guessed."""
     return secrets.token_urlsafe(_TOKEN_BYTES)
 
 
