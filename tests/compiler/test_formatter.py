@@ -290,6 +290,12 @@ def _without_blank_lines(text: str) -> list[str]:
     return [line for line in text.splitlines() if line]
 
 
+def test_a_pragma_at_the_end_of_the_file_is_kept() -> None:
+    result = formatted("t.st", "PROGRAM Main\nEND_PROGRAM {warning 'w'}")
+    assert result == "PROGRAM Main\nEND_PROGRAM\n{warning 'w'}\n"
+    assert formatted("t.st", result) == result
+
+
 @settings(max_examples=12, deadline=None)
 @given(st.randoms(use_true_random=False))
 def test_comments_anywhere_are_kept_and_settle_at_once(chance: random.Random) -> None:

@@ -24,7 +24,7 @@ from plctool.compiler.source import Source
 from plctool.image.targets import DEFAULT_TARGET, find_target
 
 _ROOT = Path(__file__).parents[2]
-EXAMPLES = sorted(path for path in (_ROOT / "examples").iterdir() if path.is_dir())
+EXAMPLES = sorted(path for path in (_ROOT / "examples").iterdir() if any(path.rglob("*.st")))
 SYSTEMS = [_ROOT / "tests/corpus" / system for system in ("codesys", "openplc", "twincat")]
 CORPUS = [path for system in SYSTEMS for path in sorted(system.iterdir())]
 RUNNING = [path for path in PROGRAMS if runs(read_script(path))]

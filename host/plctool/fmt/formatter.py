@@ -82,7 +82,8 @@ class _Writer:
         for line in split(self._items):
             self._add_line(line)
         end = len(self._items) - 1
-        self._add_before(Line(end, end + 1, 0, 0), self._items[end])
+        if last := self._add_before(Line(end, end + 1, 0, 0), self._items[end]):
+            self._add_own(last, 0)  # nothing follows it in its line
         self._finish_rows()
         kept = list(self._switched_off())
         if ranges or kept:
