@@ -270,6 +270,11 @@ class Controller(ABC):
             )
         return table.call_stack(exception.code_offset, exception.trace)
 
+    def info(self) -> dict[str, str]:
+        """Project, author, version and so on, of the application. Raises DeviceError when the controller does not say
+        it."""
+        raise DeviceError("This controller does not say what its application is.", "no-info")
+
     @abstractmethod
     def tasks(self) -> list[TaskInfo]:
         """Statistics of the tasks."""

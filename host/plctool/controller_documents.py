@@ -9,12 +9,11 @@ from plctool.errors import DeviceError
 
 if TYPE_CHECKING:
     from plctool.controller import Controller, ExceptionInfo, PlcStatus
-    from plctool.device import Plc
 
 Document = dict[str, Any]
 
 
-def program_document(plc: Plc) -> Document | None:
+def program_document(plc: Controller) -> Document | None:
     """Returns name and version of the program; None from a firmware without application information."""
     with suppress(DeviceError):
         info = plc.info()
