@@ -29,7 +29,7 @@ enum {
     FORCE_ALL_BITS = 0xFF /* FORCE_PLACE.mask */
 };
 
-/* What is forced. Two are the same if all members are: those that are not used are 0. */
+/* A forced place. Members that are not used are 0, so that two places can be compared as bytes. */
 typedef struct {
     RTS_UI8 area; /* APP_AREA_*, not that of the code */
     RTS_UI8 pointers;
