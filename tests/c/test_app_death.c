@@ -7,7 +7,7 @@
  * not finished.
  */
 #include "../../firmware/src/app/AppCommit.h"
-#include "../../firmware/src/app/AppImage.h"
+#include "../../firmware/src/cycle/AppImage.h"
 #include "../../firmware/src/app/AppLife.h"
 #include "AppAddress.h"
 #include "AppException.h"

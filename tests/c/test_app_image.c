@@ -27,7 +27,7 @@ static bool always;
 #define AppAreasGet fake_area
 #define SysLockEnter fake_enter
 #define SysLockLeave fake_leave
-#include "../../firmware/src/app/AppImage.c"
+#include "../../firmware/src/cycle/AppImage.c"
 
 #include "test.h"
 

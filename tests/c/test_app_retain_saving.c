@@ -8,7 +8,7 @@
  */
 #include <string.h>
 
-#include "../../firmware/src/app/CmpRetain.c"
+#include "../../firmware/src/cycle/CmpRetain.c"
 
 #include "test.h"
 

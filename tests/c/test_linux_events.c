@@ -7,9 +7,9 @@
  * only a stop has to be there in time, with room to spare.
  */
 #define _GNU_SOURCE
-#include "../../firmware/src/app/AppAreas.h"
+#include "../../firmware/src/cycle/AppAreas.h"
 #include "AppException.h"
-#include "../../firmware/src/app/AppImage.h"
+#include "../../firmware/src/cycle/AppImage.h"
 #include "CmpAppEmbedded.h"
 #include "CmpChecksum.h"
 #include "CmpIecTask.h"

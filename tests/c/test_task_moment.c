@@ -11,7 +11,7 @@
 #include <pthread.h>
 #include <time.h>
 
-#include "../../firmware/src/app/IecCycle.c"
+#include "../../firmware/src/cycle/IecCycle.c"
 
 #include "test.h"
 

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "../../firmware/src/app/IecCycle.c"
+#include "../../firmware/src/cycle/IecCycle.c"
 #include "app_device.h"
 
 static void the_average_starts_again_when_the_count_does(void)

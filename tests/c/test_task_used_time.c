@@ -11,7 +11,7 @@
 #include "SysExcept.h"
 #include "SysTime.h"
 #include "SysTimer.h"
-#include "../../firmware/src/app/TaskTrigger.h"
+#include "../../firmware/src/cycle/TaskTrigger.h"
 #include "rts_config.h"
 #include "test.h"
 

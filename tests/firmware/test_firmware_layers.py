@@ -16,7 +16,7 @@ import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 SOURCE = FIRMWARE / "src"
-FLOORS = ["core", "sys", "modbus", "app", "io", "comm"]
+FLOORS = ["core", "sys", "modbus", "cycle", "load", "app", "io", "comm"]
 
 # Two sources with the same functions, of which a firmware has one.
 INSTEAD_OF = {"CmpScheduleEmbedded": "CmpScheduleTimer"}
@@ -28,7 +28,7 @@ DEFINITION = re.compile(r"^(?!static\b|typedef\b|else\b)[A-Za-z_][\w *]*?\b(\w+)
 DECLARATION = re.compile(r"^(?!static\b|typedef\b|#)[A-Za-z_][\w *]*?\b(\w+)\([^;{}]*\)[^;{}]*;", re.MULTILINE)
 MACRO = re.compile(r"^#define (\w+)\(((?:\\.|[^\n\\])*)", re.MULTILINE | re.DOTALL)
 NOT_CODE = re.compile(r'/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
-INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
+INCLUDE = re.compile(r'^#include "(?:\.\./\w+/)?([^"]+)"', re.MULTILINE)
 
 
 @cache

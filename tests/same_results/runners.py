@@ -22,7 +22,7 @@ _WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O1"]
 _ALTERNATIVES = ("CmpScheduleEmbedded.c",)  # in place of what the simulator has
 _PORTABLE = [
     source
-    for folder in ("app", "core", "sys")
+    for folder in ("app", "core", "cycle", "load", "sys")
     for source in sorted((FIRMWARE / "src" / folder).glob("*.c"))
     if source.name not in _ALTERNATIVES
 ]
@@ -81,7 +81,7 @@ class Runner:
     def compile(self, folder: Path, main: Path = HERE / "runner.c", *extra: str) -> Path:
         """A program of the runtime with `main`, in `folder`; `extra`: more flags."""
         program = folder / f"{main.stem}-{self.target}"
-        include = [f"-I{FIRMWARE / name}" for name in ("include", "port/sim", "src/app")]
+        include = [f"-I{FIRMWARE / name}" for name in ("include", "port/sim", "src/app", "src/cycle")]
         flags = [*(_BARE_FLAGS if self.bare else []), *self.flags, *_WARNINGS, *include, *extra]
         entry = FIRMWARE / "port/baremetal" / self.family / "IecCall.c"
         sources = [*_BARE_SOURCES, entry] if self.bare else _LINUX_SOURCES

@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-#include "AppImage.h"
+#include "../cycle/AppImage.h"
 #include "AppLife.h"
 #include "AppState.h"
 #include "CompactDownload.h"

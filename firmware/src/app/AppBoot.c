@@ -13,7 +13,7 @@
 #include "AppCommit.h"
 #include "AppException.h"
 #include "AppLife.h"
-#include "AppLoader.h"
+#include "../load/AppLoader.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
 #include "SysExcept.h"

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "AppException.h"
-#include "AppLoader.h"
+#include "../load/AppLoader.h"
 #include "AppPassword.h"
 #include "CMUtils.h"
 #include "CmpBytes.h"

@@ -11,7 +11,7 @@
 #include "AppBoot.h"
 #include "AppCommit.h"
 #include "AppLife.h"
-#include "AppLoader.h"
+#include "../load/AppLoader.h"
 #include "AppState.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"

@@ -10,14 +10,14 @@
 
 #include <string.h>
 
-#include "AppAreas.h"
+#include "../cycle/AppAreas.h"
 #include "AppCommit.h"
 #include "AppException.h"
-#include "AppFunctions.h"
+#include "../load/AppFunctions.h"
 #include "AppIo.h"
 #include "AppRetain.h"
 #include "AppState.h"
-#include "AppTasks.h"
+#include "../load/AppTasks.h"
 #include "CmpEventMgr.h"
 #include "CmpIecTask.h"
 #include "CmpLog.h"

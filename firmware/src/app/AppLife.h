@@ -9,7 +9,7 @@
 #ifndef APPLIFE_H
 #define APPLIFE_H
 
-#include "AppLoaded.h"
+#include "../load/AppLoaded.h"
 #include "AppRefusal.h"
 #include "AppState.h"
 #include "CmpErrors.h"

@@ -11,7 +11,7 @@
 #include "AppRetain.h"
 
 #include "AppCommit.h"
-#include "AppLoader.h"
+#include "../load/AppLoader.h"
 #include "CmpLog.h"
 
 /* Not inlined: an image and what checks it are large on the stack. */

@@ -8,7 +8,7 @@
 #ifndef APPRETAIN_H
 #define APPRETAIN_H
 
-#include "AppLoaded.h"
+#include "../load/AppLoaded.h"
 #include "CmpErrors.h"
 
 /*

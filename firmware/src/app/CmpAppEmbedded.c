@@ -7,10 +7,10 @@
 
 #include <string.h>
 
-#include "AppAreas.h"
+#include "../cycle/AppAreas.h"
 #include "AppBoot.h"
 #include "AppCommit.h"
-#include "AppFunctions.h"
+#include "../load/AppFunctions.h"
 #include "AppLife.h"
 #include "CmpForce.h"
 #include "CmpLog.h"

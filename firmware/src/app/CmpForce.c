@@ -12,7 +12,7 @@
 
 #include <string.h>
 
-#include "AppImage.h"
+#include "../cycle/AppImage.h"
 #include "AppState.h"
 #include "CmpEventMgr.h"
 #include "CyclePhases.h"

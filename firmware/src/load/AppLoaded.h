@@ -6,7 +6,7 @@
 #ifndef APPLOADED_H
 #define APPLOADED_H
 
-#include "AppImage.h"
+#include "../cycle/AppImage.h"
 #include "CmpIecAbi.h"
 #include "CmpRetain.h"
 #include "CompactDownload.h"
