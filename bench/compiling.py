@@ -17,8 +17,8 @@ from plctool.compiler.codegen.emit import optimised
 from plctool.compiler.codegen.link import link
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.front import check_sources
+from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.compiler.syntax.parser import parse
 from plctool.image.targets import DEFAULT_TARGET, find_target
 

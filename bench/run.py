@@ -21,7 +21,7 @@ import tanks
 import targets
 
 from plctool.compiler import IoFiles, compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.device import Plc
 from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport

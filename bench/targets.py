@@ -28,10 +28,10 @@ import logic  # noqa: E402
 from runners import RUNNERS, Runner  # noqa: E402
 
 from plctool.compiler import load_sources  # noqa: E402
-from plctool.compiler.build import BuildResult, build_program  # noqa: E402
 from plctool.compiler.codegen.lower_unit import Options, parse_checks  # noqa: E402
 from plctool.compiler.front import check_sources  # noqa: E402
-from plctool.compiler.typed import TypedProgram  # noqa: E402
+from plctool.compiler.image.build import BuildResult, build_program  # noqa: E402
+from plctool.compiler.typed.nodes import TypedProgram  # noqa: E402
 from plctool.core import lib  # noqa: E402
 from plctool.debug.variables import Symbol  # noqa: E402
 from plctool.image.file import parse_image  # noqa: E402

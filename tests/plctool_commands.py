@@ -28,8 +28,8 @@ from typing import IO, Any, NoReturn
 IMPORTED = (
     "plctool.__main__",
     "plctool.cli.main",
-    "plctool.compiler.build",
-    "plctool.compiler.library",
+    "plctool.compiler.image.build",
+    "plctool.compiler.syntax.library",
     "plctool.device",
     "plctool.gateway.client",
     "plctool.port_check",

@@ -1,4 +1,4 @@
-"""Where the project file is: `plc.toml` says what belongs to a program (compiler/project.py reads it).
+"""Where the project file is: `plc.toml` says what belongs to a program (compiler/sources/project.py reads it).
 
 Commands that are given no sources look for it in the current folder and those above it, but do not use the file of
 another user (docs/security.md).

@@ -42,7 +42,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 def _has_test(data: bytes) -> bool:
     if not _WORD.search(data):
         return False
-    from plctool.compiler.source_files import decode
+    from plctool.compiler.sources.source_files import decode
     from plctool.compiler.syntax.plain_text import plain_text
 
     return _TEST.search(plain_text(decode(data), strings=True)) is not None
@@ -74,7 +74,7 @@ class StFile(pytest.File):
 
     def _sources(self) -> tuple[Path, ...]:
         """The project of this file, or all sources of its folder, which may have the project of others."""
-        from plctool.compiler.source_files import find_sources
+        from plctool.compiler.sources.source_files import find_sources
         from plctool.project import PROJECT_FILE
 
         folder = self.path.parent

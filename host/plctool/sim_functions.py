@@ -13,7 +13,7 @@ from plctool.iec.types import StringType, Type
 from plctool.iec.values import decode, encode
 
 if TYPE_CHECKING:
-    from plctool.compiler.typed import Pou
+    from plctool.compiler.typed.nodes import Pou
 
 _FAILED = int(lib.RTSEXCPT_NONCONTINUABLE)  # what the program ends with when Python raises
 

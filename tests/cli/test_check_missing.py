@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from plctool.compiler.library import standard_library
-from plctool.compiler.stand_ins import stand_ins
+from plctool.compiler.sources.stand_ins import stand_ins
+from plctool.compiler.syntax.library import standard_library
 
 PROGRAM = """PROGRAM Main
 VAR blink : BLINK; second : Util.Blink; pid : INT; axis : AXIS_REF; power : MC_Power; a, b : INT; x : Whatever;

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from plctool.compiler.dialect_of_files import dialect_of_files
+from plctool.compiler.sources.dialect_of_files import dialect_of_files
 
 MIXED = "TYPE Mode : (off, on); END_TYPE\nPROGRAM Main\nVAR m : Mode; n : INT; END_VAR\nm := n;\nEND_PROGRAM\n"
 HALF = "PROGRAM Main\nVAR x : REAL := 2.5; b : BYTE; END_VAR\nb := REAL_TO_BYTE(x);\nEND_PROGRAM\n"

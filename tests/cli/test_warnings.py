@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from plctool.compiler.codegen.lower_frame import STATEMENTS, VALUES
-from plctool.compiler.diagnostics import MAX_OF_KIND
 from plctool.compiler.semantics.checker import EXPRESSION_RULES, STATEMENT_RULES
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Assign, Binary
+from plctool.compiler.syntax.diagnostics import MAX_OF_KIND
+from plctool.compiler.typed.nodes import Assign, Binary
 
 PROGRAM = """PROGRAM Main
 VAR

@@ -10,9 +10,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check, Options
-from plctool.compiler.typed import (
+from plctool.compiler.image.build import BuildResult, build_program
+from plctool.compiler.typed.nodes import (
     Binary,
     BinaryOp,
     Const,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 
-from plctool.compiler import typed
 from plctool.compiler.front import CheckResult, Source, check_sources
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
-from plctool.compiler.typed import Binary, BinaryOp, Call, Const, Pou, Statement, TypedProgram, Variable
+from plctool.compiler.typed import nodes as typed
+from plctool.compiler.typed.nodes import Binary, BinaryOp, Call, Const, Pou, Statement, TypedProgram, Variable
 from plctool.iec.common_types import SIGNED
 from plctool.iec.types import BOOL, ArrayType, Elementary, Kind, StringType, Type, base_of, is_scalar
 

@@ -6,10 +6,10 @@ import re
 
 import pytest
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
 from plctool.image.targets import find_target
 
 TEXT = """

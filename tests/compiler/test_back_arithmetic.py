@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
-from plctool.compiler.ranges import type_range
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Assign,
     BinaryOp,
     Convert,
@@ -25,6 +24,7 @@ from plctool.compiler.typed import (
     Unary,
     UnaryOp,
 )
+from plctool.compiler.typed.ranges import type_range
 from plctool.iec.types import (
     BOOL,
     BYTE,

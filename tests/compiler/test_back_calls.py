@@ -7,7 +7,7 @@ from back_support import POS, ProgramBuilder, binary, build, const, load, place
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     ArrayInit,
     Assign,
     BinaryOp,

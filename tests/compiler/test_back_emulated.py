@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from test_back_random import Generator, meaningful, outcome
 
-from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.image.build import BuildResult, build_program
 from plctool.core import lib
 from plctool.debug.symbols import SymbolTable
 from plctool.image.file import parse_image

@@ -7,7 +7,7 @@ import random
 import pytest
 from back_support import POS, ProgramBuilder, Running, binary, build, const, load, place, pos
 
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     Assign,
     BinaryOp,

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
-from plctool.compiler.ranges import type_range
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     Assign,
     BinaryOp,
@@ -39,6 +38,7 @@ from plctool.compiler.typed import (
     Variable,
     While,
 )
+from plctool.compiler.typed.ranges import type_range
 from plctool.iec.common_types import SIGNED
 from plctool.iec.types import (
     BOOL,

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import load_sources
-from plctool.compiler.build import BuildResult, build_program
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.elf_object import code_size
 from plctool.compiler.codegen.emit import emit_object, optimised
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.partition import Part
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
-from plctool.compiler.typed import TypedProgram
+from plctool.compiler.image.build import BuildResult, build_program
+from plctool.compiler.typed.nodes import TypedProgram
 from plctool.controller import ProgramStopped
 from plctool.image.file import parse_image
 from plctool.image.targets import find_target

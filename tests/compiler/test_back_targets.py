@@ -18,7 +18,7 @@ from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.memory_functions import MEMORY_FUNCTIONS, memory_object
 from plctool.compiler.codegen.partition import Part
 from plctool.compiler.codegen.relocations import OutOfReach, stub
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Assign,
     BinaryOp,
     Call,

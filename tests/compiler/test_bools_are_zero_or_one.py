@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool import Simulator
-from plctool.compiler.build import build_program
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen import lower_expr
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
+from plctool.compiler.image.build import build_program
 from plctool.image.targets import find_target
 
 INPUTS = "abcd"

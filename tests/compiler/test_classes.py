@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
-from plctool.compiler.typed import TypedProgram
+from plctool.compiler.image.build import BuildResult
+from plctool.compiler.typed.nodes import TypedProgram
 from plctool.debug.symbols import SymbolTable
 from plctool.errors import UsageError
 from plctool.image.targets import TARGETS, find_target

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources, load_sources
-from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.front import check_sources
+from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.sim import Simulator
 
 HEADER = (

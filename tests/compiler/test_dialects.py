@@ -11,8 +11,8 @@ from plcopen_support import data, errors, pou, project, st, variables
 
 from plctool import Simulator
 from plctool.compiler import CompileError, compile_sources
+from plctool.compiler.base.source import Source
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
 from plctool.errors import UsageError
 from plctool.iec.dialect import DIALECTS, OWN, find_dialect
 from plctool.st_tests import run_tests

@@ -10,11 +10,11 @@ from random import Random
 
 import pytest
 
-from plctool.compiler.build import build_program
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.firmware_stacks import FirmwareStacks
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
+from plctool.compiler.image.build import build_program
 from plctool.errors import UsageError
 from plctool.image.c_functions import interface_signature
 from plctool.image.limits import Need

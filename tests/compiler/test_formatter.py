@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_st_programs import PROGRAMS, built_without_optimisation, read_script, runs
 
-from plctool.compiler.build import build_program
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower_unit import Options, parse_checks
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
+from plctool.compiler.image.build import build_program
 from plctool.errors import PlcError, UsageError
 from plctool.fmt.formatter import formatted
 from plctool.fmt.scan import Item, scan

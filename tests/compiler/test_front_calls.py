@@ -7,8 +7,8 @@ import zlib
 import pytest
 from front_support import body_of, main, messages, program
 
-from plctool.compiler import typed
-from plctool.compiler.typed import Assign, Call, Const, Convert, FbCall, If, Load, Pou, ValuePlace
+from plctool.compiler.typed import nodes as typed
+from plctool.compiler.typed.nodes import Assign, Call, Const, Convert, FbCall, If, Load, Pou, ValuePlace
 from plctool.iec.types import StringType
 
 LIBRARY = """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from front_support import messages, program, variable
 
-from plctool.compiler.typed import Assign, Task, TaskKind, VarPlace
+from plctool.compiler.typed.nodes import Assign, Task, TaskKind, VarPlace
 from plctool.iec.areas import Area
 
 PROGRAMS = """PROGRAM P

@@ -6,7 +6,7 @@ import pytest
 from front_support import check, findings, main, messages, program, variable
 
 from plctool.compiler.front import Source, check_sources
-from plctool.compiler.typed import ArrayInit, Const, ScalarInit, Storage, StructInit, TypedProgram
+from plctool.compiler.typed.nodes import ArrayInit, Const, ScalarInit, Storage, StructInit, TypedProgram
 from plctool.iec.areas import Area
 from plctool.iec.types import ArrayType, EnumType, StringType, StructType, SubrangeType
 

@@ -12,8 +12,8 @@ from front_support import body_of, findings, folded, main, messages
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from plctool.compiler import typed
-from plctool.compiler.typed import Binary, BinaryOp, BitPlace, Const, Convert, Expr, IndexPlace, Load, MemberPlace
+from plctool.compiler.typed import nodes as typed
+from plctool.compiler.typed.nodes import Binary, BinaryOp, BitPlace, Const, Convert, Expr, IndexPlace, Load, MemberPlace
 
 VARIABLES = """b, b2 : BOOL; by : BYTE; w : WORD; dw : DWORD; lw : LWORD; si : SINT; i : INT; di : DINT; li : LINT;
 us : USINT; u : UINT; ud : UDINT; ul : ULINT; r : REAL; lr : LREAL; t : TIME; lt : LTIME; s : STRING[20];

@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler import compile_sources
-from plctool.compiler.diagnostics import MAX_MESSAGE, render
 from plctool.compiler.front import Source, check_sources
+from plctool.compiler.syntax.diagnostics import MAX_MESSAGE, render
 from plctool.compiler.syntax.lexer import KEYWORDS
 from plctool.iec.types import ELEMENTARY
 from plctool.sim import Simulator

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from front_support import body_of, main, messages
 
-from plctool.compiler import typed
-from plctool.compiler.typed import Assign, Case, Const, For, If, Repeat, While
+from plctool.compiler.typed import nodes as typed
+from plctool.compiler.typed.nodes import Assign, Case, Const, For, If, Repeat, While
 
 BEFORE = "TYPE Color : (Red, Green, Blue); END_TYPE\nVAR_GLOBAL CONSTANT LIMIT : INT := 5; END_VAR\n"
 VARIABLES = "i, j : INT; b : BOOL; e : Color; u : USINT; d : DINT; r : REAL; a : ARRAY[0..3] OF INT; s, s2 : STRING;"

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from front_support import body_of, check, main, messages, program
 
-from plctool.compiler import typed
-from plctool.compiler.diagnostics import MAX_ERRORS, MAX_LINE, render, render_all
 from plctool.compiler.front import Source, check_sources
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import MAX_ERRORS, MAX_LINE, render, render_all
 from plctool.compiler.syntax.parser import parse
 from plctool.compiler.syntax.tables import _GRAMMAR, _decode, _encode, load_tables, make_tables
+from plctool.compiler.typed import nodes as typed
 
 VARIABLES = "x, y : INT; b : BOOL; a : ARRAY[1..3] OF INT;"
 

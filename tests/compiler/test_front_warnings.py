@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from front_support import check, main
 
-from plctool.compiler import check_with_tests, warnings
+from plctool.compiler import check_with_tests
 from plctool.compiler.front import Source, check_sources
-from plctool.compiler.warnings import WARNINGS, warning_options
+from plctool.compiler.syntax import warnings
+from plctool.compiler.syntax.warnings import WARNINGS, warning_options
 from plctool.errors import UsageError
 from plctool.iec.dialect import find_dialect
 

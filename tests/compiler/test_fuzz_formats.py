@@ -19,7 +19,7 @@ from test_source_files import BLOCK as TC_BLOCK
 from test_source_files import GENERATED, TASK
 
 from plctool.compiler.front import check_sources
-from plctool.compiler.source_files import load
+from plctool.compiler.sources.source_files import load
 
 LADDER = pou(
     "Rungs",

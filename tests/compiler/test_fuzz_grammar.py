@@ -12,11 +12,11 @@ import pytest
 from front_support import verify
 from test_back_random import meaningful
 
-from plctool.compiler.build import build_program
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.diagnostics import render
 from plctool.compiler.front import CheckResult, Source, check_sources
-from plctool.compiler.typed import TypedProgram
+from plctool.compiler.image.build import build_program
+from plctool.compiler.syntax.diagnostics import render
+from plctool.compiler.typed.nodes import TypedProgram
 from plctool.core import ffi, lib
 from plctool.debug.symbols import SymbolTable
 from plctool.iec.areas import Area

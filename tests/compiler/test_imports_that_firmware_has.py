@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
-from plctool.compiler.level import Level
+from plctool.compiler.base.level import Level
 from plctool.errors import UsageError
 from plctool.image.board import find_board
 from plctool.image.c_functions import C_FUNCTIONS, find_c_function

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from plctool import Simulator
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
 from plctool.image.targets import find_target
 
 CAPACITIES = {"a": 5, "b": 80, "c": 255, "d": 300, "e": 20}

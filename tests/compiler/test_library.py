@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.front import check_sources
-from plctool.compiler.library import Library
-from plctool.compiler.source import Source
+from plctool.compiler.syntax.library import Library
 from plctool.iec.types import ELEMENTARY
 
 NUMBERS = ["SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT"]

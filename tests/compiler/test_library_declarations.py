@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from library_support import check, library, messages
 
-from plctool.compiler import imports
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
+from plctool.compiler.sources import imports
 
 BETWEEN = {
     "blank": " ",

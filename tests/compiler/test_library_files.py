@@ -11,9 +11,10 @@ import pytest
 from library_support import check, library, manifest, messages, zipped
 
 from plctool import archives
-from plctool.compiler import imports, load_sources, program_files
+from plctool.compiler import load_sources, program_files
 from plctool.compiler.front import parse_all
-from plctool.compiler.library_files import resolve_libraries
+from plctool.compiler.sources import imports
+from plctool.compiler.sources.library_files import resolve_libraries
 from plctool.errors import UsageError
 from plctool.st_tests import run_tests
 
@@ -394,7 +395,7 @@ def test_unit_that_is_not_used_is_not_checked_nor_compiled(tmp_path: Path) -> No
     "CLASS Get\nEND_CLASS",
 ])  # fmt: skip
 def test_part_that_declares_a_name_is_found(text: str) -> None:
-    from plctool.compiler.source import Source
+    from plctool.compiler.base.source import Source
 
     other = "FUNCTION Other : INT\nEND_FUNCTION\n"
     for source in (text, other + text, f"{text}\n{other}"):

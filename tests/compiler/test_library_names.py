@@ -9,7 +9,7 @@ from library_support import check, library, messages
 
 from plctool import Simulator
 from plctool.compiler import compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.image.c_functions import interface_signature
 from plctool.image.file import parse_image
 from plctool.image.targets import host_target

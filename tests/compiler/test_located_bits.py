@@ -5,10 +5,10 @@ from __future__ import annotations
 from bit_programs import BitProgram, bit_programs, block_programs
 from hypothesis import given, settings
 
-from plctool.compiler.build import build_program
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
+from plctool.compiler.image.build import build_program
 from plctool.image.targets import find_target
 from plctool.sim import Simulator
 

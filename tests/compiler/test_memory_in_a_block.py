@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 
 from plctool import Simulator
 from plctool.compiler import compile_sources
-from plctool.compiler.build import build_program
 from plctool.compiler.codegen.emit import optimised
 from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.memory import Memory
+from plctool.compiler.image.build import build_program
 from plctool.image.targets import find_target
 
 SIZES = {"i8": 1, "i16": 2, "i32": 4, "i64": 8, "float": 4}

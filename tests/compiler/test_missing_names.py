@@ -9,10 +9,10 @@ import pytest
 from plctool.cli.documents import check
 from plctool.cli.projects import Settings
 from plctool.compiler import program_files
+from plctool.compiler.base.missing_names import library_of
+from plctool.compiler.base.source import Source
 from plctool.compiler.front import check_sources
-from plctool.compiler.missing_names import library_of
-from plctool.compiler.source import Source
-from plctool.compiler.warnings import ALL_WARNINGS
+from plctool.compiler.syntax.warnings import ALL_WARNINGS
 
 
 def errors(text: str) -> list[str]:

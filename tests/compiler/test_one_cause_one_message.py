@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import pytest
 
-from plctool.compiler.diagnostics import MAX_ERRORS, render_all
+from plctool.compiler.base.source import Source
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
+from plctool.compiler.syntax.diagnostics import MAX_ERRORS, render_all
 
 
 def errors(text: str) -> list[str]:

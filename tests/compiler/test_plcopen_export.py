@@ -6,10 +6,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.formats.plcopen import read_project
 from plctool.compiler.front import check_sources
 from plctool.compiler.plcopen_export.project import Written, write_project
-from plctool.compiler.source import Source
 
 NS = {"p": "http://www.plcopen.org/xml/tc6_0201", "x": "http://www.w3.org/1999/xhtml"}
 

@@ -14,13 +14,13 @@ import pytest
 from test_st_programs import PROGRAMS, built_without_optimisation, read_script, runs
 
 from plctool.compiler import IoFiles, check_with_tests, program_files
-from plctool.compiler.build import build_program
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower_unit import Options, parse_checks
 from plctool.compiler.formats.plcopen import read_project
 from plctool.compiler.front import CheckResult, check_sources, declared_names_asked_for
-from plctool.compiler.library import standard_library
+from plctool.compiler.image.build import build_program
 from plctool.compiler.plcopen_export.project import Written, write_project
-from plctool.compiler.source import Source
+from plctool.compiler.syntax.library import standard_library
 from plctool.image.targets import DEFAULT_TARGET, find_target
 
 _ROOT = Path(__file__).parents[2]

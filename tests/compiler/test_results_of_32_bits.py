@@ -10,7 +10,7 @@ import pytest
 
 from plctool import Simulator
 from plctool.compiler import CompileError, compile_sources
-from plctool.compiler.level import Level
+from plctool.compiler.base.level import Level
 from plctool.iec.dialect import DIALECTS
 
 VENDORS = ["codesys", "twincat"]

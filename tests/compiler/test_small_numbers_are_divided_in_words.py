@@ -9,9 +9,9 @@ import pytest
 from test_back_emulated import SYSTEMS, emulated
 from test_back_structure import checked, parts
 
-from plctool.compiler.build import build_program
 from plctool.compiler.codegen.emit import optimised
 from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.image.build import build_program
 from plctool.iec.areas import Area
 from plctool.image.file import parse_image
 from plctool.image.targets import find_target

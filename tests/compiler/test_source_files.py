@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources, load_sources
-from plctool.compiler.diagnostics import render, render_all
 from plctool.compiler.formats.twincat import read_object
 from plctool.compiler.front import check_sources
+from plctool.compiler.syntax.diagnostics import render, render_all
 from plctool.errors import UsageError
 from plctool.sim import Simulator
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import Level, check_sources
-from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_unit import Options, parse_checks
-from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.front import CheckResult
+from plctool.compiler.image.build import BuildResult, build_program
+from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.debug.symbols import SymbolTable
 from plctool.iec.literals import string, typed, unsigned
 from plctool.iec.types import ELEMENTARY, REAL

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
-from plctool.compiler.build import BuildResult
-from plctool.compiler.warnings import warning_options
+from plctool.compiler.image.build import BuildResult
+from plctool.compiler.syntax.warnings import warning_options
 from plctool.image.file import NO_PARTS, ImagePart, parse_image
 
 GLOBALS = """

@@ -8,7 +8,7 @@ from typing import get_args
 
 import pytest
 
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Binary,
     BinaryOp,
     Call,
@@ -27,7 +27,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import rewrite, walk
+from plctool.compiler.typed.typed_nodes import rewrite, walk
 from plctool.iec.types import DINT, ArrayType
 
 POS = Pos("main.st", 1, 1)

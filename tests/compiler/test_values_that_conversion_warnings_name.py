@@ -9,8 +9,8 @@ from front_support import check
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from plctool.compiler.build import build_program
 from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.image.build import build_program
 from plctool.image.targets import find_target, host_target
 from plctool.sim import Simulator
 

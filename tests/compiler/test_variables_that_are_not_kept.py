@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from plctool import ProgramStopped, Simulator, UsageError
-from plctool.compiler.build import BuildResult, build_program
+from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Options
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
-from plctool.compiler.typed import TypedProgram
+from plctool.compiler.image.build import BuildResult, build_program
+from plctool.compiler.typed.nodes import TypedProgram
 from plctool.debug.symbols import SymbolTable
 from plctool.image.targets import find_target
 

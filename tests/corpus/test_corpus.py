@@ -14,8 +14,8 @@ from conftest import Tool
 
 from plctool import Simulator
 from plctool.compiler import load_sources
-from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.compiler.syntax.parser import parse_all
 
 ROOT = Path(__file__).parent

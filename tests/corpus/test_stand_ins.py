@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from conftest import Tool
 
-from plctool.compiler.imports import words_of
-from plctool.compiler.library import standard_library
+from plctool.compiler.sources.imports import words_of
+from plctool.compiler.syntax.library import standard_library
 
 FOLDER = Path(__file__).parent / "stand_ins"
 WORDS = words_of("\n".join(file.read_text() for file in FOLDER.glob("*.st")))

@@ -17,9 +17,9 @@ from unittest.mock import patch
 from plctool.cli.links import project_link
 from plctool.cli.source_archive import Archive, unpacked
 from plctool.compiler import check_with_tests, compile_sources, load_io
-from plctool.compiler.library_files import read_library
-from plctool.compiler.project import read_project
-from plctool.compiler.source_files import load
+from plctool.compiler.sources.library_files import read_library
+from plctool.compiler.sources.project import read_project
+from plctool.compiler.sources.source_files import load
 from plctool.core import lib
 from plctool.debug.symbols import SymbolTable
 from plctool.device import Plc

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from plctool.compiler import CompileError, IoFiles, compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.image.file import parse_image
 from plctool.io.configuration import Configuration, parse_configuration
 

@@ -8,7 +8,7 @@ import pytest
 from io_support import addresses, build, messages
 
 from plctool.compiler import compile_sources
-from plctool.compiler.diagnostics import CompileError
+from plctool.compiler.syntax.diagnostics import CompileError
 from plctool.sim import Simulator
 
 MAIN = "PROGRAM Main\nVAR {} END_VAR\n{}\nEND_PROGRAM\n"

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from plctool.cli.io_documents import export_board, init
 from plctool.cli.links import _link_in
 from plctool.compiler import CompileError, check_with_tests, compile_sources, io_sources, load_io, load_sources
-from plctool.compiler.diagnostics import render_all
+from plctool.compiler.syntax.diagnostics import render_all
 from plctool.errors import UsageError
 
 PROGRAM = """\

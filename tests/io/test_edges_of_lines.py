@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from io_support import build, messages
 
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.sim import Simulator
 
 PROGRAM = """

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from io_support import build
 
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.errors import UsageError
 from plctool.sim import Simulator
 

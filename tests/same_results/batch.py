@@ -10,9 +10,9 @@ from pathlib import Path
 
 from runners import Runner
 
-from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_unit import Options, parse_checks
-from plctool.compiler.typed import TypedProgram
+from plctool.compiler.image.build import BuildResult, build_program
+from plctool.compiler.typed.nodes import TypedProgram
 from plctool.core import ffi, lib
 from plctool.debug.variables import Symbol
 from plctool.iec.areas import Area

@@ -12,8 +12,8 @@ from batch import Recorder, Recording, run_batch
 from comparison import differences
 from runners import RUNNERS, Runner
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
 from plctool.iec.dialect import find_dialect
 
 SIGNED = {"SINT": 8, "INT": 16, "DINT": 32, "LINT": 64}

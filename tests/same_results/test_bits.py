@@ -16,8 +16,8 @@ from comparison import differences
 from hypothesis import Phase, given, settings
 from runners import RUNNERS, Runner
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
 
 PROGRAMS = 40
 LEVELS = (0, 2)

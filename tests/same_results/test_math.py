@@ -15,8 +15,8 @@ import pytest
 from batch import AREAS, REFERENCE, Recorder, Recording, State, run_batch
 from runners import RUNNERS
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.front import check_sources
-from plctool.compiler.source import Source
 from plctool.iec.areas import Area
 
 BOUND_ULP = 2.0

@@ -21,7 +21,7 @@ from test_st_programs import PROGRAMS, Script, read_script, run_cycle
 
 from plctool.compiler import load_sources
 from plctool.compiler.front import check_sources
-from plctool.compiler.typed import TypedProgram
+from plctool.compiler.typed.nodes import TypedProgram
 
 UNOPTIMISED = 3  # of so many programs one is repeated without optimisation
 KEEPS_ALL = 2  # the highest level at which no variable is in registers only, and memory is that of -O0

@@ -13,7 +13,7 @@ import pytest
 import plctool
 from plctool.cli import documents
 from plctool.compiler import compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.controller import Controller
 from plctool.core import lib
 from plctool.device import Plc

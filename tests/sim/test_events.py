@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler import compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.core import lib
 from plctool.errors import DeviceError
 from plctool.image.file import parse_image

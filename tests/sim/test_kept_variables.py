@@ -10,7 +10,7 @@ import pytest
 from kept_table import CHANGED, INITIAL, KEPT, LOST, QUALIFIERS, program, table
 
 from plctool.compiler import compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.core import lib
 from plctool.link.services import AppState
 from plctool.sim import Simulator

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from plctool.compiler import compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.debug.symbols import SymbolTable
 from plctool.errors import DeviceError, UsageError
 from plctool.sim import Simulator

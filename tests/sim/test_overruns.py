@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler import Level, compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.core import error_name, lib
 from plctool.sim import Simulator
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.core import lib
 from plctool.errors import DeviceError, UsageError
 from plctool.sim import Simulator

@@ -27,8 +27,8 @@ _FOREVER = 1e9  # seconds
 
 def check(path: Path) -> tuple[Document, list[str]]:
     """Every diagnostic of an EDS or DCF, also as users read them, and what the file describes."""
-    from plctool.compiler.diagnostics import Diagnostic, render_all
-    from plctool.compiler.source import Source
+    from plctool.compiler.base.source import Source
+    from plctool.compiler.syntax.diagnostics import Diagnostic, render_all
 
     eds = load_eds(path)
     found = [Diagnostic(m.pos.file, m.pos.line, m.pos.column, m.severity, "eds", m.message) for m in eds.findings.found]

@@ -12,8 +12,8 @@ from typing import Any
 from urllib.parse import quote
 from xml.etree import ElementTree
 
-from plctool.compiler.diagnostics import Diagnostic
-from plctool.compiler.warnings import WARNINGS
+from plctool.compiler.syntax.diagnostics import Diagnostic
+from plctool.compiler.syntax.warnings import WARNINGS
 from plctool.version import plctool_version
 
 _SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"

@@ -22,11 +22,11 @@ from plctool.files import STDOUT, read_image, write_atomically, write_output
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
-    from plctool.compiler.build import BuildResult
-    from plctool.compiler.diagnostics import Diagnostic
-    from plctool.compiler.missing_names import Missing, Use
-    from plctool.compiler.program_files import ProgramFiles
-    from plctool.compiler.source import Source
+    from plctool.compiler.base.missing_names import Missing, Use
+    from plctool.compiler.base.source import Source
+    from plctool.compiler.image.build import BuildResult
+    from plctool.compiler.sources.program_files import ProgramFiles
+    from plctool.compiler.syntax.diagnostics import Diagnostic
     from plctool.controller import Controller, OtherTool
     from plctool.debug.symbols import SymbolTable
     from plctool.device import Plc
@@ -156,8 +156,8 @@ class CheckReports:
 
 def check(settings: Settings, reports: CheckReports | None = None) -> tuple[Document, list[str]]:
     """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
-    from plctool.compiler.diagnostics import render_all
-    from plctool.compiler.missing_names import missing_names
+    from plctool.compiler.base.missing_names import missing_names
+    from plctool.compiler.syntax.diagnostics import render_all
 
     reports = reports or CheckReports()
     reports.check_names(settings.every_file())
@@ -172,8 +172,8 @@ def check(settings: Settings, reports: CheckReports | None = None) -> tuple[Docu
 def missing(settings: Settings) -> Document:
     """The names of libraries of other systems that a program uses: those that nothing declares, and those that the
     standard library has. `other_errors`: how many there are besides."""
-    from plctool.compiler.missing_names import missing_names
-    from plctool.compiler.stand_ins import library_of_stand_in, uses_of_stand_ins
+    from plctool.compiler.base.missing_names import missing_names
+    from plctool.compiler.sources.stand_ins import library_of_stand_in, uses_of_stand_ins
 
     diagnostics, sources, _ = _checked(settings)
     absent = [_missing_document(m) | {"stand_in": False} for m in missing_names(_missing(diagnostics))]
@@ -196,7 +196,7 @@ def _checked(settings: Settings) -> tuple[list[Diagnostic], list[Source], list[S
 
 
 def _missing(diagnostics: Sequence[Diagnostic]) -> list[Use]:
-    from plctool.compiler.missing_names import Use
+    from plctool.compiler.base.missing_names import Use
 
     return [Use(d.missing, d.file, d.line) for d in diagnostics if d.missing]
 
@@ -212,9 +212,9 @@ def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
     Raises CompileError when the sources have errors, UsageError when no function is implemented in C.
     """
     from plctool.compiler import CompileError, io_sources, library_sources
+    from plctool.compiler.base.internal import bugs_reported
     from plctool.compiler.export_itf import export_interface as export
     from plctool.compiler.front import check_sources
-    from plctool.compiler.internal import bugs_reported
     from plctool.files import make_folder
     from plctool.iec.dialect import find_dialect
 
@@ -260,11 +260,11 @@ def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list
     file that would be a source of the program itself.
     """
     from plctool.compiler import CompileError
-    from plctool.compiler.diagnostics import render
+    from plctool.compiler.base.internal import bugs_reported
     from plctool.compiler.front import check_sources, declared_names_asked_for
-    from plctool.compiler.internal import bugs_reported
-    from plctool.compiler.library import standard_library
     from plctool.compiler.plcopen_export.project import write_project
+    from plctool.compiler.syntax.diagnostics import render
+    from plctool.compiler.syntax.library import standard_library
     from plctool.iec.dialect import find_dialect
 
     files = settings.files
@@ -311,7 +311,7 @@ def info(path: Path) -> Document:
         table = find_symbols(int(document["crc"], 16), path)
     except UsageError:
         return document
-    from plctool.compiler.build import code_sizes
+    from plctool.compiler.image.build import code_sizes
 
     units = {unit.name: unit for unit in table.pous}
     document["pous"] = [

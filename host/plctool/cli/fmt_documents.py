@@ -13,10 +13,10 @@ from typing import BinaryIO
 
 from plctool.cli.io_documents import Document
 from plctool.compiler import program_files
+from plctool.compiler.base.garbage import no_collection
 from plctool.compiler.formats import unreadable
-from plctool.compiler.garbage import no_collection
-from plctool.compiler.project import read_project
-from plctool.compiler.source_files import READERS, TEXTS, encoding_of
+from plctool.compiler.sources.project import read_project
+from plctool.compiler.sources.source_files import READERS, TEXTS, encoding_of
 from plctool.errors import PlcError, UsageError, counted, listed
 from plctool.files import check_inside, read_regular, write_atomically
 from plctool.fmt.formatter import DEFAULT_WIDTH, Range, formatted

@@ -142,8 +142,8 @@ def export_board(device: Path, folder: Path) -> Document:
 def _board(path: Path) -> DeviceFile:
     """A device file without mistakes. Raises CompileError with all of them."""
     from plctool.compiler import CompileError
-    from plctool.compiler.diagnostics import Diagnostic
-    from plctool.compiler.source import Source
+    from plctool.compiler.base.source import Source
+    from plctool.compiler.syntax.diagnostics import Diagnostic
     from plctool.io.description import load_device
     from plctool.io.mistakes import CODE
 

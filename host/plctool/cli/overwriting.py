@@ -45,7 +45,7 @@ def check_not_read(output: Path, inputs: Iterable[Path], better: str) -> None:
 
 def _kind(output: Path) -> str:
     from plctool.compiler.formats.twincat_projects import CONTAINERS, PLC_PROJECT
-    from plctool.compiler.source_files import SUFFIXES
+    from plctool.compiler.sources.source_files import SUFFIXES
 
     suffix = output.suffix.lower()
     if suffix in SUFFIXES:

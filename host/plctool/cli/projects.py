@@ -10,9 +10,9 @@ from typing import Any
 
 from plctool.cli.links import project_link
 from plctool.compiler import IoFiles, Level, ProgramFiles, program_files
-from plctool.compiler.dialect_of_files import dialect_of_files
-from plctool.compiler.project import Project
-from plctool.compiler.warnings import WarningOptions, warning_options
+from plctool.compiler.sources.dialect_of_files import dialect_of_files
+from plctool.compiler.sources.project import Project
+from plctool.compiler.syntax.warnings import WarningOptions, warning_options
 from plctool.errors import UsageError
 from plctool.project import DEFAULT_IMAGE, PROJECT_FILE, find_project
 

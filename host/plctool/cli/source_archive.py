@@ -19,7 +19,7 @@ from plctool.link.file_services import SOURCE_NAME
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
-    from plctool.compiler.program_files import ProgramFiles
+    from plctool.compiler.sources.program_files import ProgramFiles
 
 _FACTS = "plctool-source.json"
 _FORMAT = 1
@@ -131,7 +131,7 @@ def _folders(settings: Settings) -> Iterator[Path]:
 
 def _named_libraries(files: ProgramFiles) -> list[Path]:
     """Those that the project does not name. Names that need no files are left out."""
-    from plctool.compiler.library_files import libraries_at
+    from plctool.compiler.sources.library_files import libraries_at
 
     known = files.project.libraries if files.project is not None else []
     return [path for path in files.libraries if path not in known and libraries_at(path)]

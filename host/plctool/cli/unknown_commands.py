@@ -42,6 +42,6 @@ def _meant(word: str, commands: Mapping[str, object]) -> str:
 
 
 def _is_source(word: str) -> bool:
-    from plctool.compiler.source_files import READERS
+    from plctool.compiler.sources.source_files import READERS
 
     return Path(word).suffix.lower() in READERS

@@ -11,20 +11,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from plctool.compiler.diagnostics import CompileError
-from plctool.compiler.garbage import no_collection
-from plctool.compiler.level import Level
-from plctool.compiler.program_files import IoFiles, ProgramFiles, Sources, program_files
+from plctool.compiler.base.garbage import no_collection
+from plctool.compiler.base.level import Level
+from plctool.compiler.sources.program_files import IoFiles, ProgramFiles, Sources, program_files
+from plctool.compiler.syntax.diagnostics import CompileError
 from plctool.errors import UsageError
 from plctool.image.targets import DEFAULT_TARGET
 
 if TYPE_CHECKING:
-    from plctool.compiler.build import BuildResult
+    from plctool.compiler.base.source import Source
     from plctool.compiler.front import CheckResult
-    from plctool.compiler.imports import ImportedLibrary
+    from plctool.compiler.image.build import BuildResult
     from plctool.compiler.semantics.python_functions import PythonFunctions
-    from plctool.compiler.source import Source
-    from plctool.compiler.warnings import WarningOptions
+    from plctool.compiler.sources.imports import ImportedLibrary
+    from plctool.compiler.syntax.warnings import WarningOptions
     from plctool.image.board import Board
     from plctool.io.model import Description
 
@@ -79,7 +79,7 @@ def _check_device(board: Board | None, io: Description | None) -> None:
 
 def io_sources(io: Description | None) -> list[Source]:
     """What messages about a description quote."""
-    from plctool.compiler.source import Source
+    from plctool.compiler.base.source import Source
 
     return [] if io is None else [Source(path, text) for path, text in io.contents.items()]
 
@@ -105,9 +105,9 @@ def check_with_tests(
 ) -> CheckResult:
     """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all.
     `load` gets the inputs and outputs for each of both. `dialect` as in `compile_sources`."""
+    from plctool.compiler.base.internal import bugs_reported
     from plctool.compiler.front import check_sources
-    from plctool.compiler.internal import bugs_reported
-    from plctool.compiler.warnings import ALL_WARNINGS
+    from plctool.compiler.syntax.warnings import ALL_WARNINGS
     from plctool.iec.dialect import find_dialect
 
     wanted, system = warnings or ALL_WARNINGS, find_dialect(dialect)
@@ -153,13 +153,13 @@ def compile_sources(
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
     """
-    from plctool.compiler.build import build_program
+    from plctool.compiler.base.internal import bugs_reported
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
-    from plctool.compiler.diagnostics import render_all
-    from plctool.compiler.fit import board_meant, check_program_fits
     from plctool.compiler.front import check_sources
-    from plctool.compiler.internal import bugs_reported
-    from plctool.compiler.warnings import ALL_WARNINGS
+    from plctool.compiler.image.build import build_program
+    from plctool.compiler.image.fit import board_meant, check_program_fits
+    from plctool.compiler.syntax.diagnostics import render_all
+    from plctool.compiler.syntax.warnings import ALL_WARNINGS
     from plctool.iec.dialect import find_dialect
     from plctool.image.board import board_of, read_firmware
     from plctool.image.targets import find_target
@@ -212,7 +212,7 @@ def compile_sources(
 
 
 def _dialect_of(files: ProgramFiles) -> str | None:
-    from plctool.compiler.dialect_of_files import dialect_of_files
+    from plctool.compiler.sources.dialect_of_files import dialect_of_files
 
     found = dialect_of_files(files.source_files)
     return None if found is None else found[0]

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from plctool.compiler.semantics.declarations.functions import interface_text
-from plctool.compiler.typed import Direction, Parameter, Pou
+from plctool.compiler.typed.nodes import Direction, Parameter, Pou
 from plctool.errors import UsageError
 from plctool.iec.types import (
     MAX_ALIGN,

@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plctool.compiler.broken_units import is_independent, remaining
-from plctool.compiler.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
-from plctool.compiler.garbage import no_collection
-from plctool.compiler.imports import ImportedLibrary, needed_parts
-from plctool.compiler.library import Library, standard_library
-from plctool.compiler.missing_names import declared_names
-from plctool.compiler.nesting import NestingError, room_for_nesting
+from plctool.compiler.base.garbage import no_collection
+from plctool.compiler.base.missing_names import declared_names
+from plctool.compiler.base.nesting import NestingError, room_for_nesting
+from plctool.compiler.base.source import Source
+from plctool.compiler.image.task_images import plan_images
 from plctool.compiler.semantics.allocation import report_overlaps
 from plctool.compiler.semantics.call_graph import report_shared_writes
 from plctool.compiler.semantics.configuration import configure
@@ -26,14 +24,16 @@ from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.rules.builtin import is_built_in
 from plctool.compiler.semantics.uncalled_blocks import report_uncalled_blocks
 from plctool.compiler.semantics.world import World
-from plctool.compiler.source import Source
+from plctool.compiler.sources.imports import ImportedLibrary, needed_parts
 from plctool.compiler.syntax.ast import Declaration
 from plctool.compiler.syntax.attributes import check_attributes, check_pragmas
+from plctool.compiler.syntax.broken_units import is_independent, remaining
 from plctool.compiler.syntax.conditions import names_asked_for
+from plctool.compiler.syntax.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
+from plctool.compiler.syntax.library import Library, standard_library
 from plctool.compiler.syntax.parser import Parsed, parse_all
-from plctool.compiler.task_images import plan_images
-from plctool.compiler.typed import Pos, TypedProgram
-from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
+from plctool.compiler.syntax.warnings import ALL_WARNINGS, WarningOptions
+from plctool.compiler.typed.nodes import Pos, TypedProgram
 from plctool.iec.areas import Area
 from plctool.iec.dialect import OWN, Dialect
 from plctool.iec.types import MAX_SIZE

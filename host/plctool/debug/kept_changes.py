@@ -1,6 +1,6 @@
 """What a download does to PERSISTENT values, according to the symbols of both programs.
 
-The device does the same by name and type (firmware/src/app/CmpRetain.c) and counts; here the values have names.
+The device does the same by name and type (firmware/src/cycle/CmpRetain.c) and counts; here the values have names.
 """
 
 from __future__ import annotations

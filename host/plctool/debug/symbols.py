@@ -76,11 +76,12 @@ class SymbolTable:
     """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry goes up to
     the next one. `aliases`: other names of variables. `classes`: the numbers by which instances show their class.
     `constants`: those that are not in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
-    lose. `io`: devices and channels of inputs and outputs (`compiler/io_configuration.py`), empty for none. `bounds`:
-    what the code checks. `unkept`: variables of function blocks, by the name of the block, that live in registers.
-    `stack`: what the deepest calls of a task need; None in a file of a version that did not say. `made_of`: the
-    fingerprint of sources and options (`cli/fresh_image.py`), empty if `build` did not write the file. `internal`: the
-    variables of blocks of the standard library that are neither inputs nor outputs, by the name of the block.
+    lose. `io`: devices and channels of inputs and outputs (`compiler/image/io_configuration.py`), empty for none.
+    `bounds`: what the code checks. `unkept`: variables of function blocks, by the name of the block, that live in
+    registers. `stack`: what the deepest calls of a task need; None in a file of a version that did not say.
+    `made_of`: the fingerprint of sources and options (`cli/fresh_image.py`), empty if `build` did not write the file.
+    `internal`: the variables of blocks of the standard library that are neither inputs nor outputs, by the name of the
+    block.
     `passed_lines`: those that the trail of an exception names by their numbers."""
 
     image_crc: int

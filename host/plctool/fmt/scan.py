@@ -9,11 +9,11 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from plctool.compiler.base.nesting import NestingError, room_for_nesting
+from plctool.compiler.base.source import Source
 from plctool.compiler.formats import unreadable
 from plctool.compiler.formats.beremiz import without_blocks_in_c
 from plctool.compiler.formats.object_text import read_object
-from plctool.compiler.nesting import NestingError, room_for_nesting
-from plctool.compiler.source import Source
 from plctool.compiler.syntax.conditions import is_directive
 from plctool.compiler.syntax.lexer import KEYWORDS, Token
 from plctool.compiler.syntax.parser import parse_all

@@ -14,8 +14,8 @@ from plctool.compiler.semantics.statement_marks import MARKS
 from plctool.iec.areas import Area
 
 if TYPE_CHECKING:
-    from plctool.compiler.source import Source
-    from plctool.compiler.typed import Pos
+    from plctool.compiler.base.source import Source
+    from plctool.compiler.typed.nodes import Pos
     from plctool.sim import Simulator
 
 _PLUGIN = "plctool.st_tests.coverage_plugin"

@@ -15,7 +15,7 @@ from plctool.errors import counted
 from plctool.st_tests.coverage import Coverage
 
 if TYPE_CHECKING:
-    from plctool.compiler.source import Source
+    from plctool.compiler.base.source import Source
 
 TEST_NAME = re.compile(r"TEST_\d+")  # names that `unit_tests.py` gives
 

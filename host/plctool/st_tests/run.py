@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from plctool.compiler import CompileError, IoFiles, Sources, io_sources, library_sources, program_files
-from plctool.compiler.build import BuildResult, build_program
+from plctool.compiler.base.internal import bugs_reported
 from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
-from plctool.compiler.internal import bugs_reported
+from plctool.compiler.image.build import BuildResult, build_program
 from plctool.compiler.semantics.assertions import FAILED, LIVE, NUMBER, Assertion, Operand
 from plctool.compiler.semantics.statement_marks import StatementMarks
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
-from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
+from plctool.compiler.syntax.warnings import ALL_WARNINGS, WarningOptions
 from plctool.controller import ExceptionInfo
 from plctool.core import lib
 from plctool.debug.symbols import SourceLine

@@ -47,7 +47,7 @@ def _check_name(name: str, template: str) -> None:
             "bad-name",
         )
     if template == "library":
-        from plctool.compiler.library_files import wrong_with_name
+        from plctool.compiler.sources.library_files import wrong_with_name
 
         if wrong := wrong_with_name(name):
             raise UsageError(f"'{name}' cannot be the name of a library: {wrong}.", "bad-name")

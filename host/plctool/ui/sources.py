@@ -26,7 +26,7 @@ def lines_around(name: str | None, line: int | None, folders: Sequence[Path]) ->
 
 
 def _source(folder: Path, name: str) -> str | None:
-    from plctool.compiler.source_files import SUFFIXES  # the first exception needs it, no start
+    from plctool.compiler.sources.source_files import SUFFIXES  # the first exception needs it, no start
 
     path = folder / name
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator
 from contextlib import suppress
 
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Binary,
     BinaryOp,
     Const,
@@ -22,7 +22,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.debug.bounds import BoundsCheck, Term
 from plctool.iec.types import ArrayType, Elementary, Kind, StructType, Type, base_of
 

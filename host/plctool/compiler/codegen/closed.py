@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Assign,
     Binary,
     BinaryOp,
@@ -30,7 +30,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import Elementary, Kind, base_of, is_scalar
 from plctool.image.targets import Target
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from plctool.compiler.typed import runtime_function
+from plctool.compiler.typed.nodes import runtime_function
 from plctool.image.c_functions import C_FUNCTIONS, COMPILER_COMPONENTS
 
 COMPILER_CALLS = {

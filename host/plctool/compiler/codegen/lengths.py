@@ -8,7 +8,7 @@ string alone. A function of which all strings have a known length is called in a
 from __future__ import annotations
 
 from plctool.compiler.codegen.ir import Value
-from plctool.compiler.typed import Assign, Call, Pou, Storage, Variable, VarPlace
+from plctool.compiler.typed.nodes import Assign, Call, Pou, Storage, Variable, VarPlace
 from plctool.iec.types import StringType
 
 _MEASURING = ("LEN", "LEN__WSTRING", "WLEN")

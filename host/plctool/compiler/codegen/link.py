@@ -26,7 +26,7 @@ from plctool.compiler.codegen.relocations import (
     stub,
 )
 from plctool.compiler.codegen.stack import Frames, read_frames
-from plctool.compiler.typed import External
+from plctool.compiler.typed.nodes import External
 from plctool.errors import UsageError
 from plctool.iec.types import align_up
 from plctool.image.targets import Machine, Target

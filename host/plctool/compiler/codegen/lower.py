@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import groupby
 
-from plctool.compiler.analysis import Effects
+from plctool.compiler.base.internal import note_position
 from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_body import write_body, write_calls
 from plctool.compiler.codegen.lower_classes import write_dispatcher
@@ -27,8 +27,8 @@ from plctool.compiler.codegen.signatures import (
 )
 from plctool.compiler.codegen.string_functions import string_function
 from plctool.compiler.codegen.transient import TransientVariables
-from plctool.compiler.internal import note_position
-from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
+from plctool.compiler.typed.analysis import Effects
+from plctool.compiler.typed.nodes import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
 from plctool.debug.bounds import BoundsCheck
 from plctool.debug.passed_lines import PassedLine

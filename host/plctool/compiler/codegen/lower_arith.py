@@ -8,7 +8,7 @@ from __future__ import annotations
 from plctool.compiler.codegen.ir import NULL, Value, float_literal, number
 from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, Frame, zero
 from plctool.compiler.codegen.lower_unit import REALS, Check, value_type
-from plctool.compiler.typed import BinaryOp, Const, Intrinsic, Pos, Rounding, UnaryOp
+from plctool.compiler.typed.nodes import BinaryOp, Const, Intrinsic, Pos, Rounding, UnaryOp
 from plctool.iec.types import BOOL, Elementary, Kind, Type, base_of
 from plctool.image.targets import Machine
 

@@ -10,7 +10,7 @@ from plctool.compiler.codegen.lower_frame import STATEMENTS, Frame, Ref, rule
 from plctool.compiler.codegen.lower_string import copy_literal, copy_string
 from plctool.compiler.codegen.lower_unit import Form
 from plctool.compiler.codegen.signatures import CONTEXT, SELF, in_order, parameter_value, passed_type, returned_type
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Binary,
     BinaryOp,
     Const,
@@ -27,7 +27,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import BOOL, PointerType, StringType, StructType, is_scalar
 
 _POINTER = PointerType(BOOL)  # what an instance stores for a VAR_IN_OUT

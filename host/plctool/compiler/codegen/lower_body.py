@@ -28,7 +28,7 @@ from plctool.compiler.codegen.signatures import (
     result_in_memory,
     returned_variable,
 )
-from plctool.compiler.typed import Direction, Pou, PouKind, Variable, VarPlace
+from plctool.compiler.typed.nodes import Direction, Pou, PouKind, Variable, VarPlace
 from plctool.iec.types import OpenArrayType, StringType, is_scalar
 
 

@@ -19,7 +19,7 @@ from plctool.compiler.codegen.lower_places import materialised
 from plctool.compiler.codegen.lower_string import append_string, copy_string, least, move_characters
 from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import CONTEXT, parameter_types, returned_type, returned_variable
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AssignedValue,
     Call,
     Const,
@@ -33,7 +33,7 @@ from plctool.compiler.typed import (
     Pou,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import BOOL, OpenArrayType, StringType, is_scalar
 
 _LONGEST = 32_767  # characters that LEN gives

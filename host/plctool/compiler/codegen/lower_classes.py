@@ -8,7 +8,7 @@ from plctool.compiler.codegen.ir import FALSE, Function
 from plctool.compiler.codegen.lower_frame import ACCESS_VIOLATION, Frame
 from plctool.compiler.codegen.lower_unit import Form, Unit, value_type
 from plctool.compiler.codegen.signatures import SELF, formals, parameter_list, returned_type, returned_variable
-from plctool.compiler.typed import Dispatch
+from plctool.compiler.typed.nodes import Dispatch
 from plctool.iec.types import CLASS_NUMBER
 
 

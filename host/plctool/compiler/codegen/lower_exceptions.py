@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from plctool.compiler.codegen.ir import Value, number
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Body, Detour, Frame, Handler, Ref, rule
-from plctool.compiler.typed import Try
+from plctool.compiler.typed.nodes import Try
 
 
 class Catch(Handler):

@@ -42,8 +42,7 @@ from plctool.compiler.codegen.lower_frame import (
 )
 from plctool.compiler.codegen.lower_string import compare_strings, equals_literal, literal_text
 from plctool.compiler.codegen.lower_unit import REALS, Check, value_type
-from plctool.compiler.ranges import type_range, value_range
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     AssignedValue,
     Binary,
@@ -62,7 +61,8 @@ from plctool.compiler.typed import (
     Unary,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.ranges import type_range, value_range
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import UDINT, StringType, Type
 from plctool.image.targets import FASTEST
 

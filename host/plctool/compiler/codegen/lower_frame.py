@@ -11,15 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from plctool.compiler.analysis import Effects
+from plctool.compiler.base.internal import note_position
 from plctool.compiler.codegen.bounds import bounds_check
 from plctool.compiler.codegen.ir import NULL, FixedPointer, Function, Value, number
 from plctool.compiler.codegen.lengths import KnownLengths, Lengths
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, REALS, Check, Form, Unit, value_type
 from plctool.compiler.codegen.memory import Memory
 from plctool.compiler.codegen.trail import SIZE as TRAIL_SIZE
-from plctool.compiler.internal import note_position
-from plctool.compiler.typed import Dispatch, Expr, External, Label, Place, Pos, Pou, Statement, Variable
+from plctool.compiler.typed.analysis import Effects
+from plctool.compiler.typed.nodes import Dispatch, Expr, External, Label, Place, Pos, Pou, Statement, Variable
 from plctool.core import ffi, lib
 from plctool.debug.passed_lines import PassedLine
 from plctool.iec.areas import Area

@@ -15,7 +15,7 @@ from plctool.compiler.codegen.lower_arith import constant
 from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.codegen.lower_string import copy_literal, encode_text
 from plctool.compiler.codegen.lower_unit import Unit
-from plctool.compiler.typed import Initial, ScalarInit, array_runs, struct_members
+from plctool.compiler.typed.nodes import Initial, ScalarInit, array_runs, struct_members
 from plctool.iec.types import ArrayType, Elementary, Kind, StringType, StructType, Type, base_of, is_scalar
 
 _LOOP_FROM = 5  # equal scalars that are worth a loop

@@ -7,8 +7,8 @@ from plctool.compiler.codegen.lower_arith import compare, is_signed, known_integ
 from plctool.compiler.codegen.lower_expr import truth
 from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, STATEMENTS, Body, rule
 from plctool.compiler.codegen.lower_unit import Check, value_type
-from plctool.compiler.ranges import type_range, value_range
-from plctool.compiler.typed import BinaryOp, Convert, For, Load, Repeat, Statement, Variable, While
+from plctool.compiler.typed.nodes import BinaryOp, Convert, For, Load, Repeat, Statement, Variable, While
+from plctool.compiler.typed.ranges import type_range, value_range
 from plctool.iec.types import SubrangeType
 
 

@@ -18,8 +18,7 @@ from plctool.compiler.codegen.lower_frame import (
 )
 from plctool.compiler.codegen.lower_unit import Check
 from plctool.compiler.codegen.signatures import SELF
-from plctool.compiler.ranges import value_range
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     BitPlace,
     DerefPlace,
     Expr,
@@ -34,7 +33,8 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import root_of
+from plctool.compiler.typed.ranges import value_range
+from plctool.compiler.typed.typed_nodes import root_of
 from plctool.iec.areas import EXCLUSIVE_AREAS
 from plctool.iec.types import BYTE, DINT, UDINT, ArrayType, PointerType, StringType, StructType, Type, is_scalar
 

@@ -9,8 +9,8 @@ from plctool.compiler.codegen.ir import Value, number
 from plctool.compiler.codegen.lower_calls import is_changing, operand
 from plctool.compiler.codegen.lower_frame import Body, Ref
 from plctool.compiler.codegen.lower_string import least, move_characters, span, splice_characters
-from plctool.compiler.typed import Call
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.nodes import Call
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import StringType
 
 _SPLICING = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from plctool.compiler.analysis import may_overlap
 from plctool.compiler.codegen.ir import FALSE
 from plctool.compiler.codegen.lengths import KnownLengths, known_by_all
 from plctool.compiler.codegen.lower_blocks import assign_aggregate
@@ -13,7 +12,8 @@ from plctool.compiler.codegen.lower_init import initialise
 from plctool.compiler.codegen.lower_splice import may_splice, splice
 from plctool.compiler.codegen.lower_unit import Form, value_type
 from plctool.compiler.codegen.signatures import SELF, result_in_memory
-from plctool.compiler.typed import (
+from plctool.compiler.typed.analysis import may_overlap
+from plctool.compiler.typed.nodes import (
     Assign,
     Call,
     CallStatement,
@@ -37,7 +37,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import root_of, walk
+from plctool.compiler.typed.typed_nodes import root_of, walk
 from plctool.iec.types import BYTE, StringType, is_scalar
 
 _WIDEST_SWITCH = 64  # labels of one range that become cases of a switch

@@ -11,7 +11,7 @@ from dataclasses import replace
 from plctool.compiler.codegen.ir import FALSE, TRUE, Value, number
 from plctool.compiler.codegen.lower_arith import compare
 from plctool.compiler.codegen.lower_frame import Frame, Ref
-from plctool.compiler.typed import BinaryOp
+from plctool.compiler.typed.nodes import BinaryOp
 from plctool.iec.types import DINT, StringType
 
 _INLINE_COPY = 128  # bytes that LLVM copies with a few vector moves

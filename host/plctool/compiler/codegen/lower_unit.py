@@ -13,7 +13,7 @@ from plctool.compiler.codegen.closed import Closed
 from plctool.compiler.codegen.ir import Module, escape
 from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
 from plctool.compiler.codegen.trail import Trail
-from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable, runtime_function
+from plctool.compiler.typed.nodes import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable, runtime_function
 from plctool.core import ffi, lib
 from plctool.debug.bounds import BoundsCheck
 from plctool.errors import UsageError

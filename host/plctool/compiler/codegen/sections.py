@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from plctool.compiler.typed import Jump, Label, Pou, PouKind, Return, Statement
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.nodes import Jump, Label, Pou, PouKind, Return, Statement
+from plctool.compiler.typed.typed_nodes import walk
 
 _LONG = 3000  # expressions and statements, some 250 lines
 

@@ -21,8 +21,8 @@ from plctool.compiler.codegen.lower_arith import is_real, is_signed
 from plctool.compiler.codegen.lower_frame import RAISED
 from plctool.compiler.codegen.lower_unit import Form, Options, value_type
 from plctool.compiler.codegen.transient import TransientVariables, transient_variables
-from plctool.compiler.typed import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.nodes import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import StringType, Type, is_scalar
 from plctool.image.targets import Target
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from plctool.compiler.codegen.sections import sections
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Assign,
     Case,
     Continue,
@@ -37,7 +37,7 @@ from plctool.compiler.typed import (
     VarPlace,
     While,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import StructType, is_scalar
 
 TransientVariables = dict[Pou, list[Variable]]

@@ -10,9 +10,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.formats.text import Chunk, Text
 from plctool.compiler.formats.units import tokens_of
-from plctool.compiler.source import Source
 
 SUFFIX = ".fun"
 _UNITS = frozenset(("FUNCTION", "FUNCTION_BLOCK"))

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import re
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.formats.text import Text
-from plctool.compiler.source import Source
 
 _BLOCKS = ("LOGGER", "python_eval", "python_poll", "python_gear")
 _BLOCK = re.compile(rf"^FUNCTION_BLOCK ({'|'.join(_BLOCKS)})\s.*?^END_FUNCTION_BLOCK", re.MULTILINE | re.DOTALL)

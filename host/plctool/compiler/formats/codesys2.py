@@ -11,8 +11,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.formats.text import Findings, Place, Text
-from plctool.compiler.source import Source
 
 _BLOCK_IN_ONE_WORD = "FUNCTIONBLOCK"  # in exports of some systems made from CODESYS 2.3
 _ENDS = {

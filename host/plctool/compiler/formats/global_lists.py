@@ -5,9 +5,9 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.formats.text import Text
 from plctool.compiler.formats.units import UNITS, tokens_of
-from plctool.compiler.source import Source
 
 
 def read_list(path: str, text: str) -> Source:

@@ -13,9 +13,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+from plctool.compiler.base.source import Piece, Source
 from plctool.compiler.formats.text import Text
 from plctool.compiler.formats.units import UNITS, tokens_of
-from plctool.compiler.source import Piece, Source
 from plctool.compiler.syntax.lexer import Token
 from plctool.compiler.syntax.plain_text import plain_text
 

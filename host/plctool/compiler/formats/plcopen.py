@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.formats import plcopen_types as types
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
 from plctool.compiler.formats.plcopen_chart import Chart
@@ -19,7 +20,6 @@ from plctool.compiler.formats.plcopen_tasks import write_configuration
 from plctool.compiler.formats.text import Chunk, Findings, Text
 from plctool.compiler.formats.units import UNITS, tokens_of
 from plctool.compiler.formats.xml_tree import Element, XmlError, read_xml
-from plctool.compiler.source import Source
 
 _KEYWORDS = {"function": "FUNCTION", "functionblock": "FUNCTION_BLOCK", "program": "PROGRAM", "interface": "INTERFACE"}
 _MODIFIERS = ("Abstract", "Final", "Internal", "Private", "Protected", "Public")

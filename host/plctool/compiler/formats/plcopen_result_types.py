@@ -9,11 +9,11 @@ import re
 from dataclasses import dataclass
 from functools import cache
 
-from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.formats.plcopen_body import Unit
 from plctool.compiler.formats.xml_tree import Element
-from plctool.compiler.library import standard_library, without_library
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.syntax.library import standard_library, without_library
 from plctool.iec import literals
 from plctool.iec.common_types import common_scalar
 from plctool.iec.types import ELEMENTARY, Elementary, Kind

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
-from plctool.compiler.source import Finding, Piece, Source
+from plctool.compiler.base.source import Finding, Piece, Source
 
 
 class Place(NamedTuple):

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import re
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.formats.text import Findings, Text
 from plctool.compiler.formats.units import unit_keyword
 from plctool.compiler.formats.xml_tree import Element, XmlError, read_xml
-from plctool.compiler.source import Source
 from plctool.iec.tasks import LOWEST_PRIORITY
 
 _TEXT = frozenset(("ST", "STNonEdit"))

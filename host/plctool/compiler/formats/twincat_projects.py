@@ -15,8 +15,8 @@ from html import unescape
 from itertools import accumulate
 from pathlib import Path, PureWindowsPath
 
+from plctool.compiler.base.source import Finding, Piece, Source
 from plctool.compiler.formats.xml_tree import XmlError, read_xml
-from plctool.compiler.source import Finding, Piece, Source
 from plctool.errors import UsageError, listed
 
 PLC_PROJECT = ".plcproj"

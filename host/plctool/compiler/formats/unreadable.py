@@ -9,7 +9,7 @@ import codecs
 import re
 from pathlib import Path
 
-from plctool.compiler.source import Finding
+from plctool.compiler.base.source import Finding
 from plctool.compiler.syntax.plain_text import plain_text
 
 _CODESYS_3 = "open it in CODESYS and export the units with Project, Export PLCopenXML"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax.attributes import Attributes
 from plctool.compiler.syntax.lexer import Token
 from plctool.compiler.syntax.parser import parse_all

@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from typing import Literal
 from xml.etree import ElementTree
 
-from plctool.compiler.diagnostics import Diagnostic
+from plctool.compiler.base.source import Source
 from plctool.compiler.plcopen_export.chart import ChartWriter
 from plctool.compiler.plcopen_export.declarations import Declarations
 from plctool.compiler.plcopen_export.elements import (
@@ -33,9 +33,9 @@ from plctool.compiler.plcopen_export.elements import (
     text_in,
 )
 from plctool.compiler.plcopen_export.outline import UNITS, Outline, Part, outline, type_end
-from plctool.compiler.source import Source
+from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.compiler.syntax.lexer import Lexer, Token
-from plctool.compiler.typed import Pos
+from plctool.compiler.typed.nodes import Pos
 from plctool.iec.tasks import LOWEST_PRIORITY
 from plctool.version import plctool_version
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.semantics.conversions import elementary
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import Role, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Initial, Pos, Storage, Variable
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.typed.nodes import Initial, Pos, Storage, Variable
 from plctool.iec.addresses import Address, ModuleAddress, parse_address, parse_module_address
 from plctool.iec.areas import Area
 from plctool.iec.types import BOOL, Type, align_up, base_of

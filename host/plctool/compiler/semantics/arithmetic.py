@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.conversions import NS_PER_MS, convert, elementary, scaled, settle
-from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Pos
+from plctool.compiler.typed.nodes import Binary, BinaryOp, Const, Expr, Pos
 from plctool.iec.common_types import NUMBERS, WIDE
 from plctool.iec.types import (
     DATE,

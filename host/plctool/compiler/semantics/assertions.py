@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from plctool.compiler.semantics.conversions import load
 from plctool.compiler.semantics.world import World
-from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Pos, Storage, Variable, VarPlace
+from plctool.compiler.typed.nodes import Binary, BinaryOp, Const, Expr, Pos, Storage, Variable, VarPlace
 from plctool.iec.types import BOOL, DINT, LTIME, TIME, Type
 
 NUMBER, FAILED = "__test", "__failed"

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 
-from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.semantics.generics import bounds_of
-from plctool.compiler.typed import (
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.typed.nodes import (
     Assign,
     BitPlace,
     Call,
@@ -34,7 +34,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import callees, walk
+from plctool.compiler.typed.typed_nodes import callees, walk
 from plctool.iec.areas import Area
 from plctool.iec.types import ArrayType
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from plctool.compiler.internal import note_position
-from plctool.compiler.nesting import MAX_DEPTH, OPERATORS, NestingError
+from plctool.compiler.base.internal import note_position
+from plctool.compiler.base.nesting import MAX_DEPTH, OPERATORS, NestingError
 from plctool.compiler.semantics.conversions import elementary, error_value, settle
 from plctool.compiler.semantics.labels import Labels
 from plctool.compiler.semantics.pitfalls import Loop
@@ -20,7 +20,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Const, Expr, Pos, Statement
+from plctool.compiler.typed.nodes import Const, Expr, Pos, Statement
 from plctool.iec.common_types import NUMBERS
 from plctool.iec.dialect import OWN
 from plctool.iec.types import BOOL, Type

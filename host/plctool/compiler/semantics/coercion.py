@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.ranges import may_wrap
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.conversions import (
     LONGER_DATES,
@@ -27,7 +25,21 @@ from plctool.compiler.semantics.conversions import (
 )
 from plctool.compiler.semantics.pitfalls import lost_fraction, overlays, wrapping
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
-from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Call, Const, Convert, Expr, Load, Place, Pos, VarPlace
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.typed.nodes import (
+    AddressOf,
+    Binary,
+    BinaryOp,
+    Call,
+    Const,
+    Convert,
+    Expr,
+    Load,
+    Place,
+    Pos,
+    VarPlace,
+)
+from plctool.compiler.typed.ranges import may_wrap
 from plctool.iec.common_types import NUMBERS
 from plctool.iec.literals import BitPattern
 from plctool.iec.types import (

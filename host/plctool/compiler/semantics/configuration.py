@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
 from plctool.compiler.semantics.rules.call_statements import program_arguments
@@ -17,7 +16,8 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol, ProgramInfo
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.syntax.diagnostics import did_you_mean
+from plctool.compiler.typed.nodes import (
     BitPlace,
     Direction,
     Load,

@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import Any
 
 from plctool.compiler.semantics.symbols import UNTYPED_INT
-from plctool.compiler.typed import BinaryOp, Intrinsic, Rounding
+from plctool.compiler.typed.nodes import BinaryOp, Intrinsic, Rounding
 from plctool.iec.types import BOOL, REAL, Elementary, EnumType, Kind, PointerType, SubrangeType, Type, base_of
 
 Value = int | float | str

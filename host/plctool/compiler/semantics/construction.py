@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from plctool.compiler.kept import is_kept
 from plctool.compiler.semantics.conversions import whole
 from plctool.compiler.semantics.instances import (
     COPY_CODE,
@@ -21,7 +20,8 @@ from plctool.compiler.semantics.instances import (
 )
 from plctool.compiler.semantics.symbols import NOTHING, Member
 from plctool.compiler.semantics.world import Pool, World
-from plctool.compiler.typed import (
+from plctool.compiler.typed.kept import is_kept
+from plctool.compiler.typed.nodes import (
     AddressOf,
     ArrayInit,
     Assign,
@@ -58,7 +58,7 @@ from plctool.compiler.typed import (
     overlay,
     runtime_function,
 )
-from plctool.compiler.typed_nodes import rewrite
+from plctool.compiler.typed.typed_nodes import rewrite
 from plctool.iec.areas import Area
 from plctool.iec.types import (
     BOOL,

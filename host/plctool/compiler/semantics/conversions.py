@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Binary,
     BinaryOp,
     BitPlace,
@@ -30,7 +30,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.common_types import NUMBERS, common_scalar
 from plctool.iec.types import (
     BOOL,

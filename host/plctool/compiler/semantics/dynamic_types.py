@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 from plctool.compiler.semantics.call_graph import CallGraph
 from plctool.compiler.semantics.symbols import ClassInfo, FunctionInfo, Member
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     Assign,
     Binary,

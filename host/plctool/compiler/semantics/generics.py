@@ -16,7 +16,7 @@ from functools import cache
 from plctool.compiler.semantics.conversions import load
 from plctool.compiler.semantics.symbols import DIRECTIONS
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     Assign,
     Binary,

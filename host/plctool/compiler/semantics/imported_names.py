@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from plctool.compiler.imports import ImportedLibrary
+from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.symbols import GlobalSymbol, Namespace, PouSymbol, TypeSymbol, Unit
-from plctool.compiler.source import Source
+from plctool.compiler.sources.imports import ImportedLibrary
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pos
+from plctool.compiler.typed.nodes import Pos
 
 Report = Callable[[str, Pos, Pos], None]
 """Says that a name is declared twice: the name, where, and where the first time."""

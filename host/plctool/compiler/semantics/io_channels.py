@@ -14,14 +14,14 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from plctool.compiler.diagnostics import Diagnostics, did_you_mean
+from plctool.compiler.base.source import Piece, Source
 from plctool.compiler.semantics.allocation import Allocation
 from plctool.compiler.semantics.names import Names
 from plctool.compiler.semantics.symbols import GlobalSymbol
-from plctool.compiler.source import Piece, Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pos, Pou, Storage, Task, Variable
-from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.compiler.syntax.diagnostics import Diagnostics, did_you_mean
+from plctool.compiler.typed.nodes import Pos, Pou, Storage, Task, Variable
+from plctool.compiler.typed.typed_nodes import root_of, walk, written_places
 from plctool.errors import UsageError
 from plctool.iec.addresses import ModuleAddress, parse_address, parse_module_address
 from plctool.iec.areas import Area

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from plctool.compiler.ranges import type_range
 from plctool.compiler.semantics.pitfalls import has_exit
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Assign,
     Binary,
     BinaryOp,
@@ -34,7 +33,8 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.compiler.typed.ranges import type_range
+from plctool.compiler.typed.typed_nodes import root_of, walk, written_places
 from plctool.iec.types import ArrayType, OpenArrayType
 
 

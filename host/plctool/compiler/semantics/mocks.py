@@ -16,10 +16,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.instances import INITIALISERS
-from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.core import lib
 
 MOCKED, CALLS = "__mocked", "__calls"

@@ -11,16 +11,16 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.imports import ImportedLibrary
-from plctool.compiler.library import Library, without_library
+from plctool.compiler.base.source import Source
 from plctool.compiler.semantics import sfc
 from plctool.compiler.semantics.generics import GROUPS
 from plctool.compiler.semantics.imported_names import ImportedNames, enum_names, put_into
 from plctool.compiler.semantics.symbols import GlobalSymbol, Namespace, PouSymbol, Symbol, TypeSymbol, Unit
-from plctool.compiler.source import Source
+from plctool.compiler.sources.imports import ImportedLibrary
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pos
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.syntax.library import Library, without_library
+from plctool.compiler.typed.nodes import Pos
 from plctool.iec.types import ELEMENTARY
 
 _RESERVED = {*ELEMENTARY, "STRING", "WSTRING", *GROUPS}

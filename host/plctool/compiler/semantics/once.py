@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import whole
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     Assign,
     AssignedValue,
@@ -21,7 +21,7 @@ from plctool.compiler.typed import (
     Storage,
     Variable,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import PointerType, Type
 
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from enum import StrEnum
 
-from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.ast import ACCESS, Modifier, Section
+from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.errors import listed, with_article
 
 

@@ -13,14 +13,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import takewhile
 
-from plctool.compiler.analysis import Effects
-from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.ranges import Range, may_wrap, type_range
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.conversions import elementary, is_untyped
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.typed.analysis import Effects
+from plctool.compiler.typed.nodes import (
     AddressOf,
     Assign,
     Binary,
@@ -54,7 +53,8 @@ from plctool.compiler.typed import (
     VarPlace,
     While,
 )
-from plctool.compiler.typed_nodes import walk, written_places
+from plctool.compiler.typed.ranges import Range, may_wrap, type_range
+from plctool.compiler.typed.typed_nodes import walk, written_places
 from plctool.iec.areas import Area
 from plctool.iec.common_types import NUMBERS, SIGNED
 from plctool.iec.types import (

@@ -14,7 +14,7 @@ from plctool.compiler.semantics.construction import Construction, Destruction
 from plctool.compiler.semantics.conversions import same_type, whole
 from plctool.compiler.semantics.symbols import PouSymbol
 from plctool.compiler.semantics.world import Pool, World
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     Assign,
     Binary,
@@ -43,7 +43,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import callees, walk
+from plctool.compiler.typed.typed_nodes import callees, walk
 from plctool.iec.types import BOOL, BYTE, DINT, MAX_SIZE, ArrayType, PointerType, RawPointerType, StructType, Type
 
 MAX_ELEMENTS = 65535

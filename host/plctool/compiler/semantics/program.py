@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from plctool.compiler.imports import ImportedLibrary
-from plctool.compiler.internal import note_position
-from plctool.compiler.library import Library
+from plctool.compiler.base.internal import note_position
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.construction import construct
 from plctool.compiler.semantics.declarations.classes import Classes
@@ -28,8 +26,10 @@ from plctool.compiler.semantics.sfc_statements import statements_of
 from plctool.compiler.semantics.symbols import TypeSymbol
 from plctool.compiler.semantics.trail import reserve_trail
 from plctool.compiler.semantics.world import Declared, World
+from plctool.compiler.sources.imports import ImportedLibrary
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pou, Variable
+from plctool.compiler.syntax.library import Library
+from plctool.compiler.typed.nodes import Pou, Variable
 
 
 class Program:

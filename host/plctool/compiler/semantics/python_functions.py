@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.program import Program
-from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Direction, Pou
+from plctool.compiler.typed.nodes import Direction, Pou
 from plctool.core import lib
 from plctool.errors import UsageError, did_you_mean
 from plctool.iec.types import ArrayType, StringType

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.names import Names
 from plctool.compiler.semantics.symbols import (
     ClassInfo,
@@ -19,9 +19,9 @@ from plctool.compiler.semantics.symbols import (
     Unit,
     VarSymbol,
 )
-from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pos, Pou, Statement
+from plctool.compiler.syntax.diagnostics import did_you_mean
+from plctool.compiler.typed.nodes import Pos, Pou, Statement
 from plctool.iec.types import Type
 
 

@@ -21,8 +21,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from plctool.compiler.diagnostics import Diagnostics, did_you_mean
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import Diagnostics, did_you_mean
 
 STEP_TYPE = "SFC_STEP__"
 _CONTROL = "ACTION_CONTROL"

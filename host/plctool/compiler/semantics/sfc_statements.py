@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 
-from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.rules.members import bound_member
 from plctool.compiler.semantics.rules.places import named_place
@@ -26,6 +25,7 @@ from plctool.compiler.semantics.sfc import (
 from plctool.compiler.semantics.symbols import MemberSymbol, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import did_you_mean
 
 
 def statements_of(world: World, decl: ast.PouDecl, scope: Scope) -> list[ast.Stmt]:

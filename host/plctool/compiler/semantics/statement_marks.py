@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pos
+from plctool.compiler.typed.nodes import Pos
 
 MARKS = "__marks"
 """ARRAY OF BOOL: which statements ran."""

@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.ast import Section
-from plctool.compiler.typed import Const, Direction, Initial, Pos, Pou, Variable
+from plctool.compiler.typed.nodes import Const, Direction, Initial, Pos, Pou, Variable
 from plctool.iec.types import Elementary, Keep, Kind, PointerType, StructType, Type
 
 

@@ -6,8 +6,8 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.world import World
-from plctool.compiler.typed import Pou, Storage, Try, Variable
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.nodes import Pou, Storage, Try, Variable
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.debug.passed_lines import DEPTH, TRAIL
 from plctool.iec.types import UDINT, ArrayType
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.typed import Assign, Direction, MemberPlace, Pos, Pou, PouKind, Storage, Variable, VarPlace
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.typed.nodes import Assign, Direction, MemberPlace, Pos, Pou, PouKind, Storage, Variable, VarPlace
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import StructType
 
 _Member = tuple[StructType, int]  # a block and an offset in its instance

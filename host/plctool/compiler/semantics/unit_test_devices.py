@@ -11,15 +11,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.assertions import LIVE, Bench
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import load, place_of
 from plctool.compiler.semantics.rules.control import check_body
 from plctool.compiler.semantics.symbols import NOTHING
-from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Assign, Call, CallStatement, If, Pos, Pou, Statement, Task
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.typed.nodes import Assign, Call, CallStatement, If, Pos, Pou, Statement, Task
 from plctool.errors import UsageError, did_you_mean
 from plctool.io.faults import Fault, parse_fault
 from plctool.io.model import Connector, Description

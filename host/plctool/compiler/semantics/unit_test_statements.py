@@ -30,7 +30,7 @@ from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol
 from plctool.compiler.semantics.unit_test_devices import TestDevices
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Assign,
     Binary,
     BinaryOp,

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.assertions import NUMBER, Assertion, Bench
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.configuration import Application, configure, default_programs
@@ -32,9 +33,8 @@ from plctool.compiler.semantics.statement_marks import StatementMarks
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
 from plctool.compiler.semantics.unit_test_devices import TestDevices, faults_of, host_function
 from plctool.compiler.semantics.unit_test_statements import TestBody
-from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Assign,
     Call,
     CallStatement,

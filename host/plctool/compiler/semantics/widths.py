@@ -9,7 +9,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.conversions import convert, elementary, is_narrow, whole_value
-from plctool.compiler.typed import BinaryOp, Expr
+from plctool.compiler.typed.nodes import BinaryOp, Expr
 from plctool.iec.common_types import common_number
 from plctool.iec.types import DINT, LINT, UDINT, Elementary, Kind
 

@@ -12,9 +12,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.library import Library
-from plctool.compiler.nesting import NestingError
+from plctool.compiler.base.nesting import NestingError
+from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.allocation import Allocation, DirectVariables, module_address
 from plctool.compiler.semantics.call_graph import CallGraph
 from plctool.compiler.semantics.coercion import Coercion
@@ -33,9 +32,10 @@ from plctool.compiler.semantics.symbols import (
     TypeSymbol,
     VarSymbol,
 )
-from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.syntax.library import Library
+from plctool.compiler.typed.nodes import (
     Assign,
     Call,
     Const,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TypeVar
 
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.iec.literals import LiteralKind as LiteralKind
 
 N = TypeVar("N")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax import ast, slips
 from plctool.compiler.syntax.attributes import Attributes, Repeated
 from plctool.compiler.syntax.builder_chart import read_action, read_priority

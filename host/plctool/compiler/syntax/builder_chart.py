@@ -5,8 +5,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import did_you_mean
 from plctool.compiler.syntax.lexer import Report, Token
 
 TIMED = frozenset(("L", "D", "SD", "DS", "SL"))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.attributes import Attributes
 from plctool.compiler.syntax.automaton import Parser, Reducer, picking, shortened

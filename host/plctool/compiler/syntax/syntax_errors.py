@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax import slips
 from plctool.compiler.syntax.automaton import Parser
 from plctool.compiler.syntax.hints import hint

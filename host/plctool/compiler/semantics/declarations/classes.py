@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from plctool.compiler.missing_names import known_name_like
+from plctool.compiler.base.missing_names import known_name_like
 from plctool.compiler.semantics.declarations.functions import Functions
 from plctool.compiler.semantics.declarations.inheritance import Hierarchy, check_class
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
@@ -29,7 +29,7 @@ from plctool.compiler.semantics.symbols import (
 )  # fmt: skip
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
+from plctool.compiler.typed.nodes import Initial, Pou, PouKind, ScalarInit, Storage, Variable
 from plctool.iec.types import CLASS_NUMBER, UDINT, EnumType, Field, InterfaceType, Keep, StructType
 
 _LASTING = {ast.Section.VAR_INST: Role.LOCAL, ast.Section.STEP: Role.STEP}  # keywords of blocks in members

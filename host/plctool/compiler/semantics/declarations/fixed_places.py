@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from plctool.compiler.semantics.generics import bounds_of
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     ArrayInit,
     BitPlace,
     Const,

@@ -31,7 +31,7 @@ from plctool.compiler.semantics.symbols import (
 )
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     ComputedInit,
     Direction,
     External,

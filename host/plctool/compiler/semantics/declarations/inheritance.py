@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.conversions import same_type
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.symbols import ERROR, ClassInfo, Member, PouSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import did_you_mean
 from plctool.errors import listed
 from plctool.iec.types import BOOL
 

@@ -35,7 +35,7 @@ from plctool.compiler.semantics.symbols import (
 )
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Direction, Initial, Parameter, Pou, Storage, StructInit, Variable
+from plctool.compiler.typed.nodes import Direction, Initial, Parameter, Pou, Storage, StructInit, Variable
 from plctool.iec.types import Field, Keep, ReferenceType, StringType, StructType
 
 # ---- function blocks ----

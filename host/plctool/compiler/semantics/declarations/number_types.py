@@ -11,7 +11,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Const, Initial, Pos, ScalarInit
+from plctool.compiler.typed.nodes import Const, Initial, Pos, ScalarInit
 from plctool.iec.types import INT, Elementary, EnumType, Kind, SubrangeType, Type
 
 

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Flag, auto
 
-from plctool.compiler.internal import note_position
-from plctool.compiler.missing_names import known_name_like
-from plctool.compiler.nesting import NestingError
+from plctool.compiler.base.internal import note_position
+from plctool.compiler.base.missing_names import known_name_like
+from plctool.compiler.base.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.allocation import is_open
 from plctool.compiler.semantics.checker import Checker
@@ -24,7 +24,7 @@ from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbo
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.slips import TYPES
-from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, Storage, StructInit, Variable, overlay
+from plctool.compiler.typed.nodes import ArrayInit, Initial, ScalarInit, Storage, StructInit, Variable, overlay
 from plctool.iec.types import (
     BOOL,
     BYTE,

@@ -19,7 +19,7 @@ from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, GlobalSymbol, 
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.ast import Section
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Assign,
     Binary,
     BinaryOp,

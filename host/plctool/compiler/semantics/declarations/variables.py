@@ -5,7 +5,6 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.kept import is_kept
 from plctool.compiler.semantics.allocation import is_open, located, misfit, module_address
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
@@ -14,7 +13,8 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.typed.kept import is_kept
+from plctool.compiler.typed.nodes import (
     Binary,
     Call,
     ComputedInit,
@@ -32,7 +32,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.areas import Area
 from plctool.iec.types import (
     ArrayType,

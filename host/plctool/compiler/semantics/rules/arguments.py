@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Container
 from dataclasses import dataclass, replace
 
-from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.library import OTHER_BLOCKS
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import (
     elementary,
@@ -25,7 +23,9 @@ from plctool.compiler.semantics.rules.members import bound_member, dotted_name
 from plctool.compiler.semantics.rules.places import changeable_place, copied
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, Member, PouSymbol, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.syntax.diagnostics import did_you_mean
+from plctool.compiler.syntax.library import OTHER_BLOCKS
+from plctool.compiler.typed.nodes import (
     AddressOf,
     BinaryOp,
     BitPlace,
@@ -48,7 +48,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import is_unaligned
+from plctool.compiler.typed.typed_nodes import is_unaligned
 from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
     BOOL,

@@ -17,7 +17,7 @@ from plctool.compiler.semantics.rules.calls import assign_property, assigned_pro
 from plctool.compiler.semantics.rules.places import changeable_place, copied
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Assign, AssignedValue, Const, DerefPlace, Expr, If, Load, Pos, Statement
+from plctool.compiler.typed.nodes import Assign, AssignedValue, Const, DerefPlace, Expr, If, Load, Pos, Statement
 from plctool.iec.types import BOOL, OpenArrayType, ReferenceType, StructType, Type, is_scalar
 
 _NOTHING = (ast.LiteralKind.NULL, ast.LiteralKind.INT)

@@ -5,7 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.missing_names import known_name_like
+from plctool.compiler.base.missing_names import known_name_like
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import convert, elementary, error_value, place_of, settle
 from plctool.compiler.semantics.generics import bounds_of
@@ -17,7 +17,7 @@ from plctool.compiler.semantics.rules.members import space_of
 from plctool.compiler.semantics.rules.places import changeable_place, named_place
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, GlobalSymbol, PouSymbol, TypeSymbol, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     Binary,
     BinaryOp,
@@ -38,7 +38,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import is_unaligned
+from plctool.compiler.typed.typed_nodes import is_unaligned
 from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
     BOOL,

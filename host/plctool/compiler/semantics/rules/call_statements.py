@@ -30,7 +30,7 @@ from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.rules.pools import DELETE, delete
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, BlockInfo, GlobalSymbol, ProgramInfo, Role, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Assign,
     BitPlace,
     Call,
@@ -49,7 +49,7 @@ from plctool.compiler.typed import (
     UnaryOp,
     Variable,
 )
-from plctool.compiler.typed_nodes import is_unaligned, walk
+from plctool.compiler.typed.typed_nodes import is_unaligned, walk
 from plctool.iec.types import BOOL, ReferenceType, StructType
 
 # ---- instances and programs ----

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from plctool.compiler.library import without_library
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import error_value, is_exact, load
 from plctool.compiler.semantics.rules.arguments import bind, declared_names, plain_arguments, typed_call
@@ -29,8 +28,9 @@ from plctool.compiler.semantics.symbols import (
     VarSymbol,
 )
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.library import without_library
 from plctool.compiler.syntax.slips import FUNCTIONS, REFUSED_CALLS
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Call,
     CallStatement,
     DerefPlace,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from plctool.compiler.nesting import NestingError
+from plctool.compiler.base.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.checker import Checker, checks_statement
 from plctool.compiler.semantics.conversions import elementary, is_untyped, whole_value
@@ -21,7 +21,7 @@ from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, Role, TypeSymbol, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Case,
     Const,
     Continue,
@@ -38,7 +38,7 @@ from plctool.compiler.typed import (
     VarPlace,
     While,
 )
-from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.compiler.typed.typed_nodes import root_of, walk, written_places
 from plctool.iec.common_types import NUMBERS, SIGNED
 from plctool.iec.types import BOOL, EnumType, Kind, StringType, SubrangeType, Type, is_scalar
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 
+from plctool.compiler.base.source import Source
 from plctool.compiler.semantics import arithmetic
 from plctool.compiler.semantics.arithmetic import as_number
 from plctool.compiler.semantics.checker import Checker
@@ -15,10 +16,9 @@ from plctool.compiler.semantics.conversions import BITS, UNSIGNED, convert, elem
 from plctool.compiler.semantics.pitfalls import lost_fraction, misread, not_a_value
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol, TypeSymbol
-from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.parser import parse
-from plctool.compiler.typed import Call, Const, Expr, Intrinsic, IntrinsicCall, Rounding
+from plctool.compiler.typed.nodes import Call, Const, Expr, Intrinsic, IntrinsicCall, Rounding
 from plctool.iec.common_types import NUMBERS, SIGNED
 from plctool.iec.types import (
     BOOL,

@@ -30,7 +30,7 @@ from plctool.compiler.semantics.rules.operators import fold_unary, operate
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.widths import negated_type
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, UnaryOp, VarPlace
+from plctool.compiler.typed.nodes import BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, UnaryOp, VarPlace
 from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import BOOL, DINT, ELEMENTARY, LINT, LREAL, REAL, Kind, StringType, Type, is_scalar
 

@@ -5,12 +5,12 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker, checks_statement
 from plctool.compiler.semantics.labels import Place
 from plctool.compiler.semantics.pitfalls import JumpLoop
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import If, Jump, Label, Statement
+from plctool.compiler.syntax.diagnostics import did_you_mean
+from plctool.compiler.typed.nodes import If, Jump, Label, Statement
 
 _WORDS = {ast.If: "IF", ast.Case: "CASE", ast.For: "FOR", ast.While: "WHILE", ast.RepeatUntil: "REPEAT",
           ast.Try: "__TRY"}  # fmt: skip

@@ -24,7 +24,7 @@ from plctool.compiler.semantics.rules.arguments import Actual, arguments_text, b
 from plctool.compiler.semantics.rules.literals import common_of, wholly
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Direction, Expr
+from plctool.compiler.typed.nodes import Direction, Expr
 from plctool.iec.types import LREAL, REAL, WCHAR, StringType, Type
 
 _TEXT_PARAMETERS = {"STR": "IN", "STR1": "IN1", "STR2": "IN2", "SIZE": "L", "LEN": "L", "POS": "P"}

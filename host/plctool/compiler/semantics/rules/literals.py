@@ -26,7 +26,7 @@ from plctool.compiler.semantics.conversions import (
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.semantics.widths import has_whole_value
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Const, Expr, Pos
+from plctool.compiler.typed.nodes import Const, Expr, Pos
 from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
     BOOL,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import error_value, load, place_of, whole
 from plctool.compiler.semantics.symbols import (
@@ -26,7 +25,8 @@ from plctool.compiler.semantics.symbols import (
     VarSymbol,
 )
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import AddressOf, Const, DerefPlace, Expr, Place, Pos, SelfPlace, VarPlace
+from plctool.compiler.syntax.diagnostics import did_you_mean
+from plctool.compiler.typed.nodes import AddressOf, Const, DerefPlace, Expr, Place, Pos, SelfPlace, VarPlace
 from plctool.iec.types import InterfaceType, StructType, Type
 
 # ---- namespaces, lists of globals, instances of programs ----

@@ -5,7 +5,6 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.ranges import type_range
 from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import (
@@ -28,7 +27,8 @@ from plctool.compiler.semantics.rules.literals import match_literals, untyped_bi
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.semantics.widths import compared, in_32_bits, is_widened, negated_type
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, Unary, UnaryOp
+from plctool.compiler.typed.nodes import Binary, BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, Unary, UnaryOp
+from plctool.compiler.typed.ranges import type_range
 from plctool.iec.common_types import NUMBERS, SIGNED, common_number
 from plctool.iec.types import (
     BOOL,

@@ -5,7 +5,6 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import (
@@ -24,7 +23,8 @@ from plctool.compiler.semantics.rules.calls import property_of
 from plctool.compiler.semantics.rules.members import may_see, variable_value
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.syntax.diagnostics import did_you_mean
+from plctool.compiler.typed.nodes import (
     AddressOf,
     BitPlace,
     Const,

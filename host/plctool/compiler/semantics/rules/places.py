@@ -10,7 +10,7 @@ from plctool.compiler.semantics.conversions import is_exact, is_temporary, place
 from plctool.compiler.semantics.rules.members import Bound, bound_member, dotted_name, is_inside, space_of
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import AddressOf, Call, DerefPlace, Expr, Load, Place, SelfPlace
+from plctool.compiler.typed.nodes import AddressOf, Call, DerefPlace, Expr, Load, Place, SelfPlace
 from plctool.iec.types import RawPointerType, StructType
 
 

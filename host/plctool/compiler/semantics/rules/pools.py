@@ -22,7 +22,20 @@ from plctool.compiler.semantics.rules.members import dotted_name
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.symbols import ERROR, TypeSymbol, Unit, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Assign, Call, Const, Direction, Expr, If, Load, Pos, Raise, Statement, Unary, UnaryOp
+from plctool.compiler.typed.nodes import (
+    Assign,
+    Call,
+    Const,
+    Direction,
+    Expr,
+    If,
+    Load,
+    Pos,
+    Raise,
+    Statement,
+    Unary,
+    UnaryOp,
+)
 from plctool.core import lib
 from plctool.iec.types import (
     BOOL,

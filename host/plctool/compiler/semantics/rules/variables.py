@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import re
 
-from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.missing_names import known_name_like
+from plctool.compiler.base.missing_names import known_name_like
 from plctool.compiler.semantics import sfc
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import error_value, load
@@ -37,8 +36,9 @@ from plctool.compiler.semantics.symbols import (
     VarSymbol,
 )
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import did_you_mean
 from plctool.compiler.syntax.slips import NAMES
-from plctool.compiler.typed import AddressOf, Const, Expr, MemberPlace, Place, SelfPlace
+from plctool.compiler.typed.nodes import AddressOf, Const, Expr, MemberPlace, Place, SelfPlace
 from plctool.iec.types import EnumType, PointerType, StructType, Type
 
 # ---- the flags of actions in charts: `action.Q` and `action.A` ----

@@ -11,7 +11,7 @@ from plctool.compiler.semantics.generics import class_of
 from plctool.compiler.semantics.rules.places import named_place
 from plctool.compiler.semantics.symbols import PouSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     BitPlace,
     Call,

@@ -14,9 +14,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from plctool.compiler.library_files import LibraryFiles
-from plctool.compiler.missing_names import declared_names
-from plctool.compiler.source import Source
+from plctool.compiler.base.missing_names import declared_names
+from plctool.compiler.base.source import Source
+from plctool.compiler.sources.library_files import LibraryFiles
 from plctool.compiler.syntax.conditions import has_conditions
 from plctool.compiler.syntax.plain_text import NAME, plain_text, without_structures
 

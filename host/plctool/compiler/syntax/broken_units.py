@@ -13,10 +13,10 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from plctool.compiler.diagnostics import Diagnostic
-from plctool.compiler.missing_names import declared_names
-from plctool.compiler.source import Source
+from plctool.compiler.base.missing_names import declared_names
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax.ast import AccessLine, ConfigLine, Declaration, GlobalBlock, InstanceBlock
+from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.compiler.syntax.lexer import KEYWORDS
 from plctool.iec.types import ELEMENTARY
 

@@ -16,9 +16,9 @@ from plctool.image.file import ApplicationInfo
 from plctool.project import project_named
 
 if TYPE_CHECKING:
-    from plctool.compiler.imports import ImportedLibrary
-    from plctool.compiler.project import Project
-    from plctool.compiler.source import Source
+    from plctool.compiler.base.source import Source
+    from plctool.compiler.sources.imports import ImportedLibrary
+    from plctool.compiler.sources.project import Project
     from plctool.io.model import Description
 
 
@@ -54,7 +54,7 @@ class ProgramFiles:
     def source_files(self) -> Sequence[Path]:
         """The files of the sources, and projects of other systems that name them; not read yet. Raises UsageError when
         there is nothing to read."""
-        from plctool.compiler.source_files import files_read
+        from plctool.compiler.sources.source_files import files_read
 
         try:
             return list(files_read(self.sources, self.root))
@@ -71,7 +71,7 @@ class ProgramFiles:
 
     def load_sources(self) -> list[Source]:
         """All sources. Raises UsageError when there is nothing to read."""
-        from plctool.compiler.source_files import load
+        from plctool.compiler.sources.source_files import load
 
         try:
             return load(self.sources, self.root)
@@ -80,7 +80,7 @@ class ProgramFiles:
 
     def every_file(self) -> Iterator[Path]:
         """All files that are read to compile it, but the project file. Raises what the other functions do."""
-        from plctool.compiler.library_files import resolve_libraries
+        from plctool.compiler.sources.library_files import resolve_libraries
 
         yield from self.source_files
         for library in resolve_libraries(self.libraries, self.sources, self.root):
@@ -90,8 +90,8 @@ class ProgramFiles:
 
     def load_libraries(self) -> list[ImportedLibrary]:
         """The libraries, and those that they need. Raises UsageError for what is missing or does not fit together."""
-        from plctool.compiler.imports import import_libraries
-        from plctool.compiler.library_files import resolve_libraries
+        from plctool.compiler.sources.imports import import_libraries
+        from plctool.compiler.sources.library_files import resolve_libraries
 
         return import_libraries(resolve_libraries(self.libraries, self.sources, self.root))
 
@@ -129,7 +129,7 @@ def program_files(paths: Sources, io: IoFiles | None = None, libraries: Sequence
     file = project_named(named)
     if file is None:
         return ProgramFiles(named, named, given, io, ApplicationInfo(project=named[0].stem if named else ""))
-    from plctool.compiler.project import read_project
+    from plctool.compiler.sources.project import read_project
 
     project = read_project(file)
     io = IoFiles(io.description or project.io, io.device or project.device, io.wanted)

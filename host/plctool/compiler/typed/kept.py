@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
-from plctool.compiler.typed import Variable
+from plctool.compiler.typed.nodes import Variable
 from plctool.core import lib
 from plctool.errors import UsageError
 from plctool.iec.types import (

@@ -7,7 +7,7 @@ from dataclasses import replace
 from operator import attrgetter
 from typing import Any, TypeVar
 
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     AddressOf,
     Assign,
     BitPlace,

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from plctool.compiler.library import STAND_INS
-from plctool.compiler.library_zip import is_zip, read_zip
-from plctool.compiler.source import Source
-from plctool.compiler.source_files import files_read, load, read_contents
+from plctool.compiler.base.source import Source
+from plctool.compiler.sources.library_zip import is_zip, read_zip
+from plctool.compiler.sources.source_files import files_read, load, read_contents
+from plctool.compiler.sources.toml_files import error_at, read_checked
 from plctool.compiler.syntax.lexer import KEYWORDS
-from plctool.compiler.toml_files import error_at, read_checked
+from plctool.compiler.syntax.library import STAND_INS
 from plctool.errors import UsageError, did_you_mean
 from plctool.files import Pos, check_inside, decode_utf8, is_inside, read_utf8
 from plctool.iec.types import ELEMENTARY

@@ -12,12 +12,12 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
+from plctool.compiler.base.level import Level
 from plctool.compiler.codegen.lower_unit import parse_checks
-from plctool.compiler.level import Level
-from plctool.compiler.library_files import is_stand_in, libraries_at, no_library
-from plctool.compiler.source_files import READERS
-from plctool.compiler.toml_files import read_checked
-from plctool.compiler.warnings import WARNINGS
+from plctool.compiler.sources.library_files import is_stand_in, libraries_at, no_library
+from plctool.compiler.sources.source_files import READERS
+from plctool.compiler.sources.toml_files import read_checked
+from plctool.compiler.syntax.warnings import WARNINGS
 from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import is_inside, read_utf8
 from plctool.iec.dialect import DIALECTS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from plctool.compiler.typed import Binary, BinaryOp, Const, Convert, Expr, Load, Variable, VarPlace
+from plctool.compiler.typed.nodes import Binary, BinaryOp, Const, Convert, Expr, Load, Variable, VarPlace
 from plctool.iec.types import Elementary, Kind, SubrangeType, Type, base_of
 
 Range = tuple[int, int]

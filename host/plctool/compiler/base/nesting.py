@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from plctool.compiler.typed import Pos
+from plctool.compiler.typed.nodes import Pos
 
 MAX_DEPTH = 400  # levels of nesting in one expression or of statements; the check and the lowering recurse over them
 OPERATORS = 8  # operators that need no more room than one other level: a sum has a level for each of its terms

@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from plctool.compiler.missing_names import Use, library_of, table
-from plctool.compiler.source import Finding, Source
-from plctool.compiler.typed import Pos
-from plctool.compiler.warnings import ALL_WARNINGS, WARNINGS, LineRanges, switched_off
+from plctool.compiler.base.missing_names import Use, library_of, table
+from plctool.compiler.base.source import Finding, Source
+from plctool.compiler.syntax.warnings import ALL_WARNINGS, WARNINGS, LineRanges, switched_off
+from plctool.compiler.typed.nodes import Pos
 from plctool.errors import UsageError, counted
 from plctool.errors import did_you_mean as did_you_mean
 from plctool.iec.dialect import OWN

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.compiler.syntax.parser import parse
 from plctool.core import lib
 

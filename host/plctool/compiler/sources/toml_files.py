@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from plctool.compiler.diagnostics import CompileError, Diagnostic
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
+from plctool.compiler.syntax.diagnostics import CompileError, Diagnostic
 from plctool.errors import UsageError
 from plctool.files import Pos
 from plctool.io.mistakes import Mistake, Mistakes

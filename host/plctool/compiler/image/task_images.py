@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
 
-from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.typed import (
+from plctool.compiler.syntax.diagnostics import Diagnostics
+from plctool.compiler.typed.nodes import (
     AddressOf,
     BitPlace,
     Const,
@@ -31,7 +31,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import callees, referenced_places, root_of, walk, written_places
+from plctool.compiler.typed.typed_nodes import callees, referenced_places, root_of, walk, written_places
 from plctool.core import lib
 from plctool.iec.areas import Area
 from plctool.iec.types import ArrayType, InterfaceType, PointerType, StructType, Type

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from plctool.compiler.imports import parts_of
-from plctool.compiler.library import OTHER_BLOCKS, standard_library, without_library
-from plctool.compiler.missing_names import Use
-from plctool.compiler.source import Source
+from plctool.compiler.base.missing_names import Use
+from plctool.compiler.base.source import Source
+from plctool.compiler.sources.imports import parts_of
 from plctool.compiler.syntax.lexer import Lexer, Token
+from plctool.compiler.syntax.library import OTHER_BLOCKS, standard_library, without_library
 
 _FUNCTIONS = {
     "Tc2_System": ("MEMCPY", "MEMMOVE", "MEMSET", "MEMCMP"),

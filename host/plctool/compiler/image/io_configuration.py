@@ -7,8 +7,8 @@ from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
-from plctool.compiler.task_images import task_ranges
-from plctool.compiler.typed import Task, TaskKind, TypedProgram
+from plctool.compiler.image.task_images import task_ranges
+from plctool.compiler.typed.nodes import Task, TaskKind, TypedProgram
 from plctool.core import lib
 from plctool.iec.areas import Area
 from plctool.iec.types import Elementary, Type, base_of

@@ -43,7 +43,7 @@ def _read(path: Path, changed: int) -> dict[Path, bytes]:
 
 
 def _is_wanted(name: str) -> bool:
-    from plctool.compiler.source_files import READERS
+    from plctool.compiler.sources.source_files import READERS
 
     path = PurePosixPath(name)
     if path.parts[:1] == ("__MACOSX",):  # what macOS knows of the files beside them

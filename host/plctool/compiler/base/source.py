@@ -16,7 +16,7 @@ from functools import cached_property
 from pathlib import PurePath
 from typing import Literal
 
-from plctool.compiler.typed import Pos
+from plctool.compiler.typed.nodes import Pos
 
 _OF_OPENPLC = re.compile(r"^\s*CONFIGURATION\s+Config0\s+RESOURCE\s+Res0\s+ON\s+PLC\b", re.MULTILINE)
 _PLCOPEN, _CODESYS = "http://www.plcopen.org/xml/tc6", "http://www.3s-software.com/"

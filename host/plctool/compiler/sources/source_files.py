@@ -10,6 +10,8 @@ import re
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from pathlib import Path
 
+from plctool.compiler.base.garbage import no_collection
+from plctool.compiler.base.source import Finding, Piece, Source
 from plctool.compiler.formats import (
     automation_studio,
     beremiz,
@@ -21,8 +23,6 @@ from plctool.compiler.formats import (
     twincat_projects,
     unreadable,
 )
-from plctool.compiler.garbage import no_collection
-from plctool.compiler.source import Finding, Piece, Source
 from plctool.errors import UsageError
 from plctool.files import MAX_TEXT, check_inside, is_inside, read_regular
 from plctool.project import LIBRARY_FILE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from plctool.compiler.build import BuildResult
+from plctool.compiler.image.build import BuildResult
 from plctool.core import lib
 from plctool.image.board import Board, known_boards
 from plctool.image.file import parse_image

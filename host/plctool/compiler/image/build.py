@@ -7,18 +7,18 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from plctool.compiler.base.garbage import no_collection
+from plctool.compiler.base.nesting import room_for_nesting
 from plctool.compiler.codegen.emit import emit_objects
 from plctool.compiler.codegen.link import Linked, link
 from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.stack import CallGraph, Frames
-from plctool.compiler.diagnostics import Diagnostic
-from plctool.compiler.garbage import no_collection
-from plctool.compiler.io_configuration import assign_tasks, configuration_of, io_document
-from plctool.compiler.kept import kept_parts, kept_variables
-from plctool.compiler.library import is_standard
-from plctool.compiler.nesting import room_for_nesting
-from plctool.compiler.typed import External, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
+from plctool.compiler.image.io_configuration import assign_tasks, configuration_of, io_document
+from plctool.compiler.syntax.diagnostics import Diagnostic
+from plctool.compiler.syntax.library import is_standard
+from plctool.compiler.typed.kept import kept_parts, kept_variables
+from plctool.compiler.typed.nodes import External, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
 from plctool.core import lib
 from plctool.debug.symbols import CodeUnit, KeptName, SymbolTable, symbol_path
 from plctool.debug.variables import Symbol, constant_symbol

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from plctool.compiler.typed import (
+from plctool.compiler.typed.nodes import (
     Call,
     DerefPlace,
     FbCall,
@@ -14,7 +14,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import referenced_places, root_of, walk, written_places
+from plctool.compiler.typed.typed_nodes import referenced_places, root_of, walk, written_places
 from plctool.iec.areas import EXCLUSIVE_AREAS
 from plctool.iec.types import ArrayType, StructType, Type
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from plctool.compiler.typed import Pos
+from plctool.compiler.typed.nodes import Pos
 from plctool.errors import InternalError, PlcError
 
 _POSITION = "position_in_program"

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from plctool.compiler.source import Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax.lexer import Lexer
 from plctool.errors import UsageError
 

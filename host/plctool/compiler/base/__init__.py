@@ -1,0 +1,1 @@
+"""Ground of the compiler: positions in sources, nesting, errors of its own."""

@@ -1,0 +1,1 @@
+"""Finding and reading programs: files, projects, libraries, archives."""
