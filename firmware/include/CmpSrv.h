@@ -32,7 +32,7 @@ enum {
     RIGHT_CONTROL = 4,  /* starts, stops, resets */
     RIGHT_DOWNLOAD = 8, /* replaces the application */
     RIGHT_ALL = RIGHT_VIEW | RIGHT_WRITE | RIGHT_CONTROL | RIGHT_DOWNLOAD,
-    RIGHT_LOOK = COMM_PASSWORD ? RIGHT_VIEW | 0x10 : RIGHT_NONE, /* state of the application: needs a login with a
+    RIGHT_STATE = COMM_PASSWORD ? RIGHT_VIEW | 0x10 : RIGHT_NONE, /* state of the application: needs a login with a
                                                                   * password only */
 };
 

@@ -518,15 +518,15 @@ static const SRV_SERVICE services[] = {
     {SRV_APP_START, RIGHT_CONTROL, start},
     {SRV_APP_STOP, RIGHT_CONTROL, stop},
     {SRV_APP_RESET, RIGHT_CONTROL, reset},
-    {SRV_APP_READ_STATUS, RIGHT_LOOK, read_status},
+    {SRV_APP_READ_STATUS, RIGHT_STATE, read_status},
     {SRV_APP_DOWNLOAD_COMPACT, RIGHT_DOWNLOAD, download_compact},
 #if FORCE_MAX > 0
     {SRV_APP_RELEASE_FORCE_LIST, RIGHT_WRITE, release_force_list},
 #endif
 #if SRV_INFORMATION
-    {SRV_APP_READ_APPLICATION_LIST, RIGHT_LOOK, read_application_list},
-    {SRV_APP_READ_APPLICATION_INFO, RIGHT_LOOK, read_application_info},
-    {SRV_APP_READ_TASK_INFO, RIGHT_LOOK, read_task_info},
+    {SRV_APP_READ_APPLICATION_LIST, RIGHT_STATE, read_application_list},
+    {SRV_APP_READ_APPLICATION_INFO, RIGHT_STATE, read_application_info},
+    {SRV_APP_READ_TASK_INFO, RIGHT_STATE, read_task_info},
 #endif
 #if SRV_OTHER_CLIENTS
     {SRV_APP_DELETE, RIGHT_DOWNLOAD, delete_app},

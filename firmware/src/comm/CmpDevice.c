@@ -297,11 +297,11 @@ static const SRV_SERVICE services[] = {
     {SRV_DEV_LOGIN, RIGHT_NONE, login},
     {SRV_DEV_LOGOUT, RIGHT_NONE, logout},
 #if SRV_INFORMATION
-    {SRV_DEV_ECHO, RIGHT_LOOK, echo},
+    {SRV_DEV_ECHO, RIGHT_STATE, echo},
 #endif
     {SRV_DEV_SESSION_CREATE, RIGHT_NONE, session_create},
 #if SRV_OTHER_CLIENTS
-    {SRV_DEV_GET_OPERATION_MODE, RIGHT_LOOK, get_operation_mode},
+    {SRV_DEV_GET_OPERATION_MODE, RIGHT_STATE, get_operation_mode},
     {SRV_DEV_SET_OPERATION_MODE, RIGHT_CONTROL, set_operation_mode},
     {SRV_DEV_SET_NODE_NAME, RIGHT_DOWNLOAD, set_node_name},
 #endif

@@ -76,10 +76,10 @@ static RTS_RESULT get_loggers(SRV_REQUEST *request, BTAG_WRITER *reply)
 #endif
 
 static const SRV_SERVICE services[] = {
-    {SRV_LOG_GET_ENTRIES, RIGHT_LOOK, get_entries},
+    {SRV_LOG_GET_ENTRIES, RIGHT_STATE, get_entries},
 #if SRV_OTHER_CLIENTS
-    {SRV_LOG_GET_COMPONENT, RIGHT_LOOK, get_component},
-    {SRV_LOG_GET_LOGGERS, RIGHT_LOOK, get_loggers},
+    {SRV_LOG_GET_COMPONENT, RIGHT_STATE, get_component},
+    {SRV_LOG_GET_LOGGERS, RIGHT_STATE, get_loggers},
 #endif
 };
 

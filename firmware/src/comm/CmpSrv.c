@@ -108,7 +108,7 @@ static const SRV_SERVICE *find_service(const SRV_GROUP *group, RTS_UI16 service)
 
 static RTS_RESULT check_right(const SRV_SERVICE *service, const SRV_REQUEST *request)
 {
-    if (service->right == RIGHT_NONE || (service->right == RIGHT_LOOK && !AppHasPassword()))
+    if (service->right == RIGHT_NONE || (service->right == RIGHT_STATE && !AppHasPassword()))
         return ERR_OK;
     if (!is_session(request->client, request->session))
         return ERR_INVALID_SESSION_ID;

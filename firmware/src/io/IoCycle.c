@@ -303,7 +303,7 @@ static RTS_INLINE bool is_bus_task(RTS_UI32 task)
     return (state.bus_tasks >> task & 1) != 0;
 }
 
-static void before_code(RTS_UI32 task, const IEC_CONTEXT *context)
+static void take_inputs(RTS_UI32 task, const IEC_CONTEXT *context)
 {
     const WORK *work = &state.work[task];
 
@@ -316,7 +316,7 @@ static void before_code(RTS_UI32 task, const IEC_CONTEXT *context)
         IoDevicesUpdate(task);
 }
 
-static void after_code(RTS_UI32 task, const IEC_CONTEXT *context)
+static void give_outputs(RTS_UI32 task, const IEC_CONTEXT *context)
 {
     const WORK *work = &state.work[task];
 
@@ -428,10 +428,10 @@ static void find_work(void)
 
 static RTS_RESULT register_phases(void)
 {
-    RTS_RESULT result = state.has_phases ? (RTS_RESULT)ERR_OK : CyclePhaseRegister(CYCLE_INPUTS, before_code);
+    RTS_RESULT result = state.has_phases ? (RTS_RESULT)ERR_OK : CyclePhaseRegister(CYCLE_INPUTS, take_inputs);
 
     if (!state.has_phases && result == ERR_OK)
-        result = CyclePhaseRegister(CYCLE_OUTPUTS, after_code);
+        result = CyclePhaseRegister(CYCLE_OUTPUTS, give_outputs);
     if (!state.has_phases && result == ERR_OK)
         result = CyclePhaseRegister(CYCLE_SAFE_STATE, enter_safe_state);
     state.has_phases = result == ERR_OK;
