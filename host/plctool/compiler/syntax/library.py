@@ -17,7 +17,7 @@ from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.compiler.syntax.parser import parse
 from plctool.core import lib
 
-_FOLDER = Path(__file__).resolve().parent.parent / "stdlib"
+_FOLDER = Path(__file__).resolve().parents[2] / "stdlib"
 _OPENING = re.compile(
     r"^(?:(?P<pou>FUNCTION_BLOCK|FUNCTION)\s+(?P<name>\w+)|(?P<types>TYPE)\b|(?P<globals>VAR_GLOBAL)\b)", re.MULTILINE
 )
