@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from front_support import check, main
 
+import plctool.compiler
 from plctool.compiler import check_with_tests
 from plctool.compiler.front import Source, check_sources
-from plctool.compiler.syntax import warnings
 from plctool.compiler.syntax.warnings import WARNINGS, warning_options
 from plctool.errors import UsageError
 from plctool.iec.dialect import find_dialect
@@ -280,7 +280,7 @@ def test_program_that_only_a_test_runs_is_no_warning(of_test: str, unused: int) 
 def test_every_warning_of_the_compiler_has_a_name() -> None:
     """Whatever is reported as a warning can be turned off."""
     used: set[object] = set()
-    for path in Path(warnings.__file__).parent.rglob("*.py"):
+    for path in Path(plctool.compiler.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             name = getattr(node.func, "attr", "") if isinstance(node, ast.Call) else ""
             if isinstance(node, ast.Call) and name in ("warning", "_warn"):
