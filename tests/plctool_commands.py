@@ -138,6 +138,7 @@ def main() -> None:
     for module in IMPORTED:
         importlib.import_module(module)
     sys.modules["plctool.compiler.syntax.tables"].load_tables()
+    sys.modules["plctool.cli.command_line"].parser()  # imports the module of each command
     gc.freeze()  # so that the pages stay common to all processes
     with socket.socket(fileno=int(sys.argv[1])) as requests:
         _serve(requests)

@@ -61,6 +61,8 @@ NOT_BELOW = {
     "compiler.semantics.declarations": ("compiler.semantics.program",),
     "compiler.front": ("compiler.codegen", "compiler.formats", "compiler.plcopen_export"),
 }
+# The parts of the command line, from the ground up: what commands share, their table, what reads it, commands, `main`.
+CLI = ("cli.commands", "cli.command_line", "cli.manual", "cli.main")
 
 
 def _module(path: Path) -> str:
@@ -141,7 +143,7 @@ def test_no_room_of_the_compiler_imports_the_whole() -> None:
 def test_imports_are_found_wherever_they_are() -> None:
     source = "from plctool.a import b\ndef f():\n    import plctool.c.d\nif TYPE_CHECKING:\n    from plctool import e"
     assert len(list(_named_in(source))) == 3
-    assert "compiler" in imports("cli.documents")  # in a function only
+    assert "compiler" in imports("cli.commands.programs")  # in a function only
     assert "debug.symbols" in imports("device")
 
 
@@ -159,6 +161,18 @@ def test_no_floor_knows_one_above_it(lower: tuple[str, ...], upper: tuple[str, .
 def test_packages_of_a_floor_do_not_know_each_other(floor: tuple[str, ...]) -> None:
     wrong = [_edges(package, set(floor) - {package}) for package in floor]
     assert set().union(*wrong) == set()
+
+
+def _floor_in_cli(module: str) -> int:
+    if module in CLI:
+        return {"cli.commands": 1, "cli.main": 4}.get(module, 2)
+    return 3 if _is_in(module, "cli.commands") else 0
+
+
+@pytest.mark.parametrize("module", sorted(m for m in MODULES if _is_in(m, "cli")))
+def test_parts_of_the_command_line_do_not_know_what_is_above_them(module: str) -> None:
+    known = [i for i in imports(module) if _is_in(i, "cli")]
+    assert [i for i in known if _floor_in_cli(i) > _floor_in_cli(module)] == []
 
 
 @pytest.mark.parametrize(("package", "others"), [*APART, *NOT_BELOW.items()])

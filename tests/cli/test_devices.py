@@ -12,8 +12,8 @@ from fake_device import FakeDevice, FakeLine, FakePlc
 from serial.tools.list_ports_common import ListPortInfo
 from small_app import make_application
 
-from plctool.cli import main as cli
-from plctool.cli import output
+from plctool.cli import connections
+from plctool.cli.commands.scan import devices_text
 from plctool.core import lib
 from plctool.errors import LinkError
 from plctool.link.transport import BlockTransport
@@ -219,7 +219,7 @@ def test_scan_lists_the_devices(tool: Any, plc: FakePlc) -> None:
 
 def test_a_scan_shows_what_only_some_devices_say() -> None:
     healthy, broken = {"node_name": "press"}, {"node_name": "oven", "problem": "a component failed to start"}
-    assert output.devices_text({"devices": [healthy, broken]}).splitlines() == [
+    assert devices_text({"devices": [healthy, broken]}).splitlines() == [
         "node_name  problem", "press", "oven       a component failed to start"
     ]  # fmt: skip
 
@@ -609,7 +609,7 @@ def test_scan_without_a_link_on_a_machine_without_serial_ports_exits_3(tool: Any
 
 def test_a_bug_is_one_sentence_with_a_hint(tool: Any, plc: FakePlc, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("PLCTOOL_DEBUG", raising=False)
-    monkeypatch.setattr(cli, "link_of", lambda args: 1 / 0)
+    monkeypatch.setattr(connections, "link_of", lambda args: 1 / 0)
     done = tool("status", *PORT)
     assert (done.status, done.out) == (1, "")
     assert "Internal error" in done.err
@@ -620,5 +620,5 @@ def test_a_bug_is_one_sentence_with_a_hint(tool: Any, plc: FakePlc, monkeypatch:
 
 def test_a_bug_shows_its_traceback_on_demand(tool: Any, plc: FakePlc, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PLCTOOL_DEBUG", "1")
-    monkeypatch.setattr(cli, "link_of", lambda args: 1 / 0)
+    monkeypatch.setattr(connections, "link_of", lambda args: 1 / 0)
     assert "ZeroDivisionError" in tool("status", *PORT).err

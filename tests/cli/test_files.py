@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from plctool.cli import output
+from plctool.cli.commands.device import log_text
 from plctool.debug.symbols import load_symbols
 from plctool.image.targets import host_target
 
@@ -562,5 +563,5 @@ def test_characters_that_the_output_cannot_hold_are_escaped(tool: Any, scratch: 
 def test_calls_stand_below_the_text_of_their_log_entry() -> None:
     call = {"pou": "Main", "file": "main.st", "line": 8}
     entry = {"time_s": 1.5, "class": "exception", "component": "C", "text": "oops", "calls": [call]}
-    first, second = output.log_text({"entries": [entry]}).splitlines()
+    first, second = log_text({"entries": [entry]}).splitlines()
     assert second.index("called from Main, main.st:8") == first.index("C: oops")

@@ -78,7 +78,7 @@ def test_all_output_of_commands_goes_through_one_function() -> None:
     """But for the demonstration, which prints its own words."""
     found = {
         f"{file.name}:{node.lineno}"
-        for file in Path(plctool.cli.__file__).parent.glob("*.py")
+        for file in Path(plctool.cli.__file__).parent.rglob("*.py")
         if file.name != "demo.py"
         for node in ast.walk(ast.parse(file.read_text()))
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("print", "sys.stdout.write", "sys.stderr.write")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from plctool.cli.io_documents import _parameter
+from plctool.cli.commands.io import _parameter
 from plctool.errors import UsageError
 
 GAIN = {"name": "gain", "id": 16, "type": "REAL"}

@@ -13,8 +13,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
 from library_support import library
 
 from plctool import Simulator
-from plctool.cli.arguments import parser
-from plctool.cli.file_documents import prepared_source
+from plctool.cli.command_line import parser
+from plctool.cli.commands.source import prepared_source
 from plctool.cli.projects import settings_of, settings_of_sources
 from plctool.image.file import image_crc
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from plctool.cli import output
-from plctool.cli.arguments import parser
+from plctool.cli.command_line import parser
 
 BROKEN = "PROGRAM Main\nVAR n : INT; unused : INT; END_VAR\nn := nonsense;\nEND_PROGRAM\n"
 PLAIN = re.compile("\33" + r"\[[\d;]*m")

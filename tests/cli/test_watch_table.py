@@ -17,7 +17,7 @@ import pytest
 from fake_device import FakePlc
 from rich.console import Console
 
-from plctool.cli.documents import _named_first
+from plctool.cli.commands.values import _named_first
 from plctool.cli.live_table import LiveTable
 
 ROWS = {f"Main.v{number:02}": str(number) for number in range(40)}

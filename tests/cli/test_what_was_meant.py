@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from plctool.cli.file_documents import source_text
+from plctool.cli.commands.source import source_text
 
 MEANT = [
     ("compile", "'compile' is not a command; did you mean build?"),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from plctool.cli.documents import check
+from plctool.cli.commands.programs import check
 from plctool.cli.projects import Settings
 from plctool.compiler import program_files
 from plctool.compiler.base.missing_names import library_of

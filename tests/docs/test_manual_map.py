@@ -10,7 +10,7 @@ import pytest
 from prose import ROOT
 from test_internals import file_exists, files, function_exists
 
-from plctool.cli.arguments import parser
+from plctool.cli.command_line import parser
 
 MAP = ROOT / "docs" / "manual-map.md"
 MISSING = "-"

@@ -16,7 +16,7 @@ from modbus_support import Devices, Wire
 from pymodbus.client import ModbusTcpClient
 
 import plctool
-from plctool.cli.io_documents import parameter
+from plctool.cli.commands.io import parameter
 from plctool.compiler import compile_sources
 from plctool.core import lib
 from plctool.device import Plc

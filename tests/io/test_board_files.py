@@ -14,7 +14,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool.cli.io_documents import export_board, init
+from plctool.cli.commands.exports import export_board
+from plctool.cli.commands.io import init
 from plctool.errors import UsageError
 from plctool.iec.types import ELEMENTARY
 from plctool.io.beginning import toml_value

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool.cli.io_documents import export_board, init
+from plctool.cli.commands.exports import export_board
+from plctool.cli.commands.io import init
 from plctool.cli.links import _link_in
 from plctool.compiler import CompileError, check_with_tests, compile_sources, io_sources, load_io, load_sources
 from plctool.compiler.syntax.diagnostics import render_all

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from plctool.cli.image_documents import production
+from plctool.cli.commands.images import production
 from plctool.compiler import compile_sources
 from plctool.core import ffi, lib
 from plctool.errors import UsageError

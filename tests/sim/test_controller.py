@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import plctool
-from plctool.cli import documents
+from plctool.cli.commands import device, flash, values
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
 from plctool.controller import Controller
@@ -312,21 +312,21 @@ def test_a_damaged_image_is_refused_here_or_by_the_controller_and_the_program_ru
 
 
 def test_what_commands_do_is_the_same_document(plc: Controller, images: dict[str, Path]) -> None:
-    flashed = documents.flash(plc, images["changed"], start=False)
+    flashed = flash.flash(plc, images["changed"], start=False)
     assert {k: flashed[k] for k in ("skipped", "state", "others")} == {"skipped": False, "state": "stop", "others": []}
-    assert documents.start(plc) == documents.status(plc)
-    assert documents.status(plc)["state"] == "run"
-    document, texts = documents.write(plc, {"Main.pause": "80ms", "Main.points[1].x": "16#2A"})
+    assert device.start(plc) == device.status(plc)
+    assert device.status(plc)["state"] == "run"
+    document, texts = values.write(plc, {"Main.pause": "80ms", "Main.points[1].x": "16#2A"})
     assert document["values"] == {"Main.pause": "T#80ms", "Main.points[1].x": 42}
-    assert documents.read(plc, list(texts)) == ({**document, "consistent": True}, texts)
-    assert [task["name"] for task in documents.tasks(plc)["tasks"]] == ["Cycle"]
+    assert values.read(plc, list(texts)) == ({**document, "consistent": True}, texts)
+    assert [task["name"] for task in device.tasks(plc)["tasks"]] == ["Cycle"]
     plc.write({"Main.divisor": 0})
     let_pass(plc)
-    exception = documents.status(plc)["exception"]
-    last = next(e for e in reversed(documents.log(plc)["entries"]) if e["class"] == "exception")
+    exception = device.status(plc)["exception"]
+    last = next(e for e in reversed(device.log(plc)["entries"]) if e["class"] == "exception")
     assert exception["pou"] == "Main"
     assert [last[key] for key in ("pou", "file", "line")] == [exception[key] for key in ("pou", "file", "line")]
-    assert documents.reset(plc, "origin")["state"] == "none"
+    assert device.reset(plc, "origin")["state"] == "none"
 
 
 def test_log_entries_come_once(plc: Controller) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from environment import CONFIG, firmware
 from programs import COUNTER
 
-from plctool.cli.image_documents import production
+from plctool.cli.commands.images import production
 from plctool.device import Plc
 from plctool.image.board import read_firmware
 from plctool.link.connection import Connection

@@ -9,7 +9,7 @@ import pytest
 from environment import CONFIG, MACHINE, ROOT, firmware
 from programs import COUNTER
 
-from plctool.cli.image_documents import production
+from plctool.cli.commands.images import production
 from plctool.device import connect
 from plctool.image.board import read_firmware
 from plctool.link.services import AppState

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Iterator
 
+from plctool.cli.commands import GROUPS
 from plctool.cli.links import VARIABLE
 from plctool.project import PROJECT_FILE
 from plctool.version import plctool_version
@@ -38,9 +39,11 @@ def _lines(parser: argparse.ArgumentParser) -> Iterator[str]:
     yield f'.TH PLCTOOL 1 "" "plctool {plctool_version()}" "User Commands"'
     yield from (".SH NAME", _text(f"plctool - {description[:1].lower()}{description[1:].rstrip('.')}"))
     yield from (".SH SYNOPSIS", ".B plctool", r"\fICOMMAND\fR [\fIOPTION\fR]...")
-    yield ".SH COMMANDS"
-    for name, command in _commands(parser).items():
-        yield from _command_lines(name, command)
+    commands = _commands(parser)
+    for title, rows in GROUPS.items():
+        yield f".SH {_text(title.upper())}"
+        for row in rows:
+            yield from _command_lines(row.name, commands[row.name])
     for title, entries in (("ENVIRONMENT", _ENVIRONMENT), ("FILES", _FILES), ("EXIT STATUS", _EXIT_STATUS)):
         yield f".SH {title}"
         for name, text in entries.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -64,3 +65,11 @@ def _same(one: Path, other: Path) -> bool:
         return os.path.samefile(one, other)
     except OSError:
         return False
+
+
+def output_or(args: argparse.Namespace, default: str) -> Path:
+    """The output that the arguments name, else `default` in the current folder. Raises UsageError if that is a link to
+    elsewhere."""
+    if args.output is None:
+        check_no_way_out(Path(default), Path(), f"-o new-{default}")
+    return Path(default) if args.output is None else args.output

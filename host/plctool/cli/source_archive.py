@@ -161,15 +161,18 @@ def _words(settings: Settings, root: Path) -> list[str]:
 
 
 def _built_crc(archive: Archive, folder: Path) -> int:
-    from plctool.cli.arguments import parser
-    from plctool.cli.documents import compiled
+    from plctool.cli.arguments import add_build_arguments
+    from plctool.cli.builds import compiled
+    from plctool.cli.parser import Parser
     from plctool.cli.projects import settings_of
 
     archive.unpack(folder)
     before = Path.cwd()
     os.chdir(folder)
     try:
-        args = parser().parse_args(["build", *archive.build, "--no-limits", "-o", "app.cdl"])
+        parser = Parser(prog="plctool build")
+        add_build_arguments(parser)
+        args = parser.parse_args([*archive.build, "--no-limits", "-o", "app.cdl"])
         return compiled(settings_of(args)).crc
     finally:
         os.chdir(before)

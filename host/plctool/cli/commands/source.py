@@ -1,51 +1,67 @@
-"""What `plctool files` and `plctool source` do; each returns its JSON document."""
+"""`plctool source`: the sources of the program, kept on the device."""
 
 from __future__ import annotations
 
+import argparse
 import gzip
 import shlex
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from plctool.cli.io_documents import Document
-from plctool.cli.source_archive import Archive, archive_of, unpacked
+from plctool.cli.arguments import (
+    add_board,
+    add_build_options,
+    add_dialect,
+    add_io_files,
+    add_link,
+    add_sources,
+    add_target,
+)
+from plctool.cli.builds import settings_with_dialect
+from plctool.cli.connections import ShowProgress, with_progress
+from plctool.cli.documents import Document
+from plctool.cli.overwriting import output_or
+from plctool.cli.parser import Parser
+from plctool.cli.source_archive import archive_of, unpacked
 from plctool.debug.symbols import find_symbols
-from plctool.errors import DeviceError, UsageError
-from plctool.files import write_output
+from plctool.errors import DeviceError
+from plctool.files import file_path
 from plctool.link.file_services import SOURCE_NAME, SYMBOLS_NAME
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
+    from plctool.cli.source_archive import Archive
     from plctool.device import Plc
 
-Progress = Callable[[int, int], None]
+
+def source_arguments(command: Parser) -> None:
+    action = command.adder_of_actions()
+    get = action("get", "write the sources that the device keeps into a folder", _get)
+    get.add_argument("-o", "--output", type=file_path, metavar="DIR", help="default: source")
+    add_link(get)
+    put = action("put", "put the sources of the program that is on the device there as well", _put)
+    put.set_defaults(no_warn=[], werror=None)
+    add_sources(put)
+    add_target(put, "processor, where it is not that of the board in plc.toml")
+    add_board(put, "that the program was built for, such as mps2-an385/full")
+    add_build_options(put)
+    add_dialect(put)
+    add_io_files(put)
+    add_link(put)
 
 
-def list_files(plc: Plc) -> Document:
-    found = plc.files()
-    files = [{"name": f.name, "size": f.size, "crc": f"{f.crc:08X}", "fixed": f.fixed} for f in found.files]
-    return {"files": files, "room": found.room}
+def _get(args: argparse.Namespace) -> int:
+    folder = output_or(args, "source")
+    return with_progress(args, lambda plc, show: get_source(plc, folder, show), source_text)
 
 
-def get_file(plc: Plc, name: str, path: Path, progress: Progress) -> Document:
-    data = plc.read_file(name, progress)
-    write_output(path, data)
-    return {"name": name, "file": str(path), "size": len(data)}
-
-
-def put_file(plc: Plc, path: Path, name: str | None, progress: Progress) -> Document:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise UsageError(f"{path} cannot be read: {error.strerror}.", "no-file") from None
-    plc.write_file(name or path.name, data, progress)
-    return {"name": name or path.name, "file": str(path), "size": len(data)}
-
-
-def delete_file(plc: Plc, name: str) -> Document:
-    plc.delete_file(name)
-    return {"name": name, "deleted": True}
+def _put(args: argparse.Namespace) -> int:
+    settings = settings_with_dialect(args)
+    return with_progress(
+        args,
+        lambda plc, show: put_source(plc, settings, show),
+        lambda d: f"{len(d['files'])} files of the program with CRC {d['crc']} are on the device.",
+    )
 
 
 def prepared_source(settings: Settings, crc: int, image: Path | None = None) -> tuple[Archive, bytes]:
@@ -56,7 +72,9 @@ def prepared_source(settings: Settings, crc: int, image: Path | None = None) -> 
     return archive_of(settings, crc, symbols.target), gzip.compress(text, mtime=0)
 
 
-def store_source(plc: Plc, prepared: tuple[Archive, bytes], progress: Progress = lambda done, total: None) -> Document:
+def store_source(
+    plc: Plc, prepared: tuple[Archive, bytes], progress: ShowProgress = lambda done, total: None
+) -> Document:
     """Puts sources and symbols on a device."""
     archive, symbols = prepared
     data = archive.pack()
@@ -65,12 +83,12 @@ def store_source(plc: Plc, prepared: tuple[Archive, bytes], progress: Progress =
     return {"crc": f"{archive.crc:08X}", "files": sorted(archive.files), "bytes": len(data) + len(symbols)}
 
 
-def put_source(plc: Plc, settings: Settings, progress: Progress) -> Document:
+def put_source(plc: Plc, settings: Settings, progress: ShowProgress) -> Document:
     """The sources of the program that is on the device."""
     return store_source(plc, prepared_source(settings, _program(plc)), progress)
 
 
-def get_source(plc: Plc, output: Path, progress: Progress) -> Document:
+def get_source(plc: Plc, output: Path, progress: ShowProgress) -> Document:
     """Raises DeviceError when they are those of another program."""
     crc = _program(plc)
     archive = unpacked(plc.read_file(SOURCE_NAME, progress))
@@ -94,11 +112,6 @@ def _program(plc: Plc) -> int:
     if crc == 0:
         raise DeviceError("The device has no program; flash one first.", "app-not-loaded")
     return crc
-
-
-def list_text(document: Document) -> str:
-    lines = [f"{f['size']:>9}  {f['name']}{'  (made by the device)' if f['fixed'] else ''}" for f in document["files"]]
-    return "\n".join([*lines, f"{document['room']:>9}  bytes are free for one more file"])
 
 
 def source_text(document: Document) -> str:

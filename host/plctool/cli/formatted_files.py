@@ -11,22 +11,22 @@ from functools import cache
 from pathlib import Path
 from typing import BinaryIO
 
-from plctool.cli.io_documents import Document
+from plctool.cli.documents import Document
 from plctool.compiler import program_files
 from plctool.compiler.base.garbage import no_collection
 from plctool.compiler.formats import unreadable
 from plctool.compiler.sources.project import read_project
 from plctool.compiler.sources.source_files import READERS, TEXTS, encoding_of
-from plctool.errors import PlcError, UsageError, counted, listed
+from plctool.errors import PlcError, UsageError, listed
 from plctool.files import check_inside, read_regular, write_atomically
 from plctool.fmt.formatter import DEFAULT_WIDTH, Range, formatted
 from plctool.project import find_project, project_named
 
 MAX_FORMATTED = 2 << 20
 """Bytes of a file that is formatted; the compiler reads larger ones."""
-_CHANGED = ("formatted", "not formatted")
+CHANGED = ("formatted", "not formatted")
 _INPUT = "<stdin>"  # the name of the standard input in messages
-_TEXT_ONLY = f"plctool fmt formats Structured Text in files {listed(TEXTS, 'and')}"
+TEXT_ONLY = f"plctool fmt formats Structured Text in files {listed(TEXTS, 'and')}"
 
 
 @dataclass(frozen=True)
@@ -59,30 +59,8 @@ def format_input(stream: BinaryIO, ranges: Sequence[Range], *, writes: bool) -> 
     return _document([entry]), result.after
 
 
-def complaints(document: Document) -> list[str]:
-    """What to say of files that could not be formatted."""
-    return [file["message"] for file in document["files"] if file["state"] == "refused"]
-
-
-def shown_text(document: Document, *, diff: bool) -> str:
-    """A line for each file that is not formatted, or the differences, and the counts."""
-    changed = [file for file in document["files"] if file["state"] in _CHANGED]
-    if diff:
-        return "\n".join(file["diff"].rstrip("\n") for file in changed)
-    lines = [f"{file['file']}: {file['state']}" for file in changed]
-    texts = [file for file in document["files"] if file["state"] in (*_CHANGED, "unchanged")]
-    if changed:
-        lines.append(f"{len(changed)} of {counted(len(texts), 'file')} {changed[0]['state']}.")
-    elif texts:
-        lines.append(f"{counted(len(texts), 'file')} formatted already.")
-    if left := [Path(file["file"]) for file in document["files"] if file["state"] == "left"]:
-        kinds = listed(sorted({path.suffix or path.name for path in left}))
-        lines.append(f"{counted(len(left), 'file')} ({kinds}) left as written: {_TEXT_ONLY}.")
-    return "\n".join(lines)
-
-
 def _document(files: list[Document]) -> Document:
-    return {"changed": sum(file["state"] in _CHANGED for file in files), "files": files}
+    return {"changed": sum(file["state"] in CHANGED for file in files), "files": files}
 
 
 def _files(sources: Sequence[Path]) -> Iterator[Path]:
@@ -103,7 +81,7 @@ def _files_of(source: Path) -> Sequence[Path]:
         return [source]
     files = sorted(path for path in source.rglob("*") if path.suffix.lower() in READERS and path.is_file())
     if not files:
-        raise UsageError(f"The folder {source} has no sources; {_TEXT_ONLY}.", "no-source")
+        raise UsageError(f"The folder {source} has no sources; {TEXT_ONLY}.", "no-source")
     for file in files:
         check_inside(file, source)
     return files

@@ -1,0 +1,207 @@
+"""`plctool status`, `start`, `log` and others: one request to a device."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from plctool.cli.arguments import add_link, utf8
+from plctool.cli.connections import on_device
+from plctool.cli.documents import Document
+from plctool.cli.output import table
+from plctool.cli.parser import Parser
+from plctool.controller_documents import log, program_document, status_document, tasks
+
+if TYPE_CHECKING:
+    from plctool.device import Plc
+
+_LOG_COLUMN = 27  # where the text of a log entry begins
+
+
+def status_arguments(command: Parser) -> None:
+    add_link(command)
+    command.set_defaults(action=_status)
+
+
+def start_arguments(command: Parser) -> None:
+    add_link(command)
+    command.set_defaults(action=_start)
+
+
+def stop_arguments(command: Parser) -> None:
+    add_link(command)
+    command.set_defaults(action=_stop)
+
+
+def cycle_arguments(command: Parser) -> None:
+    add_link(command)
+    command.set_defaults(action=_cycle)
+
+
+def reset_arguments(command: Parser) -> None:
+    command.add_argument(
+        "option", choices=["warm", "cold", "origin"], metavar="warm|cold|origin",
+        help="warm keeps RETAIN variables, cold only PERSISTENT ones, origin deletes the program",
+    )  # fmt: skip
+    add_link(command)
+    command.set_defaults(action=_reset)
+
+
+def tasks_arguments(command: Parser) -> None:
+    add_link(command)
+    command.set_defaults(action=_tasks)
+
+
+def log_arguments(command: Parser) -> None:
+    add_link(command)
+    command.set_defaults(action=_log)
+
+
+def shell_arguments(command: Parser) -> None:
+    add_link(command)
+    command.add_argument(
+        "words", nargs="+", type=utf8, metavar="COMMAND", help="for example ?, rtsinfo, tasklist, plcload"
+    )
+    command.set_defaults(action=_shell)
+
+
+def passwd_arguments(command: Parser) -> None:
+    add_link(command)
+    command.add_argument("--remove", action="store_true", help="every tool that reaches the device may use it again")
+    command.add_argument(
+        "--new-password-file", type=Path, metavar="FILE",
+        help="its first line; else the environment's PLC_NEW_PASSWORD, or what you type",
+    )  # fmt: skip
+    command.set_defaults(action=_passwd)
+
+
+def _status(args: argparse.Namespace) -> int:
+    return on_device(args, status, status_text)
+
+
+def status(plc: Plc) -> Document:
+    """Returns the state of the program, with the name and version that plc.toml gave it."""
+    status = plc.status()
+    return status_document(status) | {"program": program_document(plc) if status.image_crc else None}
+
+
+def status_text(document: dict[str, Any]) -> str:
+    lines = [f"state: {document['state']}"]
+    if program := document.get("program"):
+        lines.append(f"program: {' '.join(filter(None, program.values()))}")
+    if document["image_crc"]:
+        lines.append(f"image: {document['image_crc']}")
+    if exception := document["exception"]:
+        task = f" in task {exception['task']}" if exception["task"] else ""
+        where = f"{place_text(exception)}{detail_text(exception)}{calls_text(exception)}"
+        lines.append(f"exception: {exception['name']}{task}{where}")
+    if document["forced"]:
+        lines.append(f"forced: {', '.join(document['forced'])}")
+    return "\n".join(lines)
+
+
+def _start(args: argparse.Namespace) -> int:
+    return on_device(args, start, status_text)
+
+
+def start(plc: Plc) -> Document:
+    """Starts the program; the state that it leads to."""
+    plc.start()
+    return status(plc)
+
+
+def _stop(args: argparse.Namespace) -> int:
+    return on_device(args, stop, status_text)
+
+
+def stop(plc: Plc) -> Document:
+    """Stops the program; the state that it leads to."""
+    plc.stop()
+    return status(plc)
+
+
+def _cycle(args: argparse.Namespace) -> int:
+    return on_device(args, cycle, status_text)
+
+
+def cycle(plc: Plc) -> Document:
+    """Runs one cycle of a stopped program; the state that it leads to."""
+    plc.cycle()
+    return status(plc)
+
+
+def _reset(args: argparse.Namespace) -> int:
+    return on_device(args, lambda plc: reset(plc, args.option), status_text)
+
+
+def reset(plc: Plc, option: str) -> Document:
+    """Resets the program; the state that it leads to."""
+    plc.reset(option)
+    return status(plc)
+
+
+def _tasks(args: argparse.Namespace) -> int:
+    return on_device(args, tasks, tasks_text)
+
+
+def tasks_text(document: dict[str, Any]) -> str:
+    """A line for each task."""
+    columns = ("name", "cycles", "last_us", "avg_us", "min_us", "max_us", "jitter_us", "overruns")
+    return table(document["tasks"], columns)
+
+
+def _log(args: argparse.Namespace) -> int:
+    return on_device(args, log, log_text)
+
+
+def log_text(document: dict[str, Any]) -> str:
+    return "\n".join(
+        f"{e['time_s']:12.6f} s  {e['class']:<9}  {e['component']}: {e['text']}{place_text(e)}"
+        f"{detail_text(e)}{calls_text(e, _LOG_COLUMN)}"
+        for e in document["entries"]
+    )
+
+
+def place_text(place: dict[str, Any]) -> str:
+    """`, Main, main.st:12` for what has a source line, else nothing."""
+    return f", {place['pou']}, {place['file']}:{place['line']}" if place.get("file") else ""
+
+
+def detail_text(place: dict[str, Any]) -> str:
+    """What is known of an exception besides its location."""
+    return f": {place['detail']}" if place.get("detail") else ""
+
+
+def calls_text(place: dict[str, Any], column: int = 2) -> str:
+    """A line for each call that led to a location, indented to a column."""
+    return "".join(
+        f"\n{'':{column}}called from {call['pou']}, {call['file']}:{call['line']}" for call in place.get("calls", [])
+    )
+
+
+def _shell(args: argparse.Namespace) -> int:
+    return on_device(args, lambda plc: shell(plc, " ".join(args.words)), lambda d: str(d["answer"]))
+
+
+def shell(plc: Plc, command: str) -> Document:
+    """What the device's PLC shell answers."""
+    return {"command": command, "answer": plc.shell(command)}
+
+
+def _passwd(args: argparse.Namespace) -> int:
+    from plctool.cli.passwords import new_password
+
+    def change(plc: Plc) -> Document:
+        plc.raw_status()  # asks for the present one first
+        return passwd(plc, None if args.remove else new_password(args.new_password_file))
+
+    return on_device(
+        args, change, lambda d: "The password is set." if d["password"] else "The device has no password now."
+    )
+
+
+def passwd(plc: Plc, password: str | None) -> Document:
+    """Sets or removes the password; whether there is one now."""
+    plc.set_password(password)
+    return {"password": password is not None}
