@@ -3,41 +3,22 @@
 from __future__ import annotations
 
 import itertools
-import json
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import canopen
 import pytest
 
-from plctool.cli import main as cli
+sys.path.append(str(Path(__file__).parents[1]))
+
+from done import Done, run_here
 
 VALVES = Path(__file__).parents[2] / "examples/canopen/valves.eds"
 NODE = 5
 _channels = itertools.count()
-
-
-@dataclass
-class Done:
-    """What a command left."""
-
-    status: int
-    out: str
-    err: str
-
-    @property
-    def json(self) -> Any:
-        """The one document on stdout."""
-        return json.loads(self.out)
-
-    @property
-    def lines(self) -> list[Any]:
-        """A document of each line."""
-        return [json.loads(line) for line in self.out.splitlines()]
 
 
 Tool = Callable[..., Done]
@@ -62,10 +43,7 @@ def tool(channel: str, capsys: pytest.CaptureFixture[str]) -> Tool:
     """Runs `plctool canopen` on the bus of the test."""
 
     def run(*words: str) -> Done:
-        capsys.readouterr()
-        status = cli.main(["canopen", *words, "--can", f"virtual:{channel}"])
-        captured = capsys.readouterr()
-        return Done(status, captured.out, captured.err)
+        return run_here(capsys, "canopen", *words, "--can", f"virtual:{channel}")
 
     return run
 

@@ -2,39 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+sys.path.append(str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "link"))
 
+from done import Done, run_here
 from fake_device import FakeDevice, FakeLine, FakePlc
 from small_app import make_application
 
-from plctool.cli import main as cli
 from plctool.debug.symbols import symbol_path
 from plctool.link.transport import BlockTransport
 from plctool.link.transports import TRANSPORTS, Link
-
-
-@dataclass
-class Done:
-    """What a command left."""
-
-    status: int
-    out: str
-    err: str
-
-    @property
-    def json(self) -> Any:
-        """The one document on stdout."""
-        return json.loads(self.out)
-
 
 Tool = Callable[..., Done]
 
@@ -53,10 +37,7 @@ def tool(capsys: pytest.CaptureFixture[str]) -> Tool:
     """Runs plctool with the given words."""
 
     def run(*words: str) -> Done:
-        capsys.readouterr()
-        status = cli.main(words)
-        captured = capsys.readouterr()
-        return Done(status, captured.out, captured.err)
+        return run_here(capsys, *words)
 
     return run
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import pytest
 
-from plctool.cli import main as cli
+sys.path.append(str(Path(__file__).parents[1]))
+
+from done import run_here
 
 
 class Tool:
@@ -15,10 +20,8 @@ class Tool:
 
     def __call__(self, *words: str) -> tuple[int, str]:
         """Exit status, and all that it said."""
-        self._capsys.readouterr()
-        status = cli.main(words)
-        captured = self._capsys.readouterr()
-        return status, captured.out + captured.err
+        done = run_here(self._capsys, *words)
+        return done.status, done.out + done.err
 
 
 @pytest.fixture

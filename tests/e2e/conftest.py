@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
@@ -16,23 +15,11 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
+from done import Done
 from plctool_commands import run_plctool
 
 from plctool.testing import waiting
 from plctool.testing.plcrt import Plcrt, find_plcrt
-
-
-@dataclass
-class Done:
-    """What a command left: its exit status, and its JSON document or its output."""
-
-    status: int
-    out: str
-    err: str
-
-    @property
-    def json(self) -> Any:
-        return json.loads(self.out)
 
 
 @dataclass
