@@ -20,7 +20,7 @@ from plctool.cli.commands import GROUPS, ROWS, Row
 from plctool.cli.parser import LINK_GROUP, Parser
 
 FOLDER = Path(plctool.cli.commands.__file__).parent
-MODULES = sorted(file.stem for file in FOLDER.glob("*.py") if file.stem != "__init__")
+MODULES = sorted(path.stem for path in FOLDER.iterdir() if not path.stem.startswith("__"))
 EVERYDAY = ("build", "check", "test", "run", "flash", "status", "read", "write", "force", "watch")
 WITHOUT_LINK = ("new", "build", "check", "run", "test", "io map", "canopen scan", "gateway", "man")
 
