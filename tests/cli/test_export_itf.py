@@ -122,6 +122,23 @@ def test_a_packed_structure_is_packed_in_c(tool: Tool) -> None:
 
 
 @needs_compiler
+def test_bits_of_a_structure_are_bit_fields(tool: Tool) -> None:
+    """The header itself asserts the size; the frame is made to return what it finds in memory."""
+    export(
+        tool,
+        "TYPE Bits : STRUCT a, b, c, d, e, f, g, h, ninth : BIT; n : INT; last : BIT; END_STRUCT END_TYPE\n"
+        "{attribute 'external' := 'take'}\nFUNCTION Take\nVAR_INPUT v : Bits; END_VAR\nEND_FUNCTION\n",
+    )
+    Path("bits.c").write_text(
+        '#include "sensorsItf.h"\n#include <string.h>\n'
+        "int main(void) { unsigned char m[] = {0x04, 0x01, 0x34, 0x12, 0x01, 0}; Bits v; memcpy(&v, m, sizeof v); "
+        "return v.c && !v.b && v.ninth && v.n == 0x1234 && v.last ? 0 : 1; }\n"
+    )
+    compile_c("bits.c", "-o", "bits")
+    subprocess.run(["./bits"], check=True)
+
+
+@needs_compiler
 def test_types_of_one_name_in_two_namespaces_are_two_in_c(tool: Tool) -> None:
     types = "TYPE Mode : (Off, {0});\nConfig : STRUCT pad : {1}; mode : Mode; END_STRUCT; END_TYPE"
     spaces = {"Press": ("Down", "INT"), "Oven": ("Hot", "LINT")}

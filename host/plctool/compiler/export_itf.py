@@ -21,6 +21,7 @@ from plctool.iec.types import (
     ArrayType,
     Elementary,
     EnumType,
+    Field,
     Kind,
     PointerType,
     StringType,
@@ -238,14 +239,21 @@ def _type_lines(t: EnumType | StructType) -> Iterable[str]:
     name, packed = _type_name(t), t.pack < MAX_ALIGN
     lines = [f"#pragma pack(push, {t.pack})"] if packed else []
     lines += ["typedef union {" if t.union else "typedef struct {"]
-    lines += [f"    {_field(f.type, c_name(f.name))};" for f in t.fields]
+    lines += [f"    {_member(f)};" for f in t.fields]
     lines += [f"}} {name};", *(["#pragma pack(pop)"] if packed else [])]
     lines += [f"RTS_STATIC_ASSERT(sizeof({name}) == {t.size}, {name}_size);"]
     lines += [
         f"RTS_STATIC_ASSERT(offsetof({name}, {c_name(f.name)}) == {f.offset}, {name}_{c_name(f.name)});"
         for f in t.fields
+        if f.bit is None
     ]
     return lines
+
+
+def _member(f: Field) -> str:
+    """A member of a struct; a BIT is a bit-field of a byte, which C99 leaves to the compiler."""
+    text = _field(f.type, c_name(f.name))
+    return text if f.bit is None else f"__extension__ {text} : 1"
 
 
 def _field(t: Type, name: str) -> str:

@@ -18,6 +18,7 @@ from plctool.iec.types import (
     ArrayType,
     Elementary,
     EnumType,
+    Field,
     InterfaceType,
     Kind,
     OpenArrayType,
@@ -113,6 +114,11 @@ class Symbol:
         fixed = None if self.fixed is None else self.fixed[offset : offset + t.size]
         return replace(self, name=name, offset=self.offset + offset, type=t, fixed=fixed)
 
+    def member(self, f: Field) -> Symbol:
+        """A member of a struct or an instance; a BIT is a bit of its byte."""
+        part = self.part(f"{self.name}.{f.name}", f.offset, f.type)
+        return part if f.bit is None else replace(part, type=ELEMENTARY["BYTE"], bit=f.bit)
+
     def target(self, name: str, t: Type) -> Symbol:
         """What this pointer leads to."""
         return Symbol(name, self.area, 0, t, None, self)
@@ -126,7 +132,7 @@ class Symbol:
         t = self.type
         if isinstance(t, StructType):
             for f in t.fields:
-                yield self.part(f"{self.name}.{f.name}", f.offset, f.type)
+                yield self.member(f)
         elif isinstance(t, ArrayType):
             for i, index in enumerate(_indices(t)):
                 yield self.part(f"{self.name}[{index}]", i * t.element.size, t.element)
@@ -237,7 +243,7 @@ def _member(symbol: Symbol, member: str, name: str, units: Units) -> Symbol:
         raise UsageError(f"{name} is a property: only the program can read it, by a call.", "property")
     if found is None:
         raise units.no_variable(name, t.name, [f"{symbol.name}.{f.name}" for f in t.fields])
-    return symbol.part(f"{symbol.name}.{found.name}", found.offset, found.type)
+    return symbol.member(found)
 
 
 def _target(symbol: Symbol) -> Symbol:

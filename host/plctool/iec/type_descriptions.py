@@ -60,11 +60,16 @@ def _describe(t: Type, types: dict[str, Any]) -> list[Type]:
         return [t.target]
     elif isinstance(t, StructType):
         entry.update(kind="struct", size=t.size, align=t.align, union=t.union)
-        entry["fields"] = [[f.name, f.type.name, f.offset] for f in t.fields]
+        entry["fields"] = [_field_entry(f) for f in t.fields]
         if t.properties:
             entry["properties"] = t.properties
         return [f.type for f in t.fields]
     return []
+
+
+def _field_entry(f: Field) -> list[Any]:
+    """Name, type and offset; of a BIT also its bit."""
+    return [f.name, f.type.name, f.offset, *([] if f.bit is None else [f.bit])]
 
 
 class DescribedTypes:
@@ -100,5 +105,7 @@ class DescribedTypes:
         struct = StructType(name, union=entry["union"], _size=entry["size"], _align=entry["align"])
         struct.properties = entry.get("properties", [])
         self._made[name] = struct  # references may lead back to it
-        struct.fields = [Field(n, self.get(t), offset) for n, t, offset in entry["fields"]]
+        struct.fields = [
+            Field(n, self.get(t), offset, bit=bit[0] if bit else None) for n, t, offset, *bit in entry["fields"]
+        ]
         return struct

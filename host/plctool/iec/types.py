@@ -28,6 +28,7 @@ class Kind(Enum):
 
 
 MAX_ALIGN = 8  # bytes: no type wants more
+BITS_OF_BYTE = 8
 
 
 class Type:
@@ -305,13 +306,15 @@ class Keep(Enum):
 
 @dataclass
 class Field:
-    """A member of a struct or function block; `offset` in bytes is set by `lay_out`. `alias`: a second name."""
+    """A member of a struct or function block; `offset` in bytes is set by `lay_out`. `alias`: a second name. `bit`: of
+    a BIT, its number in the byte at `offset` (-1 before `lay_out`); `type` is BOOL then."""
 
     name: str
     type: Type
     offset: int = -1
     alias: str = ""
     keep: Keep = Keep.UNSAID
+    bit: int | None = None
 
     @property
     def hidden(self) -> bool:
@@ -359,9 +362,17 @@ class StructType(Type):
             end, align, own = self.base.size, self.base.align, self.fields[len(self.base.fields) :]
             for f, of_base in zip(self.fields, self.base.fields, strict=False):
                 f.offset = of_base.offset
+        free = BITS_OF_BYTE  # the next bit of the last byte
         for f in own:
             multiple = min(f.type.align, self.pack)
             f.offset = 0 if self.union else align_up(end, multiple)
+            if f.bit is None or self.union:
+                free = BITS_OF_BYTE
+                f.bit = None if f.bit is None else 0
+            elif free < BITS_OF_BYTE:
+                f.offset, f.bit, free = end - 1, free, free + 1
+            else:
+                f.bit, free = 0, 1
             end = max(end, f.offset + f.type.size)
             align = max(align, multiple)
         self._align = align

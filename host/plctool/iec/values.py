@@ -17,6 +17,7 @@ from plctool.iec.types import (
     ArrayType,
     Elementary,
     EnumType,
+    Field,
     Kind,
     PointerType,
     StringType,
@@ -36,7 +37,7 @@ def decode(t: Type, data: bytes) -> Any:
         items = [decode(t.element, data[i * size : (i + 1) * size]) for i in range(t.count)]
         return _nest(items, [high - low + 1 for low, high in t.bounds])
     if isinstance(t, StructType):
-        return {f.name: decode(f.type, data[f.offset : f.offset + f.type.size]) for f in t.fields if not f.hidden}
+        return {f.name: _decode_member(f, data) for f in t.fields if not f.hidden}
     if isinstance(t, StringType):
         return _decode_text(t, data)
     if isinstance(t, PointerType):
@@ -53,6 +54,12 @@ def decode(t: Type, data: bytes) -> Any:
     if base.kind is Kind.CHAR:
         return chr(number) if number else ""
     return decoded(base, number)
+
+
+def _decode_member(f: Field, data: bytes) -> Any:
+    if f.bit is not None:
+        return bool(data[f.offset] >> f.bit & 1)
+    return decode(f.type, data[f.offset : f.offset + f.type.size])
 
 
 def _decode_text(t: StringType, data: bytes) -> str:
@@ -139,7 +146,11 @@ def _encode_struct(t: StructType, value: Any) -> bytes:
         if f.name not in value:
             hint = "supply every member, or write members individually"
             raise UsageError(f"The member {f.name} of {t} has no value; {hint}.", "bad-value")
-        data[f.offset : f.offset + f.type.size] = encode(f.type, value[f.name])
+        encoded = encode(f.type, value[f.name])
+        if f.bit is None:
+            data[f.offset : f.offset + f.type.size] = encoded
+        else:
+            data[f.offset] |= encoded[0] << f.bit
     return bytes(data)
 
 

@@ -9,6 +9,7 @@ image.
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 
 from plctool.compiler.codegen.ir import Value, round_to_single
 from plctool.compiler.codegen.lower_arith import constant
@@ -16,7 +17,7 @@ from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.codegen.lower_string import copy_literal, encode_text
 from plctool.compiler.codegen.lower_unit import Unit
 from plctool.compiler.typed.nodes import Initial, ScalarInit, array_runs, struct_members
-from plctool.iec.types import ArrayType, Elementary, Kind, StringType, StructType, Type, base_of, is_scalar
+from plctool.iec.types import BYTE, ArrayType, Elementary, Kind, StringType, StructType, Type, base_of, is_scalar
 
 _LOOP_FROM = 5  # equal scalars that are worth a loop
 _CONSTANT_FROM = 4  # different scalars that are worth a constant
@@ -43,7 +44,11 @@ def image_of(unit: Unit, t: Type, initial: Initial | None) -> bytes:
     data = bytearray(t.size)
     if isinstance(t, StructType):
         for f, value in struct_members(t, initial, unit.defaults.get(t.name)):
-            data[f.offset : f.offset + f.type.size] = image_of(unit, f.type, value)
+            member = image_of(unit, f.type, value)
+            if f.bit is None:
+                data[f.offset : f.offset + f.type.size] = member
+            else:
+                data[f.offset] |= member[0] << f.bit
     return bytes(data)
 
 
@@ -76,7 +81,8 @@ def _initialise_struct(frame: Frame, ref: Ref, t: StructType, initial: Initial |
 
 def initialise_members(frame: Frame, ref: Ref, t: StructType, initial: Initial | None) -> None:
     for f, value in struct_members(t, initial, frame.unit.defaults.get(t.name)):
-        initialise(frame, ref.member(f.offset, f.type), value)
+        member = ref.member(f.offset, f.type)
+        initialise(frame, member if f.bit is None else replace(member, type=BYTE, bit=f.bit), value)
 
 
 def _initialise_array(frame: Frame, ref: Ref, t: ArrayType, initial: Initial | None) -> None:

@@ -55,6 +55,7 @@ from plctool.compiler.typed.nodes import (
     Variable,
     VarPlace,
     array_runs,
+    member_place,
     overlay,
     runtime_function,
 )
@@ -161,7 +162,7 @@ class Construction:
         statements: list[Statement] = []
         named = path_members(self._world, t)
         for f in t.fields:
-            part, own = MemberPlace(place, f.offset, f.type, pos), None if keep is None else keep.of_member(f.keep)
+            part, own = member_place(place, f, pos), None if keep is None else keep.of_member(f.keep)
             statements += self.place(part, complete.members.get(f.name), pos, own, f"{path}.{f.name}")
             if f.name.casefold() in named and isinstance(f.type, StringType):
                 statements.append(Assign(part, Const(path[: f.type.length], f.type, pos), pos))
@@ -284,7 +285,7 @@ class Destruction:
         assert isinstance(t, StructType)
         statements = [self._call(member, place) for member in finalisers(self._world, t)]
         for f in reversed(t.fields):
-            statements += self.place(MemberPlace(place, f.offset, f.type, pos))
+            statements += self.place(member_place(place, f, pos))
         return statements
 
     def _call(self, member: Member, place: Place) -> Statement:

@@ -10,12 +10,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import groupby, product
 
 from plctool.compiler.typed.nodes import Variable
 from plctool.core import lib
 from plctool.errors import UsageError
 from plctool.iec.types import (
+    BYTE,
     ArrayType,
     Elementary,
     EnumType,
@@ -103,11 +104,20 @@ def _parts(t: Type, keep: Keep) -> Iterator[KeptPart]:
     if isinstance(t, ArrayType):
         yield from _elements(t, keep)
     elif isinstance(t, StructType) and not t.union:
-        for f in t.fields:
+        for f in _members(t):
             for part in _parts(f.type, keep.of_member(f.keep)) if _is_data(f) else ():
                 yield replace(part, name=f".{f.name}{part.name}", offset=f.offset + part.offset)
     elif keep.kept and not _has_address(t):
         yield KeptPart("", _type_text(t), 0, t.size, keep is Keep.PERSISTENT)
+
+
+def _members(t: StructType) -> Iterator[Field]:
+    """The members; of BITs their bytes, each with the names of all its bits: where one is added, none of them is taken
+    for another."""
+    for _, group in groupby(t.fields, lambda f: f.name if f.bit is None else f.offset):
+        first, *others = group
+        names = "+".join(f.name for f in (first, *others))
+        yield Field(names, BYTE, first.offset) if first.bit is not None else first
 
 
 def _is_data(field: Field) -> bool:
@@ -152,6 +162,6 @@ def _type_text(t: Type) -> str:
     if isinstance(t, ArrayType):
         return f"{t.bounds}{_type_text(t.element)}"
     if isinstance(t, StructType):
-        return f"({','.join(f'{f.offset}{_type_text(f.type)}' for f in t.fields)})"
+        return f"({','.join(f'{f.offset}{_type_text(f.type)}' for f in _members(t))})"
     assert isinstance(t, Elementary)
     return t.name

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from plctool.files import Pos as Pos
 from plctool.iec.areas import Area
-from plctool.iec.types import ArrayType, Field, Keep, StructType, Type
+from plctool.iec.types import BYTE, ArrayType, Field, Keep, StructType, Type
 from plctool.image.c_functions import C_FUNCTIONS, VERSION
 
 if TYPE_CHECKING:
@@ -216,6 +216,13 @@ class SelfPlace(Node):
     type: Type
     pos: Pos
     exact: bool = False
+
+
+def member_place(base: Place, f: Field, pos: Pos) -> Place:
+    """A member of a struct or an instance; a BIT is a bit of its byte."""
+    if f.bit is None:
+        return MemberPlace(base, f.offset, f.type, pos)
+    return BitPlace(MemberPlace(base, f.offset, BYTE, pos), f.bit, f.type, pos)
 
 
 Place = VarPlace | MemberPlace | IndexPlace | DerefPlace | BitPlace | ValuePlace | SelfPlace

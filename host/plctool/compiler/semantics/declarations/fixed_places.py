@@ -24,7 +24,7 @@ from plctool.compiler.typed.nodes import (
     array_runs,
     overlay,
 )  # fmt: skip
-from plctool.iec.types import ArrayType, StructType, Type
+from plctool.iec.types import BYTE, ArrayType, Field, StructType, Type
 
 Step = str | int  # the name of a member, or the number of an element from 0
 
@@ -39,6 +39,11 @@ class FixedPlace:
     bit: int | None = None
 
 
+def _is_of(f: Field, place: MemberPlace) -> bool:
+    """Whether a place is the member, or the byte that the member is a bit of."""
+    return place.type is (BYTE if f.bit is not None else f.type)
+
+
 def fixed_place(place: Place) -> FixedPlace | None:
     """Where a place is; None when that is only known when it runs."""
     if isinstance(place, VarPlace):
@@ -51,8 +56,7 @@ def fixed_place(place: Place) -> FixedPlace | None:
     if isinstance(place, BitPlace):
         found.bit = place.bit
     elif isinstance(place, MemberPlace) and isinstance(t, StructType):
-        name = next(f.name for f in t.fields if f.offset == place.offset and f.type == place.type)
-        found.steps.append(name)
+        found.steps.append(next(f.name for f in t.fields if f.offset == place.offset and _is_of(f, place)))
         found.offset += place.offset
     elif isinstance(place, IndexPlace) and isinstance(t, ArrayType):
         number = _element_number(place)

@@ -61,6 +61,12 @@ class May(Flag):
     HAVE_OPEN_ADDRESS = auto()  # AT %I*
     BE_EDGE = auto()  # BOOL R_EDGE
     BE_OPEN_ARRAY = auto()  # ARRAY[*]
+    BE_BIT = auto()  # BIT, which shares its byte with its neighbours
+
+
+def is_packed_bit(decl: ast.VarDecl) -> bool:
+    """Whether a member of a struct is a BIT without an address of its own."""
+    return isinstance(decl.type, ast.NamedType) and decl.type.name.upper() == "BIT" and decl.location is None
 
 
 class TypeDeclarations:
@@ -95,7 +101,8 @@ class TypeDeclarations:
         spec, inits = with_arguments(decl)
         if isinstance(spec, ast.ArraySpec) and None in spec.bounds and May.BE_OPEN_ARRAY in may:
             return self._open_array(spec, scope), None
-        t, default = self.type_of(spec, scope)
+        is_bit = May.BE_BIT in may and is_packed_bit(decl)
+        t, default = (BOOL, None) if is_bit else self.type_of(spec, scope)
         if decl.edge and t is not BOOL and t is not ERROR:
             scope.error(spec.pos, "type", f"{decl.edge} is for a BOOL, not for {t}")
         values = [] if t is ERROR else [self._initials.initial(init, t, scope) for init in inits]
@@ -338,14 +345,14 @@ class TypeDeclarations:
         seen.update(f.name.casefold() for f in t.fields)
         located: dict[str, VarSymbol] = dict(self._world.open_members.get(t.base, {})) if t.base is not None else {}
         for decl in spec.fields:
-            field_type, default = self.declared_type(decl, scope, May.HAVE_OPEN_ADDRESS)
+            field_type, default = self.declared_type(decl, scope, May.HAVE_OPEN_ADDRESS | May.BE_BIT)
             require_instances(self._world, field_type, scope, decl.pos)
             for offset, field_name in decl.names:
                 if field_name.casefold() in seen:
                     scope.error(offset, "duplicate", f"{name} has a member {field_name} already")
                     continue
                 seen.add(field_name.casefold())
-                t.fields.append(Field(field_name, field_type))
+                t.fields.append(Field(field_name, field_type, bit=-1 if is_packed_bit(decl) else None))
                 if decl.location is not None and field_type is not ERROR:
                     symbol = VarSymbol(field_name, scope.pos(offset), field_type, Role.LOCAL, default=default)
                     symbol.variable = Variable(field_name, field_type, Storage.SELF, symbol.pos)
@@ -414,7 +421,7 @@ class TypeDeclarations:
         if not isinstance(base, StructType) or base in self._world.blocks or base.union is not t.union:
             scope.error(spec.pos, "type", f"{spec.name} is not a {'UNION' if t.union else 'STRUCT'}")
             return False
-        t.fields += [Field(f.name, f.type) for f in base.fields]
+        t.fields += [Field(f.name, f.type, bit=f.bit) for f in base.fields]
         t.base = base
         inherited = self._world.defaults.get(base.name)
         defaults.update(inherited.members if isinstance(inherited, StructInit) else {})

@@ -36,6 +36,7 @@ from plctool.compiler.typed.nodes import (
     SelfPlace,
     Storage,
     Variable,
+    member_place,
 )
 from plctool.iec.common_types import NUMBERS
 from plctool.iec.types import (
@@ -85,7 +86,7 @@ def member_of(c: Checker, base: Expr, node: ast.Member) -> Expr:
     if field is None:
         hint = did_you_mean(name, (f.name for f in t.fields))
         return c.error(node.name_pos, "unknown", f"{t} has no member {name}{hint}")
-    return load(MemberPlace(place_of(base), field.offset, field.type, c.pos(node.pos)))
+    return load(member_place(place_of(base), field, c.pos(node.pos)))
 
 
 def _block_member(c: Checker, base: Expr, members: dict[str, VarSymbol], node: ast.Member) -> Expr:
