@@ -26,6 +26,7 @@ SHARED = [
     "SysStart.h",
     "CmpAppEmbedded.h",
     "CmpForce.h",
+    "CmpOperationControl.h",
     "CmpIecTask.h",
     "CmpItf.h",
     "CmpLog.h",

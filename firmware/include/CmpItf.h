@@ -93,6 +93,7 @@ enum {
     CMPID_CmpFileTransfer = 0x002A,
     CMPID_SimModbus = 0x002B,
     CMPID_CmpForce = 0x002C,
+    CMPID_CmpOperationControl = 0x0030,
 };
 
 /* Name of a component, "" when unknown. */

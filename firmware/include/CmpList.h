@@ -97,6 +97,9 @@ enum {
 #if HAS_CmpMath
     CMP_ONE(CmpMath)
 #endif
+#if HAS_CmpOperationControl
+    CMP_ONE(CmpOperationControl)
+#endif
 #if HAS_IoDrvModbus
     CMP_ONE(IoDrvModbus)
 #endif

@@ -45,6 +45,9 @@ X(IoDrvModbus)
 #if HAS_CmpForce
 X(CmpForce)
 #endif
+#if HAS_CmpOperationControl
+X(CmpOperationControl)
+#endif
 #ifdef PORT_COMPONENTS
 PORT_COMPONENTS(X)
 #endif

@@ -280,7 +280,14 @@
 #define FORCE_MAX 0
 #endif
 
-/* Event callbacks that may be registered, all for components of a port but one of CmpForce; five words each. 0: the
+/* 1: a program may forbid operations of tools (CmpOperationControl.h). It needs HAS_CmpOperationControl in cmp_list.c, and
+ * one of EVENT_MAX_CALLBACKS. 0: no flash for it, and a program that does is refused. */
+#ifndef OPERATION_CONTROL
+#define OPERATION_CONTROL 0
+#endif
+
+/* Event callbacks that may be registered, all for components of a port but one each of CmpForce and
+ * CmpOperationControl; five words each. 0: the
  * application sends no events. */
 #ifndef EVENT_MAX_CALLBACKS
 #define EVENT_MAX_CALLBACKS 8

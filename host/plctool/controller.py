@@ -39,6 +39,9 @@ RESET_OPTIONS = {
     "origin": lib.RESET_OPTION_ORIGIN,
 }
 
+OPERATIONS = ("online change", "download", "stop", "breakpoint", "write", "force", "reset")
+"""What a program may forbid, by the number OPERATION_* (CmpOperationControl.h)."""
+
 
 @dataclass(frozen=True)
 class ExceptionInfo:
@@ -73,13 +76,14 @@ class ProgramStopped(DeviceError):
 @dataclass(frozen=True)
 class PlcStatus:
     """`state` is "run", "stop", "exception" or "none"; `image_crc` is 0 without application. `forced`: the names of
-    the variables that are forced."""
+    the variables that are forced. `forbidden`: the operations that the program forbids now, of OPERATIONS."""
 
     state: AppState
     image_crc: int
     image_size: int
     exception: ExceptionInfo | None
     forced: list[str] = field(default_factory=list)
+    forbidden: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -231,7 +235,8 @@ class Controller(ABC):
         status = self.raw_status()
         exception = self._explain(status.image_crc, status.exception) if status.exception else None
         forced = list(self._named_forces(status.image_crc)) if status.operating_state & lib.OS_FORCE_ACTIVE else []
-        return PlcStatus(status.state, status.image_crc, status.image_size, exception, forced)
+        forbidden = [name for bit, name in enumerate(OPERATIONS) if status.forbidden >> bit & 1]
+        return PlcStatus(status.state, status.image_crc, status.image_size, exception, forced, forbidden)
 
     def check_running(self) -> None:
         """Raises ProgramStopped when the application stopped with an exception."""

@@ -29,6 +29,7 @@ def status_document(status: PlcStatus) -> Document:
         "image_crc": None if status.state is AppState.NONE else f"{status.image_crc:08X}",
         "exception": None if status.exception is None else exception_document(status.exception),
         "forced": status.forced,
+        "forbidden": status.forbidden,
     }
 
 

@@ -152,7 +152,12 @@ class Simulator(Controller):
 
     # ---- the program ----
 
+    def _check_allowed(self, operation: int, action: str) -> None:
+        """As the services of a device do. Writing is always allowed: it stands for what happens at the inputs."""
+        l7.check_result(self._lib.OperationMay(operation), action)
+
     def _download(self, data: bytes, start: bool, restart: bool, progress: Callable[[int], None]) -> None:
+        self._check_allowed(lib.OPERATION_DOWNLOAD, "download")
         self._add_events(data)
         _check(self._lib.AppDownloadBegin(len(data), image_crc(data)), "The image is refused")
         _check(self._lib.AppDownloadWrite(0, data, len(data)), "The image cannot be stored")
@@ -183,12 +188,15 @@ class Simulator(Controller):
 
     def stop(self) -> None:
         self._application_crc()
+        self._check_allowed(lib.OPERATION_STOP, "stop")
         with self._functions.while_running():
             result = self._lib.AppStopApplication()
         l7.check_result(result, "stop")
 
     def _reset(self, option: int) -> None:
         self._application_crc()
+        if option != lib.RESET_OPTION_ORIGIN:
+            self._check_allowed(lib.OPERATION_RESET, "reset")
         with self._functions.while_running():
             result = self._lib.AppReset(option)
         l7.check_result(result, "reset")
@@ -210,7 +218,8 @@ class Simulator(Controller):
             found = self._lib.SysExceptGetTrace()
             trace = Trace.of((call.target, call.distance) for call in found.call[0 : found.count])
             exception = AppException.of(c.exception.code, c.exception.code_offset, c.exception.task, trace)
-        return Status(app_state(c.state, c.op_state), c.image_crc, c.image_size, exception, c.op_state)
+        state, forbidden = app_state(c.state, c.op_state), self._lib.OperationForbidden()
+        return Status(state, c.image_crc, c.image_size, exception, c.op_state, forbidden)
 
     def _application_crc(self) -> int:
         c = self._ffi.new("APP_STATUS *")
@@ -397,6 +406,7 @@ class Simulator(Controller):
                 self.follow_inputs(first, first + (1 if symbol.bit is not None else symbol.size * 8))
 
     def _force(self, table: SymbolTable, changes: Sequence[tuple[Symbol, ForcedPlace]]) -> None:
+        self._check_allowed(lib.OPERATION_FORCE, "force")
         listed = self._read_forces()
         new = [p for _, p in changes if not any(p.same_place(old) for old in listed.places)]
         if len(listed.places) + len(new) > listed.room:

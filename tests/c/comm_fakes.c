@@ -24,6 +24,7 @@
 #include "CmpPlcShell.h"
 #include "CmpMonitor2.h"
 #include "CmpNameServiceServer.h"
+#include "CmpOperationControl.h"
 #include "CmpRouterEmbedded.h"
 #include "CmpSrv.h"
 #include "CmpUserMgr.h"
@@ -276,6 +277,18 @@ static RTS_RESULT control(void)
     fakes.now_ms += fakes.control_ms;
     return fakes.control_result;
 }
+
+#if OPERATION_CONTROL
+RTS_UI32 OperationForbidden(void)
+{
+    return fakes.forbidden;
+}
+
+RTS_RESULT OperationMay(RTS_UI32 operation)
+{
+    return (fakes.forbidden >> operation & 1) != 0 ? ERR_OPERATION_DENIED : ERR_OK;
+}
+#endif
 
 RTS_RESULT AppStartApplication(void)
 {

@@ -7,6 +7,7 @@
 
 #include "CmpBytes.h"
 #include "CmpChannelServerEmbedded.h"
+#include "CmpOperationControl.h"
 #include "CmpSrv.h"
 #include "SysExcept.h"
 #include "comm_client.h"
@@ -161,6 +162,28 @@ static void start_and_stop_reach_the_application(void)
     put_descriptor(client.app_session, NULL);
     CHECK(call(SRV_APP_STOP));
     CHECK_EQUAL(fakes.stops, 1);
+}
+
+static RTS_UI32 control(RTS_UI16 service, const RTS_UI32 *option)
+{
+    put_descriptor(client.app_session, option);
+    CHECK(call(service));
+    return reply_number(&reply, TAG_SERVICE_RESULT);
+}
+
+static void what_the_program_forbids_is_refused_but_not_start_and_origin(void)
+{
+    RTS_UI32 cold = RESET_OPTION_COLD;
+    RTS_UI32 origin = RESET_OPTION_ORIGIN;
+
+    setup();
+    fakes.forbidden = 1 << OPERATION_STOP | 1 << OPERATION_RESET;
+    CHECK_EQUAL(control(SRV_APP_STOP, NULL), ERR_OPERATION_DENIED);
+    CHECK_EQUAL(control(SRV_APP_RESET, &cold), ERR_OPERATION_DENIED);
+    CHECK_EQUAL(fakes.stops + fakes.resets, 0);
+    CHECK_EQUAL(control(SRV_APP_START, NULL), ERR_OK);
+    CHECK_EQUAL(control(SRV_APP_RESET, &origin), ERR_OK);
+    CHECK_EQUAL(fakes.starts + fakes.resets, 2);
 }
 
 static void refusal_of_the_application_is_the_result(void)
@@ -435,6 +458,7 @@ int main(void)
     RUN(create_without_a_name_is_an_error);
     RUN(logout_ends_the_application_session_only);
     RUN(start_and_stop_reach_the_application);
+    RUN(what_the_program_forbids_is_refused_but_not_start_and_origin);
     RUN(refusal_of_the_application_is_the_result);
     RUN(wrong_application_session_changes_nothing);
     RUN(session_0_is_that_of_no_application);

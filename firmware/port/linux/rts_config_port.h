@@ -31,6 +31,7 @@
 #define SRV_OTHER_CLIENTS 1
 #define SRV_NETWORKS 8
 #define FORCE_MAX 128
+#define OPERATION_CONTROL 1
 #define TCP_BUFFER_SIZE 16384
 #define CAN_FD 1
 #define CAN_BLOCK_SIZE 0 /* the kernel has room */

@@ -10,6 +10,7 @@
 #include "CmpBytes.h"
 #include "CmpForce.h"
 #include "CmpIecTask.h"
+#include "CmpOperationControl.h"
 #include "CmpPackets.h"
 #include "CmpSrv.h"
 #include "SysExcept.h"
@@ -98,6 +99,21 @@ static RTS_RESULT control(SRV_REQUEST *request, BTAG_WRITER *reply, RTS_RESULT (
     return result;
 }
 
+/* A reset to the origin is the way out of a program that always forbids all. */
+static RTS_RESULT reset_if_allowed(RTS_UI32 option)
+{
+    RTS_RESULT result = option == RESET_OPTION_ORIGIN ? ERR_OK : OperationMay(OPERATION_RESET);
+
+    return result == ERR_OK ? AppReset(option) : result;
+}
+
+static RTS_RESULT stop_if_allowed(void)
+{
+    RTS_RESULT result = OperationMay(OPERATION_STOP);
+
+    return result == ERR_OK ? AppStopApplication() : result;
+}
+
 static RTS_RESULT start(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     return control(request, reply, AppStartApplication);
@@ -105,7 +121,7 @@ static RTS_RESULT start(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 static RTS_RESULT stop(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
-    return control(request, reply, AppStopApplication);
+    return control(request, reply, stop_if_allowed);
 }
 
 static RTS_RESULT reset(SRV_REQUEST *request, BTAG_WRITER *reply)
@@ -120,7 +136,7 @@ static RTS_RESULT reset(SRV_REQUEST *request, BTAG_WRITER *reply)
     if (result != ERR_OK)
         return result;
     if (verdict == ERR_OK)
-        verdict = option <= RESET_OPTION_ORIGIN ? AppReset(option) : ERR_NOT_SUPPORTED;
+        verdict = option <= RESET_OPTION_ORIGIN ? reset_if_allowed(option) : ERR_NOT_SUPPORTED;
     BTagWrite16(reply, TAG_SERVICE_RESULT, verdict);
     return ERR_OK;
 }
@@ -245,6 +261,8 @@ static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTagWrite(reply, TAG_APP_IMAGE, BTAG_ALIGN_0, &image, sizeof(image));
     if (status.exception.code != RTSEXCPT_NOEXCEPTION) /* else a task may have one just now */
         write_calls(reply);
+    if (OperationForbidden() != 0)
+        BTagWrite32(reply, TAG_APP_FORBIDDEN, OperationForbidden());
     BTagClose(reply);
     if (SRV_OTHER_CLIENTS)
         BTagWrite32(reply, TAG_APP_OPERATION_MODE, DEV_MODE_DEBUG);
@@ -448,6 +466,9 @@ static RTS_RESULT take_block(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *bl
 {
     RTS_RESULT result = ERR_OK;
 
+    if (OperationMay(OPERATION_DOWNLOAD) != ERR_OK)
+        return APP_REFUSE(refusal, ERR_OPERATION_DENIED,
+                          "The running program forbids it (PlcOperationControlInstance).");
     if (is_anothers(client))
         return APP_REFUSE(refusal, ERR_INVALID_STATE, "Another tool is downloading; try again when it is done.");
     if (block->offset > block->total || block->size > block->total - block->offset)

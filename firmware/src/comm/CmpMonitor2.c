@@ -16,6 +16,7 @@
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
 #include "CmpForce.h"
+#include "CmpOperationControl.h"
 #include "CmpIecTask.h"
 #include "CmpPackets.h"
 #include "CmpSrv.h"
@@ -443,6 +444,8 @@ static MON_RESULT check_force(const FORCE_PLACE *place)
 {
     MON_RESULT result = ForceCheck(place);
 
+    if (OperationMay(OPERATION_FORCE) != ERR_OK)
+        result = MONITORING_ERR_OPERATION_DENIED;
     if (result == MONITORING_ERR_OK && !ForceHas(place) && ForceGetCount() + ++to_add > ForceGetRoom())
         result = MONITORING_ERR_FORCE_FAILED;
     return result;
@@ -538,6 +541,10 @@ static RTS_RESULT change_all(SRV_REQUEST *request, BTAG_WRITER *reply, bool forc
 
 static RTS_RESULT mon_write(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
+    if (OperationMay(OPERATION_WRITE) != ERR_OK) {
+        write_error(reply, MONITORING_ERR_OPERATION_DENIED, 0);
+        return ERR_OK;
+    }
     return change_all(request, reply, false);
 }
 

@@ -16,6 +16,8 @@ _FUNCTIONS = {
         iecraise(UDINT)                                     48    80""",
     "CmpRetain": """
         ieckept(POINTER TO BYTE,UDINT):BOOL                 32    16""",
+    "CmpOperationControl": """
+        operation_control(POINTER TO BYTE):BOOL             64    80""",
     "CmpMath": """
         sin(LREAL):LREAL                                  1008  1856
         cos(LREAL):LREAL                                  1008  1856

@@ -336,6 +336,8 @@ def _monitoring_error(action: str, error: int) -> DeviceError:
     if action == "write" and error == lib.MONITORING_ERR_UNSUPPORTED_OPERATOR:
         hint = "Its firmware may be too old to write single bits: write the whole byte or word."
         return DeviceError(f"The device refused the write: {name}. {hint}", l7.slug(name), error)
+    if error == lib.MONITORING_ERR_OPERATION_DENIED:
+        l7.check_result(lib.ERR_OPERATION_DENIED, action)
     outside = error in (lib.MONITORING_ERR_INVALID_AREA, lib.MONITORING_ERR_INVALID_INDEX)
     hint = " The program has no memory at one of the addresses." if outside else ""
     return DeviceError(f"The device refused the {action}: {name}.{hint}", l7.slug(name), error)

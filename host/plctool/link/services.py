@@ -89,13 +89,15 @@ class AppException:
 
 @dataclass(frozen=True)
 class Status:
-    """What the application does. `image_crc` is 0 without application."""
+    """What the application does. `image_crc` is 0 without application. `forbidden`: a bit 1 << OPERATION_* for each
+    operation that the program forbids now."""
 
     state: AppState
     image_crc: int
     image_size: int
     exception: AppException | None
     operating_state: int
+    forbidden: int = 0
 
 
 @dataclass(frozen=True)
@@ -216,7 +218,9 @@ def _status_of(tags: bintag.Tags) -> Status:
     if last.code != lib.RTSEXCPT_NOEXCEPTION:
         trace = Trace.of(_CALL.unpack_each(status.find(lib.TAG_APP_CALLS) or b""))
         exception = AppException.of(last.code, last.code_offset, signed32(last.task), trace)
-    return Status(app_state(state.state, state.op_state), image.crc, image.size, exception, state.op_state)
+    forbidden = 0 if status.find(lib.TAG_APP_FORBIDDEN) is None else status.u32(lib.TAG_APP_FORBIDDEN)
+    state_now = app_state(state.state, state.op_state)
+    return Status(state_now, image.crc, image.size, exception, state.op_state, forbidden)
 
 
 def app_state(state: int, operating: int) -> AppState:

@@ -98,6 +98,8 @@ def status_text(document: dict[str, Any]) -> str:
         lines.append(f"exception: {exception['name']}{task}{where}")
     if document["forced"]:
         lines.append(f"forced: {', '.join(document['forced'])}")
+    if document["forbidden"]:
+        lines.append(f"forbidden by the program: {', '.join(document['forbidden'])}")
     return "\n".join(lines)
 
 
