@@ -1,6 +1,6 @@
 #!/bin/sh
 # bootstrap.sh VENV     makes a virtual environment, with what it needs from Debian: a C compiler, Python's headers and venv
-# bootstrap.sh --tests  installs what some tests need: cross compilers and QEMU, for Cortex-M, RISC-V and AArch64, and
+# bootstrap.sh --tests  installs what some tests need: cross compilers and QEMU, for Cortex-M, RISC-V, AArch64 and ARMv7, and
 #                       programs of others that speak Modbus, QEMU for a Linux kernel with hardware that is simulated, and
 #                       a browser for the page
 # bootstrap.sh --fuzz   installs clang, with which libFuzzer runs the fuzz targets
@@ -24,6 +24,7 @@ if [ "$1" = --tests ]; then
     command -v riscv64-unknown-elf-gcc >/dev/null || set -- "$@" gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf
     command -v qemu-system-riscv32 >/dev/null || set -- "$@" qemu-system-misc
     command -v aarch64-linux-gnu-gcc >/dev/null || set -- "$@" gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+    command -v arm-linux-gnueabihf-gcc >/dev/null || set -- "$@" gcc-arm-linux-gnueabihf libc6-dev-armhf-cross
     command -v qemu-aarch64 >/dev/null || set -- "$@" qemu-user
     command -v qemu-system-x86_64 >/dev/null || set -- "$@" qemu-system-x86
     command -v xz >/dev/null || set -- "$@" xz-utils

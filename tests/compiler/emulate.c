@@ -41,6 +41,13 @@ void *memset(void *to, int value, unsigned long size)
     return to;
 }
 
+/* The division of libgcc on Linux calls it for a divisor of 0. */
+int raise(int signal)
+{
+    (void)signal;
+    return 0;
+}
+
 /* ---- what differs between processors ---- */
 
 #if defined(__aarch64__)

@@ -23,6 +23,7 @@ HARNESS = Path(__file__).with_name("emulate.c")
 ARM = ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb"]
 SYSTEMS = {
     "aarch64-linux": (["aarch64-linux-gnu-gcc", "-mgeneral-regs-only"], ["qemu-aarch64"]),
+    "armv7-linux": (["arm-linux-gnueabihf-gcc"], ["qemu-arm"]),
     "cortex-m0": (ARM, ["qemu-arm"]),
     "cortex-m3": (ARM, ["qemu-arm"]),
     "cortex-m4f": ([*ARM, "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"], ["qemu-arm"]),

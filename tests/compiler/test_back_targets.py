@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+from pathlib import Path
 
 import pytest
 from back_support import POS, ProgramBuilder, Running, binary, build, const, load, place
@@ -41,7 +42,7 @@ from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import DINT, INT, LINT, LREAL, REAL, ArrayType, StringType
 from plctool.image.file import parse_image
-from plctool.image.targets import TARGETS, Machine, Target, find_target
+from plctool.image.targets import TARGETS, Machine, Target, find_target, host_target
 
 ALL = list(TARGETS.values())
 
@@ -114,7 +115,7 @@ def test_single_precision_needs_no_calls_with_an_fpu() -> None:
         Assign(place(x), binary(BinaryOp.MUL, load(x), const(0.1, REAL)), POS),
         Assign(place(n), Convert(load(x), DINT, POS), POS),
     )
-    for name in ("cortex-m4f", "cortex-m7", "x86_64-linux", "aarch64-linux"):
+    for name in ("cortex-m4f", "cortex-m7", "x86_64-linux", "aarch64-linux", "armv7-linux"):
         assert parse_image(build(program, name).image).externals == []
 
 
@@ -136,6 +137,36 @@ PROGRAM Main VAR n : INT; i : DINT; END_VAR n := Far(i); END_PROGRAM
     )
     code = parse_image(compile_sources([path], target=target, level=level, checks="none", limits=False).image).code
     assert (PROBES[target] in code) == probed
+
+
+def test_armv7_linux_has_no_frame_beyond_the_guard(tmp_path: Path) -> None:
+    """Its frames are not touched page by page."""
+    path = tmp_path / "frame.st"
+    path.write_text(
+        """FUNCTION Far : SINT VAR_INPUT i : DINT; END_VAR VAR field : ARRAY[0..4_200_000] OF SINT; END_VAR
+Far := field[i];
+END_FUNCTION
+PROGRAM Main VAR n : SINT; i : DINT; END_VAR n := Far(i); END_PROGRAM
+"""
+    )
+    with pytest.raises(UsageError, match="stack"):
+        compile_sources([path], target="armv7-linux")
+
+
+@pytest.mark.parametrize(
+    ("machine", "pointer", "target"),
+    [
+        ("armv7l", 4, "armv7-linux"),
+        ("aarch64", 8, "aarch64-linux"),
+        ("aarch64", 4, "armv7-linux"),  # Raspberry Pi OS of 32 bits has a kernel of 64
+        ("x86_64", 8, "x86_64-linux"),
+        ("riscv64", 8, "x86_64-linux"),
+    ],
+)
+def test_this_machine_has_a_target(machine: str, pointer: int, target: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    monkeypatch.setattr("struct.calcsize", lambda _: pointer)
+    assert host_target() == target
 
 
 def test_an_unknown_target_is_refused_with_the_names_of_the_others() -> None:

@@ -19,7 +19,7 @@ from plctool.io.fit import check_board
 INTEGERS = ["SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT"]
 BITS = ["BYTE", "WORD", "DWORD", "LWORD"]
 REALS = ["REAL", "LREAL"]
-SMALL = [target for target in TARGETS.values() if target.small_flash]
+WITH_STUBS = [target for target in TARGETS.values() if target.stubs]
 
 
 def statements() -> tuple[list[str], list[str]]:
@@ -64,7 +64,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("level", [0, 1, 2, 3, "s"])
-@pytest.mark.parametrize("target", SMALL, ids=lambda target: target.name)
+@pytest.mark.parametrize("target", WITH_STUBS, ids=lambda target: target.name)
 def test_imports_are_those_of_the_processor(program: Path, target: Target, level: Level) -> None:
     image = parse_image(compile_sources([program], target=target.name, level=level, limits=False).image)
     found = {external.name: find_c_function(external.name, external.signature) for external in image.externals}

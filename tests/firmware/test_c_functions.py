@@ -35,12 +35,14 @@ def test_all_functions_are_known_with_their_component() -> None:
     assert found == {name: function.component for name, function in C_FUNCTIONS.items()}
 
 
-@pytest.mark.parametrize("target", [t for t in TARGETS.values() if t.small_flash], ids=lambda t: t.name)
+@pytest.mark.parametrize("target", [t for t in TARGETS.values() if t.stubs], ids=lambda t: t.name)
 def test_the_functions_of_a_processor_are_those_its_firmware_registers(target: Target) -> None:
     text = (FIRMWARE / "port/baremetal/common/CmpCompilerCalls.c").read_text().replace("#include", "//")
     defined = {"__arm__": target.machine is not Machine.RISCV32, "__ARM_FP": target.has_fpu}
     defined["__ARM_ARCH_6M__"] = target.machine is Machine.THUMB_V6M
+    profile = "A" if target.hosted else "M"
     words = [f"-D{name}=1" if on else f"-U{name}" for name, on in defined.items()]
+    words.append(f"-D__ARM_ARCH_PROFILE='{profile}'")
     done = subprocess.run(["cc", "-E", "-P", *words, "-"], input=text, capture_output=True, text=True, check=True)
     found = set(re.findall(r'\{"(\w+)", 0x', done.stdout))
     compiler = [f for f in C_FUNCTIONS.values() if f.component in COMPILER_COMPONENTS]

@@ -41,6 +41,7 @@ _LINUX_SOURCES = [
     *(s for s in (FIRMWARE / "port/sim").glob("*.c") if s.name not in _OF_PLCTOOL),
     *(FIRMWARE / "port/linux" / name for name in ("IecStack.c", "IecStackSwitch.S", "SysExcept.c", "SysMem.c")),
 ]
+_ARM_SOURCES = [FIRMWARE / "port/baremetal/common/CmpCompilerCalls.c", FIRMWARE / "port/baremetal/cortexm/IecCall.c"]
 # Picolibc keeps the clock to itself unless a flag says that there is one.
 _BARE_FLAGS = [
     "--specs=picolibc.specs", "--oslib=semihost", "--crt0=hosted", "-Wl,--gc-sections",
@@ -84,7 +85,8 @@ class Runner:
         include = [f"-I{FIRMWARE / name}" for name in ("include", "port/sim", "src/app", "src/cycle")]
         flags = [*(_BARE_FLAGS if self.bare else []), *self.flags, *_WARNINGS, *include, *extra]
         entry = FIRMWARE / "port/baremetal" / self.family / "IecCall.c"
-        sources = [*_BARE_SOURCES, entry] if self.bare else _LINUX_SOURCES
+        linux = [*_LINUX_SOURCES, *(_ARM_SOURCES if "arm" in self.compiler else [])]
+        sources = [*_BARE_SOURCES, entry] if self.bare else linux
         subprocess.run([self.compiler, *flags, "-o", program, main, *sources, "-lm"], check=True)
         return program
 
@@ -148,5 +150,6 @@ RUNNERS = {
             family="riscv",
         ),
         Runner("aarch64-linux", "aarch64-linux-gnu-gcc", ("-static", "-pthread"), ("qemu-aarch64",), bare=False),
+        Runner("armv7-linux", "arm-linux-gnueabihf-gcc", ("-static", "-pthread"), ("qemu-arm",), bare=False),
     )
 }  # fmt: skip

@@ -19,14 +19,15 @@
 #endif
 
 #define STACK_SIZE ((size_t)RTS_IEC_STACK_SIZE)
-#define GUARD_SIZE ((size_t)16 * 1024 * 1024)
+#define GUARD_SIZE ((size_t)(sizeof(void *) > 4 ? 16 : 4) * 1024 * 1024)
 #define SIGNAL_SIZE ((size_t)64 * 1024) /* a signal frame with all vector registers takes up to 20 KiB */
 
 int IecStackSwitch(void (*fn)(void *arg), void *arg, IEC_STACK *stack, RTS_UI32 running);
 void IecStackSwitchBack(IEC_STACK *stack) __attribute__((noreturn));
 void IecStackCallBelow(void (*fn)(void *arg), void *arg, uintptr_t stack_pointer);
 
-RTS_STATIC_ASSERT(offsetof(IEC_STACK, back) == 0 && offsetof(IEC_STACK, top) == 8 && offsetof(IEC_STACK, running) == 16,
+RTS_STATIC_ASSERT(offsetof(IEC_STACK, back) == 0 && offsetof(IEC_STACK, top) == sizeof(void *) &&
+                      offsetof(IEC_STACK, running) == 2 * sizeof(void *),
                   layout_is_what_the_switch_knows);
 
 __thread IEC_STACK *IecStackOfThread;

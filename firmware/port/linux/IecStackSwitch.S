@@ -13,8 +13,8 @@
  * pointer on the IEC stack is for debuggers only.
  */
 #define BACK 0
-#define TOP 8
-#define RUNNING 16
+#define TOP __SIZEOF_POINTER__
+#define RUNNING (2 * __SIZEOF_POINTER__)
 
     .text
     .globl IecStackSwitch
@@ -210,6 +210,87 @@ IecStackCallBelow:
     .cfi_restore x29
     .cfi_restore x30
     ret
+    .cfi_endproc
+    .size IecStackCallBelow, . - IecStackCallBelow
+
+#elif defined(__arm__)
+
+    .syntax unified
+    .arch armv7-a
+    .fpu vfpv3-d16
+    .thumb
+    .cfi_sections .debug_frame
+
+    .thumb_func
+IecStackSwitch:
+    .cfi_startproc
+    push {r3-r11, lr} /* r3: an even number of registers keeps the alignment */
+    .cfi_def_cfa_offset 40
+    .cfi_offset r4, -36
+    .cfi_offset r5, -32
+    .cfi_offset r6, -28
+    .cfi_offset r7, -24
+    .cfi_offset r8, -20
+    .cfi_offset r9, -16
+    .cfi_offset r10, -12
+    .cfi_offset r11, -8
+    .cfi_offset lr, -4
+    vpush {d8-d15}
+    .cfi_def_cfa_offset 104
+    mov r12, sp
+    str r12, [r2, #BACK]
+    ldr r4, [r2, #TOP]
+    str r12, [r4, #-16]!
+    mov sp, r4
+    .cfi_remember_state
+    .cfi_escape 0x0f, 5, 0x7d, 0, 0x06, 0x23, 104 /* frame: what is at the stack pointer, plus 104 */
+    str r3, [r2, #RUNNING]
+    mov r12, r0
+    mov r0, r1
+    blx r12
+    ldr r1, 2f
+1:  add r1, pc
+    ldr r1, [r1]
+    mrc p15, 0, r0, c13, c0, 3
+    ldr r0, [r0, r1]
+    movs r1, #0
+go_back:
+    ldr r2, [r0, #BACK]
+    mov sp, r2
+    .cfi_restore_state
+    movs r3, #0
+    str r3, [r0, #RUNNING]
+    mov r0, r1
+    vpop {d8-d15}
+    .cfi_def_cfa_offset 40
+    pop {r3-r11, pc}
+    .cfi_endproc
+    .align 2
+2:  .word IecStackOfThread(gottpoff) + (. - 1b - 4)
+    .size IecStackSwitch, . - IecStackSwitch
+
+    .thumb_func
+IecStackSwitchBack:
+    movs r1, #1
+    b go_back
+    .size IecStackSwitchBack, . - IecStackSwitchBack
+
+    .thumb_func
+IecStackCallBelow:
+    .cfi_startproc
+    push {r7, lr}
+    .cfi_def_cfa_offset 8
+    .cfi_offset r7, -8
+    .cfi_offset lr, -4
+    mov r7, sp
+    .cfi_def_cfa_register r7
+    mov sp, r2
+    mov r12, r0
+    mov r0, r1
+    blx r12
+    mov sp, r7
+    .cfi_def_cfa_register sp
+    pop {r7, pc}
     .cfi_endproc
     .size IecStackCallBelow, . - IecStackCallBelow
 

@@ -101,6 +101,8 @@ static PLACE place_of(const void *ucontext)
     return (PLACE){.address = (uintptr_t)registers[REG_RIP], .stack = (uintptr_t)registers[REG_RSP]};
 #elif defined(__aarch64__)
     return (PLACE){.address = at->uc_mcontext.pc, .stack = at->uc_mcontext.sp, .link = at->uc_mcontext.regs[30]};
+#elif defined(__arm__)
+    return (PLACE){.address = at->uc_mcontext.arm_pc, .stack = at->uc_mcontext.arm_sp, .link = at->uc_mcontext.arm_lr};
 #else
 #error "SysExcept.c: say where this architecture keeps these registers in its ucontext_t."
 #endif

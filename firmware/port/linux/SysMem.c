@@ -11,7 +11,7 @@
 
 #include <sys/mman.h>
 
-#define GUARD_SIZE ((size_t)256 * 1024 * 1024)
+#define GUARD_SIZE ((size_t)(sizeof(void *) > 4 ? 256 : 64) * 1024 * 1024)
 
 /* Sizes are rounded up to pages by the system. */
 static void *map_guarded(size_t size)

@@ -5,6 +5,8 @@
  */
 #include "PortDrivers.h"
 
+#include "IecCompilerCalls.h"
+
 #define HAS_SysTime 1
 #define HAS_CmpLog 1
 #define HAS_CmpEventMgrEmbedded 1
@@ -29,5 +31,5 @@
 #define HAS_CmpBlkDrvTcp 1
 #define HAS_CmpBlkDrvUdp 1
 #define PORT_SYSTEM(X) X(SysTarget) X(SysLock) X(SysTimer)
-#define PORT_COMPONENTS(X) X(SysEvent) X(IoDrvSysfs) PORT_DRIVERS(X)
+#define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysEvent) X(IoDrvSysfs) PORT_DRIVERS(X)
 #include "CmpList.h"

@@ -6,6 +6,8 @@
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H
 
+#include "IecEntry.h"
+
 /* An application on a PC-class machine may be large; RAM is plenty. */
 #define APP_MAX_TASKS 16
 #define APP_MAX_IMPORTS 128
@@ -54,6 +56,8 @@
 #define BOARD_TARGET_ID TARGET_ID_X86_64_LINUX
 #elif defined(__aarch64__)
 #define BOARD_TARGET_ID TARGET_ID_AARCH64_LINUX
+#elif defined(__ARM_PCS_VFP)
+#define BOARD_TARGET_ID TARGET_ID_ARMV7_LINUX
 #else
 #error "Give this architecture a target id in CompactDownload.h and in plctool."
 #endif

@@ -11,6 +11,8 @@
 
 #if defined(__aarch64__)
 #define SIM_TARGET_ID TARGET_ID_AARCH64_LINUX
+#elif defined(__ARM_PCS_VFP)
+#define SIM_TARGET_ID TARGET_ID_ARMV7_LINUX
 #else
 #define SIM_TARGET_ID TARGET_ID_X86_64_LINUX
 #endif

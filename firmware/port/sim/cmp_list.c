@@ -3,6 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#include "../linux/IecCompilerCalls.h"
+
 #define HAS_CmpLog 1
 #define HAS_CmpEventMgrEmbedded 1
 #define HAS_CmpRetain 1
@@ -21,8 +23,8 @@
 #define HAS_CmpBlkDrvSimpleCom 1
 #ifdef SIM_HAS_BUSES
 #define HAS_IoDrvModbus 1
-#define PORT_COMPONENTS(X) X(SysSim) X(SimModbus)
+#define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim) X(SimModbus)
 #else
-#define PORT_COMPONENTS(X) X(SysSim)
+#define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim)
 #endif
 #include "CmpList.h"

@@ -6,6 +6,8 @@
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H
 
+#include "../linux/IecEntry.h"
+
 #define APP_MAX_TASKS 16
 #define APP_MAX_IMPORTS 128
 #ifndef APP_DATA_SIZE /* less for the C tests in QEMU, which takes long to clear it at each start */

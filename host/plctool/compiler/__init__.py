@@ -173,7 +173,7 @@ def compile_sources(
         known = board_of(board, None if firmware is None else read_firmware(firmware))
     processor = find_target(_target(target, known, description))
     stacks = None
-    if firmware is not None and processor.stubs:
+    if firmware is not None and not processor.hosted:
         from plctool.compiler.codegen.firmware_stacks import FirmwareStacks  # late, as it loads a reader of ELF files
 
         stacks = FirmwareStacks(firmware, processor.machine)

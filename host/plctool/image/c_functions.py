@@ -119,13 +119,11 @@ COMPILER_COMPONENTS = {
 }
 """The last three, and what their functions are for."""
 
-_ON_CORTEX_M0 = frozenset(
-    (
-        "__muldi3", "__ashldi3", "__ashrdi3", "__lshrdi3", "__divsi3", "__udivsi3", "__modsi3", "__umodsi3",
-        "__clzsi2", "__clzdi2",
-    )
-)  # fmt: skip
+_ON_CORTEX_M0 = frozenset(("__muldi3", "__ashldi3", "__ashrdi3", "__lshrdi3", "__clzsi2", "__clzdi2"))
 """Other processors have instructions for it, so their firmware does not register these."""
+
+_DIVISIONS = frozenset(("__divsi3", "__udivsi3", "__modsi3", "__umodsi3"))
+"""The firmware of a processor that divides words itself does not register these."""
 
 _WITHOUT_FPU = frozenset(
     (
@@ -162,6 +160,8 @@ class CFunction:
         """Whether its component registers it on a processor."""
         if self.name in _ON_CORTEX_M0:
             return target.machine is Machine.THUMB_V6M
+        if self.name in _DIVISIONS:
+            return not target.divides
         return self.name not in _WITHOUT_FPU or not target.has_fpu
 
     def stack(self, machine: Machine) -> int:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import platform
+import struct
 from dataclasses import dataclass
 from enum import Enum
 
 from plctool.errors import UsageError
 
+_ARMV7_POINTER = 4  # bytes
 FASTEST = 3  # the level of optimisation that is for speed only
 
 
@@ -30,6 +32,7 @@ class Target:
     size work at any address. `vectors`: 16-byte vector compares are cheap. `registers`: that carry arguments inside the
     image, for addresses and integers, and for reals (0: reals are like integers). `probes`: a function that is entered
     touches each page of its frame, so that a large one does not pass over the guard at the end of the stack.
+    `hosted`: programs run in a process of Linux, with memory in plenty. `divides`: an instruction divides words.
     `features_for_speed`: those of level 3 besides. A processor that executes one instruction after the other gains
     nothing from their order, and the search for a good one costs registers.
     """
@@ -47,6 +50,8 @@ class Target:
     vectors: bool = False
     abi: str = ""
     probes: bool = False
+    hosted: bool = False
+    divides: bool = True
     external_convention: str = (
         ""  # LLVM calling convention of C functions that take or return floats; "" is the default
     )
@@ -65,7 +70,7 @@ class Target:
     @property
     def small_flash(self) -> bool:
         """Whether programs are in a small flash."""
-        return self.pointer_size == 4
+        return not self.hosted
 
     @property
     def shortens(self) -> bool:
@@ -75,7 +80,7 @@ class Target:
     @property
     def divides_words(self) -> bool:
         """Whether words are as easy to divide by constants as smaller numbers are, or easier."""
-        return self.machine in (Machine.THUMB, Machine.RISCV32)
+        return self.machine in (Machine.THUMB, Machine.RISCV32) and self.divides
 
     def saves_room(self, opt_level: int) -> bool:
         """Whether code for a small flash is to stay small, at that level of optimisation."""
@@ -87,15 +92,20 @@ TARGETS: dict[str, Target] = {
     for t in (
         Target(
             "x86_64-linux", "x86_64-unknown-linux-gnu", "x86-64", "", Machine.X86_64, "TARGET_ID_X86_64_LINUX",
-            pointer_size=8, registers=(6, 8), stubs=False, unaligned=True, vectors=True, probes=True,
+            pointer_size=8, registers=(6, 8), stubs=False, unaligned=True, vectors=True, probes=True, hosted=True,
         ),
         Target(
             "aarch64-linux", "aarch64-unknown-linux-gnu", "generic", "", Machine.AARCH64, "TARGET_ID_AARCH64_LINUX",
-            pointer_size=8, registers=(8, 8), stubs=False, unaligned=True, probes=True,
+            pointer_size=8, registers=(8, 8), stubs=False, unaligned=True, probes=True, hosted=True,
+        ),
+        Target(  # what Debian's armhf runs on: a Cortex-A8 neither divides nor has all of the others' registers
+            "armv7-linux", "thumbv7a-none-unknown", "generic", "+reserve-r9,-neon,-d32", Machine.THUMB,
+            "TARGET_ID_ARMV7_LINUX", pointer_size=4, registers=(4, 8), stubs=True, unaligned=True, hosted=True,
+            divides=False, external_convention="arm_aapcs_vfpcc",
         ),
         Target(
             "cortex-m0", "thumbv6m-none-unknown", "cortex-m0", "+reserve-r9", Machine.THUMB_V6M, "TARGET_ID_CORTEX_M0",
-            pointer_size=4, registers=(4, 0), stubs=True, unaligned=False,
+            pointer_size=4, registers=(4, 0), stubs=True, unaligned=False, divides=False,
         ),
         Target(
             "cortex-m3", "thumbv7m-none-unknown", "cortex-m3", "+reserve-r9", Machine.THUMB, "TARGET_ID_CORTEX_M3",
@@ -123,7 +133,10 @@ DEFAULT_TARGET = "x86_64-linux"
 
 def host_target() -> str:
     """The target whose programs run in this process."""
-    here = f"{platform.machine()}-linux"
+    machine = platform.machine()
+    if struct.calcsize("P") == _ARMV7_POINTER and machine.startswith(("arm", "aarch64")):
+        machine = "armv7"  # also a process of 32 bits on a kernel of 64
+    here = f"{machine}-linux"
     return here if here in TARGETS else DEFAULT_TARGET
 
 

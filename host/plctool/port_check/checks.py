@@ -294,7 +294,7 @@ class Checks:
         text = program(variables, f"IF n > {_HEALTHY_CYCLES} THEN\n{body}\nEND_IF")
         if "Large" not in body:
             return text
-        size = _LARGE_FRAME if find_target(self._bench.target).pointer_size == 8 else _SMALL_FRAME
+        size = _LARGE_FRAME if find_target(self._bench.target).hosted else _SMALL_FRAME
         return f"""
 FUNCTION Large : DINT
 VAR_INPUT

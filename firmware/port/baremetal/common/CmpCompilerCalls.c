@@ -12,6 +12,13 @@
 
 #include <math.h>
 
+/* A Cortex-M0 has no instruction for it, and the oldest processors with an operating system neither (armv7-linux). */
+#if defined(__ARM_ARCH_6M__) || (defined(__ARM_ARCH_PROFILE) && __ARM_ARCH_PROFILE == 'A')
+#define OFFERS_DIVISION 1
+#else
+#define OFFERS_DIVISION 0
+#endif
+
 enum { CALLS_VERSION = 0x00010000 };
 
 #ifdef __ARM_ARCH_6M__
@@ -100,17 +107,7 @@ static RTS_UI64 ulint_modulo(RTS_UI64 a, RTS_UI64 b)
     return a % b;
 }
 
-#ifdef __ARM_ARCH_6M__
-static RTS_I32 udint_leading_zeros(RTS_UI32 value)
-{
-    return value != 0 ? __builtin_clz(value) : 32;
-}
-
-static RTS_I32 ulint_leading_zeros(RTS_UI64 value)
-{
-    return value != 0 ? __builtin_clzll(value) : 64;
-}
-
+#if OFFERS_DIVISION
 static RTS_I32 dint_divide(RTS_I32 a, RTS_I32 b)
 {
     return a / b;
@@ -129,6 +126,19 @@ static RTS_UI32 udint_divide(RTS_UI32 a, RTS_UI32 b)
 static RTS_UI32 udint_modulo(RTS_UI32 a, RTS_UI32 b)
 {
     return a % b;
+}
+
+#endif
+
+#ifdef __ARM_ARCH_6M__
+static RTS_I32 udint_leading_zeros(RTS_UI32 value)
+{
+    return value != 0 ? __builtin_clz(value) : 32;
+}
+
+static RTS_I32 ulint_leading_zeros(RTS_UI64 value)
+{
+    return value != 0 ? __builtin_clzll(value) : 64;
 }
 
 static RTS_UI64 lint_multiply(RTS_UI64 a, RTS_UI64 b)
@@ -153,11 +163,13 @@ static RTS_I64 lint_shift_right(RTS_I64 a, RTS_UI32 count)
 #endif
 
 static const CMP_EXT_FUNCTION int_calls[] = {
-#ifdef __ARM_ARCH_6M__
+#if OFFERS_DIVISION
     {"__divsi3", 0xDAB9671E, CALLS_VERSION, (RTS_PFN)dint_divide},
     {"__udivsi3", 0x42186644, CALLS_VERSION, (RTS_PFN)udint_divide},
     {"__modsi3", 0xA8E7FDB1, CALLS_VERSION, (RTS_PFN)dint_modulo},
     {"__umodsi3", 0x97416208, CALLS_VERSION, (RTS_PFN)udint_modulo},
+#endif
+#ifdef __ARM_ARCH_6M__
     {"__muldi3", 0xFF782539, CALLS_VERSION, (RTS_PFN)lint_multiply},
     {"__ashldi3", 0xC854631C, CALLS_VERSION, (RTS_PFN)lint_shift_left},
     {"__ashrdi3", 0x316A835E, CALLS_VERSION, (RTS_PFN)lint_shift_right},

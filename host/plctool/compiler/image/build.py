@@ -137,8 +137,8 @@ def _needs(
     frames: Counter[str] = Counter()
     for offset, frame in chain:
         frames[names[offset]] += frame
-    # Where there are no stubs, stacks are large.
-    are_known = not options.target.stubs or len(stubs) == len(linked.imports)
+    # On Linux stacks are large.
+    are_known = options.target.hosted or len(stubs) == len(linked.imports)
     at_least = program.may_recurse or not are_known
     needs["stack"] = Need(frames.total(), largest((+frames).items()), deepest=True, at_least=at_least)
     return needs
