@@ -4,7 +4,9 @@
 # make format gives C and Python their one style
 # make wheel  dist/*.whl for this kind of Linux and every Python from 3.11 on, tried in those that are here
 # make release  dist/ with the wheel, the sources, the firmware of all boards and their checksums
-# make size   flash and RAM of the bare-metal runtime, per component
+# make size   flash and RAM of the bare-metal runtime, per component; plcrt of each processor
+# make linux-arm  plcrt for Linux on 64-bit and 32-bit Arm: build-aarch64-linux, build-armv7-linux
+# make test-linux-arm  the C tests and tests/e2e with these, in QEMU's user mode (ARGS="-k force"); some are in `make test`
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
@@ -25,21 +27,35 @@ RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command 
 BOARD_BUILDS := $(CORTEX_M) $(RISC_V)
 BUILDS := build build-sanitized $(BOARD_BUILDS)
 
-.PHONY: demo test quick test-vcan test-kernel lint format bench size wheel release run-release attack soak fuzz properties habits all clean
-.PHONY: run-test run-all run-bench run-size run-fuzz
+# The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
+LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
+
+.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm lint format bench size wheel release run-release attack soak fuzz properties habits all clean
+.PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
 
 # A make of its own, so that BUILDS sees what bootstrapping has just installed.
-test all bench size release: $(VENV)/dev
+test all bench size release linux-arm test-linux-arm: $(VENV)/dev
 	@$(MAKE) --no-print-directory run-$@
 
 run-test: run-all
-	$(BIN)/python tests/run_all.py --meson $(MESON) $(ARGS) $(BUILDS)
+	$(BIN)/python tests/run_all.py --meson $(MESON) $(ARGS) $(LINUX_ARM:%=--processor %) $(BUILDS)
 
-run-all: $(BUILDS:%=%/build.ninja)
+run-all: $(BUILDS:%=%/build.ninja) $(LINUX_ARM:%=%/build.ninja)
 	set -e; for build in $(BUILDS); do $(MESON) compile -C $$build; done
+	set -e; for build in $(LINUX_ARM); do $(MESON) compile -C $$build plcrt processor_tests; done
+
+run-linux-arm: $(LINUX_ARM:%=%/build.ninja)
+	@[ -n "$(strip $(LINUX_ARM))" ] || { echo "No cross compiler: sudo apt-get install gcc-aarch64-linux-gnu gcc-arm-linux-gnueabihf" >&2; exit 1; }
+	set -e; for build in $(LINUX_ARM); do $(MESON) compile -C $$build plcrt; done
+	@size $(LINUX_ARM:%=%/firmware/port/linux/plcrt)
+
+run-test-linux-arm: build/build.ninja $(LINUX_ARM:%=%/build.ninja)
+	set -e; for build in build $(LINUX_ARM); do $(MESON) compile -C $$build; done
+	set -e; for build in $(LINUX_ARM); do $(MESON) test -C $$build --no-rebuild --suite c; done
+	$(BIN)/python tests/linux_arm/run.py $(LINUX_ARM) -- $(ARGS)
 
 quick: build/build.ninja
 	@ninja --quiet -C build under_attack
@@ -76,8 +92,10 @@ run-bench: $(BENCHED:%=%/build.ninja)
 	$(MESON) compile -C build can_share
 	PYTHONPATH=host:build/host PLCRT=build/firmware/port/linux/plcrt $(BIN)/python bench/run.py $(ARGS)
 
-run-size: build-cm3/build.ninja $(RISC_V:%=%/build.ninja)
+run-size: build-cm3/build.ninja $(RISC_V:%=%/build.ninja) build/build.ninja $(LINUX_ARM:%=%/build.ninja)
 	set -e; for build in build-cm3 $(RISC_V); do echo "$$build:"; $(MESON) compile -C $$build size; done
+	set -e; for build in build $(LINUX_ARM); do $(MESON) compile -C $$build plcrt >/dev/null; done
+	@size $(patsubst %,%/firmware/port/linux/plcrt,build $(LINUX_ARM))
 
 # The tag says which C library it needs at least: that of this machine's compiler.
 wheel: $(VENV)/dev
@@ -143,7 +161,7 @@ build-libfuzzer/build.ninja: $(VENV)/dev
 build-cm%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini
 
-build-lm3s6965/build.ninja build-stm32f405/build.ninja build-rv32imac/build.ninja: build-%/build.ninja: $(VENV)/dev
+build-lm3s6965/build.ninja build-stm32f405/build.ninja build-rv32imac/build.ninja build-aarch64-linux/build.ninja build-armv7-linux/build.ninja: build-%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-$* --cross-file cross/$*.ini
 
 # What a user gets: the package with its two commands; and the plant of the demo speaks Modbus.

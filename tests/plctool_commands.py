@@ -37,7 +37,16 @@ IMPORTED = (
     "plctool.st_tests",
     "plctool.trace_file",
 )
+TARGET = "PLCRT_TARGET"
+"""A variable of the environment: the target of a $PLCRT for another processor, which programs are built for then."""
+
 LONGEST = 1 << 18  # bytes of a request; the environment is its greatest part
+
+
+def build_for_plcrt() -> None:
+    """Has programs built for the processor of plcrt, in this process, if $PLCRT_TARGET names it."""
+    if TARGET in os.environ:
+        importlib.import_module("plctool.compiler").DEFAULT_TARGET = os.environ[TARGET]  # type: ignore[attr-defined]
 
 
 @cache
@@ -137,6 +146,7 @@ def _work(request: dict[str, Any], streams: list[int]) -> NoReturn:
 def main() -> None:
     for module in IMPORTED:
         importlib.import_module(module)
+    build_for_plcrt()
     sys.modules["plctool.compiler.syntax.tables"].load_tables()
     sys.modules["plctool.cli.command_line"].parser()  # imports the module of each command
     gc.freeze()  # so that the pages stay common to all processes

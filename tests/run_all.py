@@ -163,14 +163,20 @@ def meson_outcome(log: Path) -> Outcome:
     return Outcome(Counter(outcomes), failures, skips, failed)
 
 
+def c_tests(meson: str, build: Path, suite: str) -> Job:
+    """The C tests of a suite in a build folder."""
+    logs = build / "meson-logs"
+    command = [meson, "test", "-C", str(build), "--print-errorlogs", "--no-rebuild", "--num-processes", "1"]
+    return Job(
+        f"{build.name} {suite}", [*command, "--suite", suite], C_TESTS_SECONDS, float("inf"),
+        logs / "testlog.json", logs / f"{suite}.txt",
+    )  # fmt: skip
+
+
 def jobs_of(meson: str, build: Path) -> Iterator[Job]:
     """All tests of a build folder."""
     logs, reports = build / "meson-logs", build / "pytest-reports"
-    command = [meson, "test", "-C", str(build), "--print-errorlogs", "--no-rebuild", "--num-processes", "1"]
-    yield Job(
-        f"{build.name} c", [*command, "--suite", "c"], C_TESTS_SECONDS, float("inf"),
-        logs / "testlog.json", logs / "c.txt",
-    )  # fmt: skip
+    yield c_tests(meson, build, "c")
     for test in json.loads(subprocess.check_output([meson, "introspect", "--tests", str(build)])):
         name = test["name"]
         if any(suite.endswith(":python") for suite in test["suite"]):
@@ -229,12 +235,17 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--meson", required=True)
     parser.add_argument("--jobs", type=int, default=(os.cpu_count() or 1) + 2, help="processes that run at once")
+    parser.add_argument(
+        "--processor", action="append", default=[], type=Path, metavar="BUILD",
+        help="a build folder of which only those C tests run that depend on the processor",
+    )  # fmt: skip
     parser.add_argument("builds", nargs="+", type=Path)
     args = parser.parse_args()
     if args.jobs < 1:
         parser.error("--jobs takes 1 or more")
     signal.signal(signal.SIGINT, signal.default_int_handler)  # tests send it; `make test &` would have it ignored
     jobs = [job for build in args.builds for job in jobs_of(args.meson, build.resolve())]
+    jobs += [c_tests(args.meson, build.resolve(), "processor") for build in args.processor]
     jobs.sort(key=lambda job: -job.seconds)
     begin, used, counts, lines, failed = time.monotonic(), 0.0, Counter[str](), list[str](), list[Done]()
     broken: dict[str, list[str]] = {}

@@ -9,6 +9,7 @@
 #ifndef APP_IMAGE_H
 #define APP_IMAGE_H
 
+#include <stdio.h>
 #include <string.h>
 
 #include "CmpAppEmbedded.h"
@@ -23,7 +24,7 @@
 #if defined(__x86_64__)
 #define NEEDS_X86_64
 #else
-#define NEEDS_X86_64 return 77
+#define NEEDS_X86_64 return puts("its applications are machine code of x86-64"), 77
 #endif
 
 enum { SPEC_NO_ENTRY = -1 };

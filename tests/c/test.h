@@ -29,6 +29,9 @@ static int test_failures;
 #define CHECK_EQUAL(actual, expected) \
     test_check_equal((long long)(actual), (long long)(expected), #actual " == " #expected, __FILE__, __LINE__, __func__)
 
+/* Of pointers. */
+#define CHECK_SAME(actual, expected) CHECK_EQUAL((uintptr_t)(actual), (uintptr_t)(expected))
+
 static inline void test_check_equal(long long actual, long long expected, const char *condition, const char *file,
                                     int line, const char *function)
 {

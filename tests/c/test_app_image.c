@@ -377,8 +377,8 @@ static void a_task_that_uses_a_part_alone_works_on_the_shared_one(void)
     always = false;
     start(true);
     CHECK_EQUAL(used, 0);
-    CHECK_EQUAL(context[LOW].area[APP_AREA_OUTPUT], fake_area(APP_AREA_OUTPUT));
-    CHECK_EQUAL(context[HIGH].area[APP_AREA_OUTPUT], fake_area(APP_AREA_OUTPUT));
+    CHECK_SAME(context[LOW].area[APP_AREA_OUTPUT], fake_area(APP_AREA_OUTPUT));
+    CHECK_SAME(context[HIGH].area[APP_AREA_OUTPUT], fake_area(APP_AREA_OUTPUT));
 }
 
 static void what_is_written_takes_its_copy_twice(void)
@@ -388,9 +388,9 @@ static void what_is_written_takes_its_copy_twice(void)
     use(HIGH, APP_AREA_OUTPUT, 8, 8, 0);
     start(true);
     CHECK_EQUAL(used * CDL_IMAGE_UNIT, 2 * 16 + 8);
-    CHECK_EQUAL(context[LOW].area[APP_AREA_INPUT], fake_area(APP_AREA_INPUT));
-    CHECK_EQUAL(byte_of(LOW, APP_AREA_OUTPUT, 0), (RTS_UI8 *)copies);
-    CHECK_EQUAL(byte_of(HIGH, APP_AREA_OUTPUT, 8), (RTS_UI8 *)copies + 32);
+    CHECK_SAME(context[LOW].area[APP_AREA_INPUT], fake_area(APP_AREA_INPUT));
+    CHECK_SAME(byte_of(LOW, APP_AREA_OUTPUT, 0), (RTS_UI8 *)copies);
+    CHECK_SAME(byte_of(HIGH, APP_AREA_OUTPUT, 8), (RTS_UI8 *)copies + 32);
 }
 
 static void an_address_in_a_copy_is_that_of_the_area(void)

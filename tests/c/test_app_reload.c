@@ -72,6 +72,7 @@ static void a_download_that_is_under_way_can_go_on(void)
 
 int main(void)
 {
+    NEEDS_X86_64;
     RUN(what_is_in_ram_is_lost_and_retain_variables_are_kept);
     RUN(a_stopped_application_runs_after_it);
     RUN(without_boot_project_there_is_nothing_to_reload);

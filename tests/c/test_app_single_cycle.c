@@ -132,6 +132,7 @@ static void components_see_a_start_and_a_stop(void)
 
 int main(void)
 {
+    NEEDS_X86_64;
     RUN(each_task_has_one_cycle_and_no_other_one_follows);
     RUN(tasks_follow_each_other_by_priority);
     RUN(a_task_that_waits_for_an_event_runs_if_that_comes_in_the_cycle);

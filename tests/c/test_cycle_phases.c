@@ -140,6 +140,7 @@ static void after_code_that_failed_there_is_nothing_but_the_safe_state(void)
 
 int main(void)
 {
+    NEEDS_X86_64;
     RUN(a_cycle_has_its_phases_in_order);
     RUN(no_more_phases_than_there_is_room_for);
     RUN(a_stop_enters_the_safe_state);

@@ -9,7 +9,8 @@
 
 #include "test.h"
 
-static const RTS_UI8 code[64];
+enum { UNIT = 1 + APP_ENTRY_MODE_BIT }; /* bytes of the shortest instruction */
+static const RTS_UI8 code[64 * UNIT];
 static uintptr_t stack[EXCEPT_MAX_CALLS + 4];
 
 static void setup(void)
@@ -19,9 +20,10 @@ static void setup(void)
     memset(stack, 0, sizeof stack);
 }
 
-static uintptr_t in_code(RTS_UI32 offset)
+/* As what follows a call there is on the stack. */
+static uintptr_t in_code(RTS_UI32 instructions)
 {
-    return (uintptr_t)code + offset;
+    return (uintptr_t)code + instructions * UNIT + APP_ENTRY_MODE_BIT;
 }
 
 static void only_words_that_lead_into_the_code_are_kept(void)
@@ -35,8 +37,8 @@ static void only_words_that_lead_into_the_code_are_kept(void)
     stack[3] = in_code(1);
     SysExceptTrace(in_code(5), stack, stack + 4, 0);
     CHECK_EQUAL(trace->count, 2);
-    CHECK(trace->call[0].target == 64 && trace->call[0].distance == sizeof stack[0]);
-    CHECK(trace->call[1].target == 1 && trace->call[1].distance == 3 * sizeof stack[0]);
+    CHECK(trace->call[0].target == 64 * UNIT && trace->call[0].distance == sizeof stack[0]);
+    CHECK(trace->call[1].target == 1 * UNIT && trace->call[1].distance == 3 * sizeof stack[0]);
 }
 
 /* What points to the start of the code is a function. */
@@ -55,7 +57,7 @@ static void the_link_register_is_distinguished(void)
 
     setup();
     SysExceptTrace(in_code(5), NULL, NULL, in_code(7));
-    CHECK(trace->count == 1 && trace->call[0].target == 7 && trace->call[0].distance == EXCEPT_LINK);
+    CHECK(trace->count == 1 && trace->call[0].target == 7 * UNIT && trace->call[0].distance == EXCEPT_LINK);
 }
 
 static void a_full_trace_keeps_the_nearest(void)
@@ -68,7 +70,7 @@ static void a_full_trace_keeps_the_nearest(void)
         stack[i] = in_code(1 + i);
     SysExceptTrace(in_code(5), stack, stack + RTS_COUNT(stack), 0);
     CHECK_EQUAL(trace->count, EXCEPT_MAX_CALLS);
-    CHECK_EQUAL(trace->call[EXCEPT_MAX_CALLS - 1].target, EXCEPT_MAX_CALLS);
+    CHECK_EQUAL(trace->call[EXCEPT_MAX_CALLS - 1].target, EXCEPT_MAX_CALLS * UNIT);
 }
 
 static void the_first_exception_counts_until_it_is_forgotten(void)
@@ -78,13 +80,13 @@ static void the_first_exception_counts_until_it_is_forgotten(void)
     setup();
     SysExceptTrace(in_code(5), NULL, NULL, in_code(7));
     SysExceptTrace(in_code(6), NULL, NULL, in_code(8));
-    CHECK(trace->count == 1 && trace->call[0].target == 7);
+    CHECK(trace->count == 1 && trace->call[0].target == 7 * UNIT);
     SysExceptKeepTrace(in_code(5));
     CHECK_EQUAL(trace->count, 1);
     SysExceptForgetTrace();
     CHECK_EQUAL(trace->count, 0);
     SysExceptTrace(in_code(6), NULL, NULL, in_code(8));
-    CHECK(trace->count == 1 && trace->call[0].target == 8);
+    CHECK(trace->count == 1 && trace->call[0].target == 8 * UNIT);
 }
 
 static void the_trace_of_another_exception_is_not_kept(void)

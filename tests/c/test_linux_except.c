@@ -501,7 +501,7 @@ static void shutdown_gives_the_handlers_back(void)
     CHECK_EQUAL(code_of(read_null), RTSEXCPT_ACCESS_VIOLATION);
     SysExceptShutdown();
     sigaction(SIGSEGV, NULL, &now);
-    CHECK_EQUAL(now.sa_handler, exit_42);
+    CHECK_SAME(now.sa_handler, exit_42);
     signal(SIGSEGV, SIG_DFL);
     CHECK_EQUAL(code_of(read_null), RTSEXCPT_ACCESS_VIOLATION);
 }

@@ -230,11 +230,13 @@ static void a_file_that_is_no_flash_is_refused_and_not_touched(void)
 static const RTS_UI8 return_42[8] = {0xB8, 42, 0, 0, 0, 0xC3, 0x90, 0x90}; /* mov eax, 42; ret */
 #elif defined(__aarch64__)
 static const RTS_UI8 return_42[8] = {0x40, 0x05, 0x80, 0x52, 0xC0, 0x03, 0x5F, 0xD6}; /* mov w0, 42; ret */
+#elif defined(__arm__)
+static const RTS_UI8 return_42[8] = {0x2A, 0x20, 0x70, 0x47, 0x00, 0xBF, 0x00, 0xBF}; /* movs r0, #42; bx lr */
 #endif
 
 static int call(const RTS_UI8 *code)
 {
-    return ((int (*)(void))(uintptr_t)code)();
+    return ((int (*)(void))((uintptr_t)code | APP_ENTRY_MODE_BIT))();
 }
 
 static void code_of_both_slots_runs_until_it_is_released(void)

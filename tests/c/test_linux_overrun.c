@@ -183,6 +183,9 @@ AS_COMPILED_ST static void destroy_registers(void *arg)
 #elif defined(__aarch64__)
     __asm__ volatile("mov x19, #-1\n\tmov x20, #-1\n\tmov x21, #-1\n\tmov x22, #-1\n\tmov x23, #-1\n\tmov x24, #-1\n\t"
                      "mov x25, #-1\n\tmov x26, #-1\n\tmov x27, #-1\n\tmov x28, #-1");
+#elif defined(__arm__)
+    __asm__ volatile("mvn r4, #0\n\tmov r5, r4\n\tmov r6, r4\n\tmov r8, r4\n\tmov r9, r4\n\tmov r10, r4\n\t"
+                     "vmov d8, r4, r4\n\tvmov d15, r4, r4");
 #endif
 }
 
@@ -193,6 +196,8 @@ AS_COMPILED_ST static void destroy_stack_pointer(void *arg)
     __asm__ volatile("movq $-1, %rsp\n\tpushq %rax");
 #elif defined(__aarch64__)
     __asm__ volatile("mov x0, #-16\n\tmov sp, x0\n\tstr x0, [sp]");
+#elif defined(__arm__)
+    __asm__ volatile("mvn r0, #15\n\tmov sp, r0\n\tstr r0, [sp]");
 #endif
 }
 

@@ -54,6 +54,7 @@ static void post(int number)
 /* Not inlined, so that only its instructions, and those it returns through, are stopped at. */
 static RTS_NOINLINE void create(RTS_UI32 count, bool interrupted)
 {
+    RTS_UNUSED(interrupted);
 #ifdef __x86_64__
     if (interrupted)
         __asm__ volatile("pushfq; orq %0, (%%rsp); popfq" ::"i"(TRAP_FLAG) : "memory", "cc");

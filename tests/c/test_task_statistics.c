@@ -38,6 +38,7 @@ static void the_load_counts_tasks_of_every_kind_over_the_time_since_their_start(
 
 int main(void)
 {
+    NEEDS_X86_64;
     RUN(the_load_counts_tasks_of_every_kind_over_the_time_since_their_start);
     RUN(the_average_starts_again_when_the_count_does);
     return test_result();

@@ -16,10 +16,19 @@ import pytest
 sys.path.append(str(Path(__file__).parents[1]))
 
 from done import Done
-from plctool_commands import run_plctool
+from emulated import reason_to_skip
+from plctool_commands import TARGET, build_for_plcrt, run_plctool
 
 from plctool.testing import waiting
 from plctool.testing.plcrt import Plcrt, find_plcrt
+
+build_for_plcrt()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items if TARGET in os.environ else []:
+        if reason := reason_to_skip(item.nodeid):
+            item.add_marker(pytest.mark.skip(reason=reason))
 
 
 @dataclass

@@ -56,6 +56,8 @@ static void fill_with_returns(APP_BYTES *image, CDL_SEGMENT code)
 {
 #if defined(__aarch64__)
     static const uint8_t ret[] = {0xC0, 0x03, 0x5F, 0xD6};
+#elif defined(__arm__)
+    static const uint8_t ret[] = {0x70, 0x47};
 #else
     static const uint8_t ret[] = {0xC3};
 #endif

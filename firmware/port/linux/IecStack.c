@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * One mapping per stack: guard, stack, guard, memory for signal handlers, guard. Guards cost address space only. They are
- * wide, for code that does not probe its frames page by page: compiled code does, C functions of the runtime and images
+ * One mapping per stack: guard, stack, guard, memory for signal handlers, guard. Guards cost address space only, which
+ * processors of 32 bits have little of. They are wide, for code that does not probe its frames page by page: compiled code does, C functions of the runtime and images
  * of other compilers need not.
  */
 #define _GNU_SOURCE
@@ -19,7 +19,8 @@
 #endif
 
 #define STACK_SIZE ((size_t)RTS_IEC_STACK_SIZE)
-#define GUARD_SIZE ((size_t)(sizeof(void *) > 4 ? 16 : 4) * 1024 * 1024)
+#define GUARD_SIZE ((size_t)16 * 1024 * 1024) /* where the stack grows into */
+#define GUARD_ABOVE ((size_t)(sizeof(void *) > 4 ? 16 : 2) * 1024 * 1024)
 #define SIGNAL_SIZE ((size_t)64 * 1024) /* a signal frame with all vector registers takes up to 20 KiB */
 
 int IecStackSwitch(void (*fn)(void *arg), void *arg, IEC_STACK *stack, RTS_UI32 running);
@@ -34,7 +35,7 @@ __thread IEC_STACK *IecStackOfThread;
 
 bool IecStackReserve(IEC_STACK *stack)
 {
-    size_t size = GUARD_SIZE + STACK_SIZE + GUARD_SIZE + SIGNAL_SIZE + GUARD_SIZE;
+    size_t size = GUARD_SIZE + STACK_SIZE + GUARD_ABOVE + SIGNAL_SIZE + GUARD_ABOVE;
     if (stack->top != 0) {
         return true;
     }
@@ -43,7 +44,7 @@ bool IecStackReserve(IEC_STACK *stack)
         return false;
     }
     char *bottom = memory + GUARD_SIZE;
-    char *signals = bottom + STACK_SIZE + GUARD_SIZE;
+    char *signals = bottom + STACK_SIZE + GUARD_ABOVE;
     if (mprotect(bottom, STACK_SIZE, PROT_READ | PROT_WRITE) != 0 ||
         mprotect(signals, SIGNAL_SIZE, PROT_READ | PROT_WRITE) != 0) {
         munmap(memory, size);
@@ -57,7 +58,7 @@ bool IecStackReserve(IEC_STACK *stack)
 void *IecStackSignalMemory(const IEC_STACK *stack, size_t *size)
 {
     *size = SIGNAL_SIZE;
-    return (void *)(stack->top + GUARD_SIZE);
+    return (void *)(stack->top + GUARD_ABOVE);
 }
 
 bool IecStackIsOverflow(const IEC_STACK *stack, uintptr_t address)

@@ -639,9 +639,13 @@ RTS_RESULT SysSockRecvRefused(RTS_HANDLE socket, SOCKADDRESS *to)
     } control;
     struct sockaddr_in receiver;
     struct msghdr message;
+    char start; /* of the datagram: QEMU's user mode gives no message to a caller without room for data */
+    struct iovec room = {.iov_base = &start, .iov_len = sizeof(start)};
     do {
         message = (struct msghdr){.msg_name = &receiver,
                                   .msg_namelen = sizeof(receiver),
+                                  .msg_iov = &room,
+                                  .msg_iovlen = 1,
                                   .msg_control = &control,
                                   .msg_controllen = sizeof(control)};
         if (recvmsg(file_of(socket), &message, MSG_ERRQUEUE) < 0) {
