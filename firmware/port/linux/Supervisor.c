@@ -52,6 +52,7 @@ static struct {
     RTS_I64 restarts_ms[PORT_PROGRAM_RESTARTS]; /* when programs were started again; the oldest is replaced */
     unsigned restarts;                          /* in all */
     unsigned restart;                           /* PortProgramRestart */
+    unsigned deaths;                            /* in all */
     unsigned end_signals;                       /* received */
     RTS_I64 kill_ms;                            /* when a worker that was asked to end has to be gone */
     char text[40];
@@ -145,6 +146,11 @@ void PortNoteRunning(bool running)
     }
 }
 
+unsigned PortDeaths(void)
+{
+    return state.deaths;
+}
+
 unsigned PortProgramRestart(void)
 {
     return state.restart;
@@ -178,7 +184,7 @@ static bool start_worker(void)
         be_worker(supervisor);
     }
     if (state.worker < 0) {
-        fprintf(stderr, "plcrt: cannot start a process: %s\n", strerror(errno));
+        PortPrint(PORT_ERROR, "cannot start a process: %s", strerror(errno));
     }
     PortComHandOver();
     PortCanHandOver();
@@ -230,6 +236,7 @@ static void note_death(int status)
 {
     int number = WIFSIGNALED(status) ? WTERMSIG(status) : state.life->number; /* a sanitizer exits */
     RTS_UI32 exception = RTSEXCPT_NOEXCEPTION;
+    state.deaths++;
     if (number != 0) {
         exception = describe_signal(number);
     } else {
@@ -313,7 +320,7 @@ static int wait_for_worker(const sigset_t *set)
     while (waitpid(state.worker, &status, WNOHANG) != state.worker) {
         wait_for_signal(set, state.kill_ms);
         if (state.kill_ms != 0 && now_ms() >= state.kill_ms) {
-            fprintf(stderr, "plcrt: the controller did not end when it was asked to and was killed\n");
+            PortPrint(PORT_ERROR, "the controller did not end when it was asked to and was killed");
             signal_worker(SIGKILL);
             state.kill_ms += PORT_END_MS;
         }
@@ -338,16 +345,16 @@ static bool survives(int status, const sigset_t *set)
     note_death(status);
     count_failure();
     if (state.end_signals != 0) {
-        fprintf(stderr, "plcrt: the controller died while it ended (%s)\n", state.text);
+        PortPrint(PORT_ERROR, "the controller died while it ended (%s)", state.text);
         return false;
     }
     if (state.failures >= PORT_MAX_FAILURES && state.start.cause == SYS_START_CRASH) {
-        fprintf(stderr, "plcrt: the controller died %u times in a row without a program (%s): try another flash file\n",
-                state.failures, state.text);
+        PortPrint(PORT_CRITICAL, "the controller died %u times in a row without a program (%s): try another flash file",
+                  state.failures, state.text);
         return false;
     }
-    fprintf(stderr, "plcrt: the controller died (%s) and is started again; its program %s\n", state.text,
-            is_restart() ? "runs again if it is proven" : "stays stopped");
+    PortPrint(PORT_ERROR, "the controller died (%s) and is started again; its program %s", state.text,
+              is_restart() ? "runs again if it is proven" : "stays stopped");
     return pause_before_start(set);
 }
 
@@ -358,7 +365,7 @@ int PortSupervise(int (*work)(void))
     state.work = work;
     state.life = mmap(NULL, sizeof(*state.life), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (state.life == MAP_FAILED) {
-        fprintf(stderr, "plcrt: not enough memory: %s\n", strerror(errno));
+        PortPrint(PORT_ERROR, "not enough memory: %s", strerror(errno));
         return EXIT_FAILURE;
     }
     sigemptyset(&set);

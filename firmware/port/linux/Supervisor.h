@@ -27,6 +27,9 @@ void PortNoteRunning(bool running);
  * was what died; above PORT_PROGRAM_RESTARTS: it is not started any more. */
 unsigned PortProgramRestart(void);
 
+/* For the worker: how many workers before it have died. */
+unsigned PortDeaths(void);
+
 /* ---- SysStart.c ---- */
 
 /* Sets why the runtime starts; `start` stays. */

@@ -16,9 +16,12 @@
 #include "IoConfig.h"
 #include "Modbus.h"
 #include "ModbusToolLine.h"
+#include "LogReport.h"
+#include "Metrics.h"
 #include "Supervisor.h"
 #include "SysExcept.h"
 #include "SysFileFlash.h"
+#include "Systemd.h"
 #include "port.h"
 #include "rts_config.h"
 
@@ -51,6 +54,8 @@ typedef struct {
     MODBUS_TOOL_LINE tunnel;
     char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
     RTS_UI32 event_count;
+    const char *metrics;
+    RTS_UI32 metrics_s;
     bool alone;
     bool reset_password;
 } OPTIONS;
@@ -60,7 +65,7 @@ static const char usage[] =
     "             [--udp ADDRESS[:PORT]] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
     "             [--tunnel PATH] [--tunnel-unit N] [--tunnel-baud N] [--tunnel-parity even|odd|none] "
     "[--tunnel-drive]\n"
-    "             [--board NAME] [--event NAME=PIPE]...\n"
+    "             [--board NAME] [--event NAME=PIPE]... [--metrics FILE] [--metrics-every SECONDS]\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
@@ -91,6 +96,10 @@ static const char usage[] =
     "  --board NAME    what device.toml calls this machine: programs with inputs and outputs of another board are "
     "refused\n"
     "  --event N=PIPE  each byte written into the named pipe is the external event N of tasks\n"
+    "  --metrics FILE  writes cycles, jitter, overruns, errors, load and state as text for Prometheus: "
+    "docs/packages.md\n"
+    "  --metrics-every SECONDS\n"
+    "                  how often, 15 if not given\n"
     "  --reset-password\n"
     "                  removes the password that is in the flash file, and ends\n"
     "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
@@ -165,6 +174,8 @@ enum {
     OPTION_TUNNEL_BAUD,
     OPTION_TUNNEL_PARITY,
     OPTION_TUNNEL_DRIVE,
+    OPTION_METRICS,
+    OPTION_METRICS_EVERY,
 };
 
 /* clang-format off */
@@ -190,6 +201,8 @@ static const struct option long_options[] = {
     {"tunnel-baud", required_argument, NULL, OPTION_TUNNEL_BAUD},
     {"tunnel-parity", required_argument, NULL, OPTION_TUNNEL_PARITY},
     {"tunnel-drive", no_argument, NULL, OPTION_TUNNEL_DRIVE},
+    {"metrics", required_argument, NULL, OPTION_METRICS},
+    {"metrics-every", required_argument, NULL, OPTION_METRICS_EVERY},
     {NULL, 0, NULL, 0},
 };
 /* clang-format on */
@@ -271,6 +284,25 @@ static void parse_bit_rate(const char *text, PORT_CAN_OPTIONS *options)
     }
 }
 
+/* The temporary file beside it has a longer name. */
+static const char *parse_metrics(const char *text)
+{
+    if (text[0] == '\0' || strlen(text) >= PATH_MAX - METRICS_EXTRA) {
+        refuse("--metrics '%.40s' is not the name of a file: give for example /run/plcrt/main.prom", text);
+    }
+    return text;
+}
+
+static RTS_UI32 parse_seconds(const char *text)
+{
+    char *end = "";
+    RTS_UI32 seconds = parse_number(text, METRICS_LONGEST_S, &end);
+    if (seconds == UINT32_MAX || seconds == 0 || *end != '\0') {
+        refuse("--metrics-every %s is not a number of seconds: give 1 to %d", text, METRICS_LONGEST_S);
+    }
+    return seconds;
+}
+
 static RTS_UI8 parse_unit(const char *text)
 {
     char *end = "";
@@ -336,6 +368,12 @@ static void take_option(OPTIONS *options, int option)
     case OPTION_EVENT:
         take_event(options, optarg);
         break;
+    case OPTION_METRICS:
+        options->metrics = parse_metrics(optarg);
+        break;
+    case OPTION_METRICS_EVERY:
+        options->metrics_s = parse_seconds(optarg);
+        break;
     case OPTION_ALONE:
         options->alone = true;
         break;
@@ -387,6 +425,7 @@ static void take_place(int argc, char **argv, int option)
 static OPTIONS parse_options(int argc, char **argv)
 {
     OPTIONS options = {.baud = DEFAULT_BAUD,
+                       .metrics_s = METRICS_S,
                        .can_options = {.node = CAN_NODE, .base = CAN_ID_BASE, .bit_rate = CAN_BIT_RATE},
                        .tunnel = {NULL, {TUNNEL_BAUD, SYSCOM_PARITY_EVEN, 1, false}, TUNNEL_UNIT}};
     int option;
@@ -448,37 +487,12 @@ static void take_end_signals(int flags)
     sigprocmask(SIG_UNBLOCK, &ends, NULL);
 }
 
-/* The handle of the log entry that comes next. */
-static RTS_UI32 next_log_handle(void)
-{
-    LOG_ENTRY entry;
-    RTS_UI32 next = 1;
-    while (LogGetEntry(next, &entry) == ERR_OK) {
-        next = entry.handle + 1;
-    }
-    return next;
-}
-
-/* Prints the errors in the log from an entry on; false when there is none. */
-static bool report_errors(RTS_UI32 from)
-{
-    LOG_ENTRY entry;
-    bool found = false;
-    for (; LogGetEntry(from, &entry) == ERR_OK; from = entry.handle + 1) {
-        if (entry.log_class == LOG_ERROR) {
-            fprintf(stderr, "plcrt: %s\n", entry.text);
-            found = true;
-        }
-    }
-    return found;
-}
-
 /* Also what is wrong with the flash is said here, not only in the log: the device may have no other line. */
 static bool start(void)
 {
     RTS_RESULT result = CMInit();
-    if (!report_errors(1) && result != ERR_OK) {
-        fprintf(stderr, "plcrt: start-up failed with error 0x%04X\n", (unsigned)result);
+    if (!PortLogReport(true) && result != ERR_OK) {
+        PortPrint(PORT_ERROR, "start-up failed with error 0x%04X", (unsigned)result);
     }
     return result == ERR_OK;
 }
@@ -486,9 +500,11 @@ static bool start(void)
 /* Saves what is to be kept; false when some of it is lost. */
 static bool end(void)
 {
-    RTS_UI32 from = next_log_handle();
+    (void)PortLogReport(false);
+    PortSystemdStopping();
     (void)CMExit();
-    return !report_errors(from);
+    PortMetricsEnd();
+    return !PortLogReport(true);
 }
 
 /* No page of the runtime is to be fetched from disk in the middle of a cycle. */
@@ -505,6 +521,9 @@ static void main_loop(void)
         PortMainPass();
         (void)CMCallHook(CH_COMM_CYCLE);
         PortNoteRunning(AppGetState() == AS_RUN);
+        (void)PortLogReport(false);
+        PortMetricsPass();
+        PortSystemdPass();
         (void)PortWait(PORT_IDLE_MS);
     }
 }
@@ -575,6 +594,7 @@ static int run(void)
     if (PortIsUp()) {
         print_lines();
     }
+    PortSystemdReady();
     main_loop();
     return end() ? EXIT_SUCCESS : EXIT_RUNTIME;
 }
@@ -636,17 +656,17 @@ static void print_warnings(const OPTIONS *options)
 {
     bool tunnel = options->tunnel.name != NULL;
     if (options->serial == NULL && options->tcp == NULL && options->udp == NULL && options->can == NULL && !tunnel) {
-        fprintf(stderr, "plcrt: no tool can reach this controller: give --serial, --tcp, --udp, --can or --tunnel\n");
+        PortPrint(PORT_WARNING, "no tool can reach this controller: give --serial, --tcp, --udp, --can or --tunnel");
     }
     if (options->serial != NULL && !PortComIsThere()) {
-        fprintf(stderr, "plcrt: serial line %s is missing: it is used when it comes\n", options->serial);
+        PortPrint(PORT_WARNING, "serial line %s is missing: it is used when it comes", options->serial);
     }
     if (options->can != NULL && PortCanAway() != NULL) {
-        fprintf(stderr, "plcrt: CAN %s is missing (%s): it is used when it comes\n", options->can, PortCanAway());
+        PortPrint(PORT_WARNING, "CAN %s is missing (%s): it is used when it comes", options->can, PortCanAway());
     }
     if (PortFlashIsShared()) {
-        fprintf(stderr, "plcrt: other users may open %s, with the password and the program in it: chmod 600 %s\n",
-                options->flash, options->flash);
+        PortPrint(PORT_WARNING, "other users may open %s, with the password and the program in it: chmod 600 %s",
+                  options->flash, options->flash);
     }
 }
 
@@ -654,11 +674,11 @@ static void print_warnings(const OPTIONS *options)
 static int reset_password(const OPTIONS *options, PORT_REASON *reason)
 {
     if (access(options->flash, F_OK) != 0) { /* opening would make it */
-        fprintf(stderr, "plcrt: %s: %s\n", options->flash, strerror(errno));
+        PortPrint(PORT_ERROR, "%s: %s", options->flash, strerror(errno));
         return EXIT_RUNTIME;
     }
     if (!PortFlashOpen(options->flash, reason)) {
-        fprintf(stderr, "plcrt: %s\n", reason->text);
+        PortPrint(PORT_ERROR, "%s", reason->text);
         return EXIT_RUNTIME;
     }
     RTS_RESULT result = SysFileFlash_Hook(CH_INIT_SYSTEM2);
@@ -671,8 +691,7 @@ static int reset_password(const OPTIONS *options, PORT_REASON *reason)
     } else if (result == ERR_NO_OBJECT) {
         printf("There is no password in %s.\n", options->flash);
     } else {
-        fprintf(stderr, "plcrt: the password in %s cannot be removed: error 0x%04X\n", options->flash,
-                (unsigned)result);
+        PortPrint(PORT_ERROR, "the password in %s cannot be removed: error 0x%04X", options->flash, (unsigned)result);
     }
     return result == ERR_OK || result == ERR_NO_OBJECT ? EXIT_SUCCESS : EXIT_RUNTIME;
 }
@@ -683,15 +702,19 @@ int main(int argc, char **argv)
     PORT_REASON reason = {.busy = false};
     hold_standard_streams();
     ignore_signals();
+    PortSystemdInit();
     if (options.reset_password) {
         return reset_password(&options, &reason);
     }
     if (!open_when_free(&options, &reason) || !open_events(&options, &reason)) {
-        fprintf(stderr, "plcrt: %s\n", reason.text);
+        PortPrint(PORT_ERROR, "%s", reason.text);
         return EXIT_RUNTIME;
     }
     print_warnings(&options);
     ModbusToolLineSet(&options.tunnel);
+    if (options.metrics != NULL) {
+        PortMetricsSet(options.metrics, options.metrics_s);
+    }
     int status = options.alone ? run_alone() : PortSupervise(run_supervised);
     SysExceptShutdown();
     PortEventClose();

@@ -19,6 +19,15 @@ typedef struct {
 
 void PortReason(PORT_REASON *reason, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* The priorities of syslog. */
+typedef enum { PORT_CRITICAL = 2, PORT_ERROR = 3, PORT_WARNING = 4, PORT_INFO = 6, PORT_DEBUG = 7 } PORT_LEVEL;
+
+/* Prints a line to stderr, in one write: "plcrt: ..." for a terminal, "<4>..." with the priority for the journal of
+ * systemd. Control characters become blanks. */
+void PortPrint(PORT_LEVEL level, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* True if stderr is the journal: JOURNAL_STREAM has its device and inode. */
+bool PortIsJournal(void);
+
 /* Whether what could not be opened, by errno, may come later: a device that is not plugged in. A path outside of /dev that
  * is not a link either leads to no device. */
 bool PortMayCome(int error, const char *path);
