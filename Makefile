@@ -11,6 +11,7 @@
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each (ARGS="--only tcp,lines --seed 7")
+# make tree-sitter generates the parser of editors/tree-sitter-iecst from its grammar.js
 # make properties what holds for all values, tried with other ones than `make test` does (ARGS="-k call")
 #
 # Everything is installed into .venv and built in build*/; Debian packages that are missing are installed when you are root.
@@ -30,7 +31,7 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm lint format bench size wheel release run-release attack soak fuzz properties habits all clean
+.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm lint format bench size wheel release run-release attack soak fuzz properties habits tree-sitter all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm
 
 demo: $(VENV)/installed
@@ -146,6 +147,13 @@ properties: build/build.ninja
 	ninja --quiet -C build under_attack
 	@PYTHONPATH=.:host:build/host PLCRT=$(abspath build/firmware/port/linux/plcrt) \
 		$(BIN)/python -m pytest --quiet -m hypothesis --hypothesis-profile=new $(PROPERTIES) $(ARGS)
+
+# The parser is kept in the repository: editors need it, and the generator's npm package downloads a program from
+# elsewhere, which not every machine may do.
+tree-sitter:
+	command -v tree-sitter >/dev/null || npm install --prefix editors/tree-sitter-iecst --no-save --no-package-lock tree-sitter-cli
+	npm run --prefix editors/tree-sitter-iecst generate
+	npm run --prefix editors/tree-sitter-iecst test
 
 build/build.ninja: $(VENV)/dev
 	$(MESON) setup build
