@@ -11,6 +11,7 @@
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each (ARGS="--only tcp,lines --seed 7")
+# make vsix   the extension for VS Code, dist/plctool-*.vsix     make test-editors  all tests of editors/
 # make tree-sitter generates the parser of editors/tree-sitter-iecst from its grammar.js
 # make properties what holds for all values, tried with other ones than `make test` does (ARGS="-k call")
 #
@@ -31,8 +32,10 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm lint format bench size wheel release run-release attack soak fuzz properties habits tree-sitter all clean
+.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm lint format bench size wheel release run-release attack soak fuzz properties habits tree-sitter vsix test-editors all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm
+VSCODE := editors/vscode
+NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -43,6 +46,7 @@ test all bench size release linux-arm test-linux-arm: $(VENV)/dev
 
 run-test: run-all
 	$(BIN)/python tests/run_all.py --meson $(MESON) $(ARGS) $(LINUX_ARM:%=--processor %) $(BUILDS)
+run-test: run-all $(NODE_PACKAGES)
 
 run-all: $(BUILDS:%=%/build.ninja) $(LINUX_ARM:%=%/build.ninja)
 	set -e; for build in $(BUILDS); do $(MESON) compile -C $$build; done
@@ -74,12 +78,13 @@ test-kernel: build/build.ninja
 
 C_FILES = find firmware tests bench examples -name '*.[ch]' -print0
 
-lint: $(VENV)/dev
+lint: $(VENV)/dev $(NODE_PACKAGES)
 	$(C_FILES) | xargs -0 $(BIN)/clang-format --dry-run --Werror
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	MYPYPATH=host $(BIN)/mypy -p plctool
 	$(BIN)/python tests/docs/words.py
+	test ! -e $(VSCODE)/node_modules/.bin/eslint || npm run --silent --prefix $(VSCODE) lint
 
 format: $(VENV)/dev
 	$(C_FILES) | xargs -0 $(BIN)/clang-format -i
@@ -147,6 +152,26 @@ properties: build/build.ninja
 	ninja --quiet -C build under_attack
 	@PYTHONPATH=.:host:build/host PLCRT=$(abspath build/firmware/port/linux/plcrt) \
 		$(BIN)/python -m pytest --quiet -m hypothesis --hypothesis-profile=new $(PROPERTIES) $(ARGS)
+
+# What the tests of the extension need, where npm is. Without it, or where its registry cannot be reached, they are skipped.
+$(VSCODE)/node_modules/.package-lock.json: $(VSCODE)/package-lock.json
+	npm ci --prefix $(VSCODE) --ignore-scripts --no-audit --no-fund --loglevel=error || \
+		echo "The tests of editors/vscode are left out: npm could not install its packages." >&2
+
+test-editors: build/build.ninja
+	./bootstrap.sh --editors
+	npm ci --prefix $(VSCODE) --ignore-scripts --no-audit --no-fund --loglevel=error
+	npm run --prefix $(VSCODE) lint
+	ninja --quiet -C build under_attack
+	$(MESON) test -C build editors --print-errorlogs
+
+vsix:
+	./bootstrap.sh --editors
+	npm ci --prefix $(VSCODE) --ignore-scripts --no-audit --no-fund --loglevel=error
+	npm ci --prefix $(VSCODE)/vsix --ignore-scripts --no-audit --no-fund --loglevel=error
+	npm run --prefix $(VSCODE)/vsix package
+	mkdir -p dist
+	mv $(VSCODE)/plctool-*.vsix dist/
 
 # The parser is kept in the repository: editors need it, and the generator's npm package downloads a program from
 # elsewhere, which not every machine may do.

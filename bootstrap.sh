@@ -2,7 +2,8 @@
 # bootstrap.sh VENV     makes a virtual environment, with what it needs from Debian: a C compiler, Python's headers and venv
 # bootstrap.sh --tests  installs what some tests need: cross compilers and QEMU, for Cortex-M, RISC-V, AArch64 and ARMv7, and
 #                       programs of others that speak Modbus, QEMU for a Linux kernel with hardware that is simulated, and
-#                       a browser for the page
+#                       a browser for the page, and Neovim for its set-up
+# bootstrap.sh --editors  installs what `make test-editors` and `make vsix` need: Node.js, npm and Neovim
 # bootstrap.sh --fuzz   installs clang, with which libFuzzer runs the fuzz targets
 #
 # Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the others what
@@ -31,8 +32,21 @@ if [ "$1" = --tests ]; then
     command -v mbpoll >/dev/null || set -- "$@" mbpoll
     command -v chromium >/dev/null || set -- "$@" chromium
     command -v chromedriver >/dev/null || set -- "$@" chromium-driver
+    command -v nvim >/dev/null || set -- "$@" neovim
     ls /usr/lib/*/libmodbus.so.5 >/dev/null 2>&1 || set -- "$@" libmodbus5
     [ $# = 0 ] || install "$@" || echo "Some tests are left out; for them: sudo apt-get install $*" >&2
+    exit 0
+fi
+
+if [ "$1" = --editors ]; then
+    set --
+    command -v node >/dev/null || set -- "$@" nodejs
+    command -v npm >/dev/null || set -- "$@" npm
+    command -v nvim >/dev/null || set -- "$@" neovim
+    [ $# = 0 ] || install "$@" || {
+        echo "Missing: $*. Install them, on Debian with: sudo apt-get install $*" >&2
+        exit 1
+    }
     exit 0
 fi
 
