@@ -166,7 +166,7 @@ test-editors: build/build.ninja
 	$(MESON) test -C build editors --print-errorlogs
 
 vsix:
-	./bootstrap.sh --editors
+	./bootstrap.sh --node
 	npm ci --prefix $(VSCODE) --ignore-scripts --no-audit --no-fund --loglevel=error
 	npm ci --prefix $(VSCODE)/vsix --ignore-scripts --no-audit --no-fund --loglevel=error
 	npm run --prefix $(VSCODE)/vsix package

@@ -3,7 +3,8 @@
 # bootstrap.sh --tests  installs what some tests need: cross compilers and QEMU, for Cortex-M, RISC-V, AArch64 and ARMv7, and
 #                       programs of others that speak Modbus, QEMU for a Linux kernel with hardware that is simulated, and
 #                       a browser for the page, and Neovim for its set-up
-# bootstrap.sh --editors  installs what `make test-editors` and `make vsix` need: Node.js, npm and Neovim
+# bootstrap.sh --node   installs Node.js and npm, for `make vsix`
+# bootstrap.sh --editors  the same, Neovim and Emacs, for `make test-editors`
 # bootstrap.sh --fuzz   installs clang, with which libFuzzer runs the fuzz targets
 #
 # Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the others what
@@ -38,11 +39,13 @@ if [ "$1" = --tests ]; then
     exit 0
 fi
 
-if [ "$1" = --editors ]; then
+if [ "$1" = --editors ] || [ "$1" = --node ]; then
+    editors=$1
     set --
     command -v node >/dev/null || set -- "$@" nodejs
     command -v npm >/dev/null || set -- "$@" npm
-    command -v nvim >/dev/null || set -- "$@" neovim
+    [ "$editors" = --node ] || command -v nvim >/dev/null || set -- "$@" neovim
+    [ "$editors" = --node ] || command -v emacs >/dev/null || set -- "$@" emacs-nox
     [ $# = 0 ] || install "$@" || {
         echo "Missing: $*. Install them, on Debian with: sudo apt-get install $*" >&2
         exit 1

@@ -22,13 +22,18 @@ export class Server implements vscode.Disposable {
         { scheme: 'file', pattern: '**/{plc,device,library}.toml' },
         { scheme: 'file', pattern: '**/*.io.toml' },
       ],
-      initializationOptions: { diagnostics: settings().get('diagnostics', 'typing') },
+      initializationOptions: { diagnostics: settings().get('diagnostics', 'typing'), delay: settings().get('delay', 150) },
       synchronize: {
         fileEvents: vscode.workspace.createFileSystemWatcher('**/*.{st,iec,TcPOU,TcDUT,TcGVL,TcIO,exp,xml,toml,eds}'),
       },
     };
     this.client = new LanguageClient('plctool', 'plctool', server, options);
     await this.client.start();
+  }
+
+  /** Tells the server that it has to ask for the settings again. */
+  async settingsChanged(): Promise<void> {
+    await this.client?.sendNotification('workspace/didChangeConfiguration', { settings: null });
   }
 
   async stop(): Promise<void> {

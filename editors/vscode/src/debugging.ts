@@ -1,8 +1,11 @@
 // The debug adapter, `plctool dap`, and the configuration of a program without launch.json.
 
+import { readFile } from 'node:fs/promises';
+import * as path from 'node:path';
 import * as vscode from 'vscode';
 
 import { activeFile, folderOf, settings, target, tool } from './setup';
+import { linkIn } from './tool';
 
 export function registerDebugging(hasAdapter: boolean): vscode.Disposable {
   return vscode.Disposable.from(
@@ -11,33 +14,39 @@ export function registerDebugging(hasAdapter: boolean): vscode.Disposable {
     }),
     vscode.debug.registerDebugAdapterDescriptorFactory('plctool', {
       createDebugAdapterDescriptor: (session) => {
-        const { path, environment } = tool();
+        const { path: command, environment } = tool();
         const cwd = session.workspaceFolder?.uri.fsPath ?? folderOf();
         const options = { env: { ...environment }, ...(cwd === undefined ? {} : { cwd }) };
-        return new vscode.DebugAdapterExecutable(path, ['dap'], options);
+        return new vscode.DebugAdapterExecutable(command, ['dap'], options);
       },
     }),
   );
 }
 
-function resolved(
+async function resolved(
   folder: vscode.WorkspaceFolder | undefined,
   configuration: vscode.DebugConfiguration,
   hasAdapter: boolean,
-): vscode.DebugConfiguration | undefined {
+): Promise<vscode.DebugConfiguration | undefined> {
   if (!hasAdapter) {
     void vscode.window.showErrorMessage('This plctool has no debug adapter; update it.');
     return undefined;
   }
   const program = target(activeFile())?.path ?? folder?.uri.fsPath;
-  const link = settings().get<string>('link', '');
   const isAttached = configuration.request === 'attach';
+  const link = isAttached ? await linkOf(program) : '';
   return {
-    ...(program === undefined ? {} : { program }),
-    ...(isAttached && link !== '' ? { link } : {}),
+    ...(isAttached || program === undefined ? {} : { program }),
+    ...(link === '' ? {} : { link }),
     ...configuration,
     type: 'plctool',
     request: isAttached ? 'attach' : 'launch',
     name: configuration.name === '' ? 'Debug in the simulator' : configuration.name,
   };
+}
+
+async function linkOf(project: string | undefined): Promise<string> {
+  const link = settings().get<string>('link', '');
+  if (link !== '' || project === undefined) return link;
+  return linkIn(await readFile(path.join(project, 'plc.toml'), 'utf8').catch(() => ''));
 }

@@ -27,6 +27,9 @@ async function start(context: vscode.ExtensionContext): Promise<void> {
     new LiveValues(context.workspaceState),
     new Tests(),
     registerTasks(),
+    vscode.workspace.onDidChangeConfiguration((change) => {
+      if (change.affectsConfiguration('plctool')) void server.settingsChanged().catch(complain);
+    }),
     ...(['check', 'build', 'flash', 'onlineChange', 'simulate'] as const).map((action) =>
       command(action, () => runAction(action)),
     ),

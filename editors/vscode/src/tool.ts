@@ -97,6 +97,12 @@ export function documentOf(ran: Ran): JsonObject {
   return document;
 }
 
+/** The link that a plc.toml names; "" if it names none. */
+export function linkIn(toml: string): string {
+  const match = /^link\s*=\s*(?:"([^"\n]*)"|'([^'\n]*)')/m.exec(toml);
+  return match?.[1] ?? match?.[2] ?? '';
+}
+
 /** The folder of the nearest plc.toml around a file, not above `root`; undefined if there is none. */
 export function projectOf(file: string, root: string, exists = existsSync): string | undefined {
   for (let folder = path.dirname(file); isWithin(folder, root); folder = path.dirname(folder)) {

@@ -7,7 +7,7 @@ import { test } from 'node:test';
 import { isDuration, missingFor, stepOf, taskArguments } from '../src/actions';
 import { filterFor, findPythonTests, findTests, junitOutcomes, outcomesOf } from '../src/discover';
 import { Lines } from '../src/lines';
-import { commandsIn, documentOf, environmentOf, findTool, projectOf, pythonOf, run, runJson, ToolError } from '../src/tool';
+import { commandsIn, documentOf, environmentOf, findTool, linkIn, projectOf, pythonOf, run, runJson, ToolError } from '../src/tool';
 import { childrenOf, entriesOf, literal, nameAt, qualified, readingOf } from '../src/values';
 
 void test('the configured plctool comes first, then that of the workspace, then that of the PATH', () => {
@@ -36,6 +36,12 @@ void test('the project of a file is the nearest plc.toml within the workspace', 
   const exists = (file: unknown): boolean => file === '/w/plant/plc.toml' || file === '/plc.toml';
   assert.equal(projectOf('/w/plant/src/main.st', '/w', exists), '/w/plant');
   assert.equal(projectOf('/w/other/main.st', '/w', exists), undefined);
+});
+
+void test('the link of a project is read from its plc.toml', () => {
+  assert.equal(linkIn('sources = []\n# link = "no"\nlink = "tcp:10.0.0.2" # there\n'), 'tcp:10.0.0.2');
+  assert.equal(linkIn("link = 'serial:/dev/ttyS0'"), 'serial:/dev/ttyS0');
+  assert.equal(linkIn('sources = []'), '');
 });
 
 void test('a document with an error is raised with its message', () => {

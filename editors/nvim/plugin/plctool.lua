@@ -1,0 +1,3 @@
+if vim.g.plctool_setup ~= false then
+  require('plctool').setup()
+end
