@@ -27,6 +27,7 @@ SHARED = [
     "CmpAppEmbedded.h",
     "CmpForce.h",
     "CmpOperationControl.h",
+    "CmpTraceMgr.h",
     "CmpIecTask.h",
     "CmpItf.h",
     "CmpLog.h",

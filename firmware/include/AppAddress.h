@@ -36,4 +36,25 @@ MON_RESULT AppAddressResolve(const AREA_ADDRESS *address, RTS_UI32 size, RTS_UI8
  * errors, or MONITORING_ERR_INVALID_POINTER: it leads into no area. */
 MON_RESULT AppAddressFollow(AREA_ADDRESS *address);
 
+enum {
+    PLACE_POINTERS = 3,   /* on the way to a variable, at most */
+    PLACE_ALL_BITS = 0xFF /* APP_PLACE.mask */
+};
+
+/* A number in the areas that is used in each cycle: forced or traced. Members that are not used are 0, so that two places
+ * can be compared as bytes. */
+typedef struct {
+    RTS_UI8 area; /* APP_AREA_* */
+    RTS_UI8 pointers;
+    RTS_UI8 size;                        /* 1, 2, 4 or 8 bytes */
+    RTS_UI8 mask;                        /* of a single byte: the bits that are meant */
+    RTS_UI32 offset[1 + PLACE_POINTERS]; /* in the area, and after each pointer; pointers are followed in each cycle */
+} APP_PLACE;
+
+/* Checks size and mask: else MONITORING_ERR_UNSUPPORTED_DATATYPE. */
+MON_RESULT AppPlaceCheck(const APP_PLACE *place);
+
+/* Finds a place by way of its pointers: *address has its area and the offset there. The errors of the functions above. */
+MON_RESULT AppPlaceFind(const APP_PLACE *place, AREA_ADDRESS *address, RTS_UI8 **at);
+
 #endif

@@ -24,37 +24,23 @@
 #include "rts_config.h"
 #endif
 
-enum {
-    FORCE_POINTERS = 3,   /* on the way to a variable, at most */
-    FORCE_ALL_BITS = 0xFF /* FORCE_PLACE.mask */
-};
-
-/* A forced place. Members that are not used are 0, so that two places can be compared as bytes. */
 typedef struct {
-    RTS_UI8 area; /* APP_AREA_*, not that of the code */
-    RTS_UI8 pointers;
-    RTS_UI8 size;                        /* 1, 2, 4 or 8 bytes */
-    RTS_UI8 mask;                        /* of a single byte: the bits that are forced */
-    RTS_UI32 offset[1 + FORCE_POINTERS]; /* in the area, and after each pointer; pointers are followed in each cycle */
-} FORCE_PLACE;
-
-typedef struct {
-    FORCE_PLACE place;
+    APP_PLACE place;
     RTS_UI64 value; /* in its first `size` bytes */
 } FORCED_VALUE;
 
 /* Checks whether a place can be forced now, on an application that is loaded. MONITORING_ERR_UNSUPPORTED_DATATYPE: its
  * size, or bits of more than a byte; MONITORING_ERR_OPERATION_DENIED: code and constants; or as AppAddressFollow. From
  * main. */
-MON_RESULT ForceCheck(const FORCE_PLACE *place);
-bool ForceHas(const FORCE_PLACE *place);
+MON_RESULT ForceCheck(const APP_PLACE *place);
+bool ForceHas(const APP_PLACE *place);
 
 /* Forces a checked place, at once and in each cycle; in place of the value that it has been forced to, as the last one:
  * where two overlap, the last one holds. MONITORING_ERR_FORCE_FAILED above FORCE_MAX. From main. */
-MON_RESULT ForceSet(const FORCE_PLACE *place, RTS_UI64 value);
+MON_RESULT ForceSet(const APP_PLACE *place, RTS_UI64 value);
 
 /* Ends it for one place, if it is forced, or for all. The variable keeps the value until it is written. From main. */
-void ForceEnd(const FORCE_PLACE *place);
+void ForceEnd(const APP_PLACE *place);
 void ForceEndAll(void);
 
 /* NULL after the last one, in the order in which they were forced. From main; valid until the list changes. */

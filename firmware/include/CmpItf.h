@@ -93,7 +93,9 @@ enum {
     CMPID_CmpFileTransfer = 0x002A,
     CMPID_SimModbus = 0x002B,
     CMPID_CmpForce = 0x002C,
-    CMPID_CmpOperationControl = 0x0030,
+    CMPID_CmpOperationControl = 0x0034,
+    CMPID_CmpTraceMgr = 0x0030,
+    CMPID_CmpTraceSrv = 0x0031,
 };
 
 /* Name of a component, "" when unknown. */

@@ -36,6 +36,9 @@
 #if HAS_CmpFileTransfer && FILE_STORE_FILES == 0
 #error "HAS_CmpFileTransfer: set FILE_STORE_FILES and FILE_STORE_SIZE in rts_config_port.h."
 #endif
+#if HAS_CmpTraceMgr && TRACE_BUFFER == 0
+#error "HAS_CmpTraceMgr: set TRACE_BUFFER, the bytes that traces may use, in rts_config_port.h."
+#endif
 #if HAS_CmpLogSrv && !HAS_CmpLog
 #error "HAS_CmpLogSrv needs HAS_CmpLog in cmp_list.c."
 #endif
@@ -121,6 +124,9 @@ enum {
 #endif
 #if HAS_CmpMonitor2
     CMP_ONE(CmpMonitor2)
+#endif
+#if HAS_CmpTraceMgr
+    CMP_ONE(CmpTraceSrv)
 #endif
 #if HAS_CmpIoMgrSrv
     CMP_ONE(CmpIoMgrSrv)

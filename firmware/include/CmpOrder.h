@@ -48,6 +48,9 @@ X(CmpForce)
 #if HAS_CmpOperationControl
 X(CmpOperationControl)
 #endif
+#if HAS_CmpTraceMgr
+X(CmpTraceMgr)
+#endif
 #ifdef PORT_COMPONENTS
 PORT_COMPONENTS(X)
 #endif
@@ -60,6 +63,9 @@ X(CmpLogSrv)
 #endif
 #if HAS_CmpMonitor2
 X(CmpMonitor2)
+#endif
+#if HAS_CmpTraceMgr
+X(CmpTraceSrv)
 #endif
 #if HAS_CmpIoMgrSrv
 X(CmpIoMgrSrv)

@@ -318,7 +318,7 @@ typedef struct {
     WIRE_UI32 size;
 } MON2_VALUE;
 
-/* One of TAG_MON2_FORCED (own): FORCE_PLACE and value. */
+/* One of TAG_MON2_FORCED (own): APP_PLACE and value. */
 typedef struct {
     RTS_UI8 area;
     RTS_UI8 pointers;
@@ -327,6 +327,41 @@ typedef struct {
     RTS_UI8 offset[16]; /* four numbers of 4 bytes */
     RTS_UI8 value[8];
 } MON2_FORCED;
+
+/* A place that is traced (own): APP_PLACE. */
+typedef struct {
+    RTS_UI8 area; /* APP_AREA_*, or TRACE_SYSTEM */
+    RTS_UI8 pointers;
+    RTS_UI8 size;
+    RTS_UI8 mask;
+    RTS_UI8 offset[16]; /* four numbers of 4 bytes */
+} TRACE_PLACE;
+
+/* TAG_TRACE_CONFIG (own): the configuration of a packet. Its records follow, a TRACE_PLACE each. */
+typedef struct {
+    WIRE_UI32 image_crc; /* of the application that it is for */
+    char name[16];       /* with NUL; "" if it has none */
+    RTS_UI8 flags;       /* TRACE_KEEP and others */
+    RTS_UI8 comparison;  /* TRACE_LESS and others */
+    RTS_UI8 task;        /* its index */
+    RTS_UI8 records;     /* how many */
+    WIRE_UI32 every;     /* records each n-th cycle; 1: all */
+    WIRE_UI32 samples;   /* how many, those before the trigger among them; 0: without end */
+    WIRE_UI32 before;    /* how many of them from before the trigger */
+    WIRE_UI64 constant;  /* the trigger compares with it */
+    TRACE_PLACE trigger;
+} TRACE_CONFIG;
+
+/* TAG_TRACE_STATE (own): what a packet has recorded. Samples are numbered from 0. */
+typedef struct {
+    WIRE_UI32 id;
+    WIRE_UI32 state;    /* TRACE_WAITING and others */
+    WIRE_UI32 written;  /* the number of the next sample */
+    WIRE_UI32 trigger;  /* the number of the first sample from the trigger on */
+    WIRE_UI32 first;    /* the number of the first sample that is packed here */
+    WIRE_UI32 count;    /* how many are packed here */
+    WIRE_UI32 capacity; /* how many samples there is room for */
+} TRACE_STATE;
 
 /* TAG_LOG_ENTRY. */
 typedef struct {
@@ -406,6 +441,9 @@ WIRE_SIZE(TASK_INFO, 40);
 WIRE_SIZE(MON2_APPLICATION, 20);
 WIRE_SIZE(MON2_VALUE, 6);
 WIRE_SIZE(MON2_FORCED, 28);
+WIRE_SIZE(TRACE_PLACE, 20);
+WIRE_SIZE(TRACE_CONFIG, 64);
+WIRE_SIZE(TRACE_STATE, 28);
 WIRE_SIZE(LOG_RECORD, 16);
 WIRE_SIZE(IO_STATE, 20);
 WIRE_SIZE(IO_PARAMETER, 16);

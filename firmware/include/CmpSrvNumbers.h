@@ -142,6 +142,7 @@ enum {
     SG_USERMGR = 0x0C,
     SG_PLCSHELL = 0x11,
     SG_MONITORING2 = 0x1B,
+    SG_TRACE = 0x60, /* own */
 };
 
 /* Device services and tags (4.4, 4.5). */
@@ -294,6 +295,21 @@ enum {
     MON2_OP_DER = 0x09, /* the value, of as many bytes as the next byte says, at an address */
     MON2_OP_ADD = 0x0E,
     MON2_OP_MASK = 0x40, /* own: of the byte at an address only the bits that are 1 in the next byte are written */
+};
+
+/* Traces (own; CmpTraceMgr.h). */
+enum {
+    SRV_TRACE_CREATE = 1,
+    SRV_TRACE_DELETE = 2,
+    SRV_TRACE_LIST = 3,
+    SRV_TRACE_READ = 4,
+    TAG_TRACE_CONFIG = 0x01,
+    TAG_TRACE_ID = 0x02,
+    TAG_TRACE_FROM = 0x03,
+    TAG_TRACE_RESULT = 0x04,
+    TAG_TRACE_RECORD = 0x05,
+    TAG_TRACE_STATE = 0x06,
+    TAG_TRACE_SAMPLES = 0x07,
 };
 
 /* Inputs and outputs; what is in them is our own. */

@@ -45,7 +45,7 @@ typedef struct CYCLE_ENTRY {
     struct CYCLE_ENTRY *next;
 } CYCLE_ENTRY;
 
-/* The same for what comes and goes, with FORCE_MAX. The component keeps `entry` and sets its `run`. Removed, it may still
+/* The same for what comes and goes, with CYCLE_PHASES_CHANGE. The component keeps `entry` and sets its `run`. Removed, it may still
  * be called in the cycles that run just now. IecCycleFindPhases must follow. From main, also while tasks run. */
 void CyclePhaseAdd(CYCLE_PHASE when, CYCLE_ENTRY *entry);
 void CyclePhaseRemove(CYCLE_PHASE when, const CYCLE_ENTRY *entry);

@@ -81,6 +81,10 @@ bool IecTaskBetweenCycles(void (*copy)(void));
  * context. */
 bool IecCycleMayRun(void);
 
+/* How long the cycle has taken until now, and how long after it was due it began; both end at 4.29 s. With TRACE_BUFFER,
+ * from CYCLE_RECORD of this task. */
+void IecTaskGetTimes(RTS_UI32 task, RTS_UI32 *cycle_ns, RTS_UI32 *late_ns);
+
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
  * simulator, between cycles. */
 RTS_RESULT IecTaskGetEntry(RTS_UI32 task, IEC_ENTRY *entry, IEC_CONTEXT **context);

@@ -286,9 +286,17 @@
 #define OPERATION_CONTROL 0
 #endif
 
+/* Bytes for what is traced (CmpTraceMgr.h): each packet takes some 150, 28 for each record, and its samples. 0: none, and
+ * no flash for them. It needs HAS_CmpTraceMgr in cmp_list.c, and two of EVENT_MAX_CALLBACKS. */
+#ifndef TRACE_BUFFER
+#define TRACE_BUFFER 0
+#endif
+
+/* 1: phases of the cycle come and go while tasks run. */
+#define CYCLE_PHASES_CHANGE (FORCE_MAX > 0 || TRACE_BUFFER > 0)
+
 /* Event callbacks that may be registered, all for components of a port but one each of CmpForce and
- * CmpOperationControl; five words each. 0: the
- * application sends no events. */
+ * CmpOperationControl and two of CmpTraceMgr; five words each. 0: the application sends no events. */
 #ifndef EVENT_MAX_CALLBACKS
 #define EVENT_MAX_CALLBACKS 8
 #endif

@@ -7,7 +7,7 @@ each does its own way is abstract.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any, Never, Self, overload
 from plctool.core import lib
 from plctool.debug.forced import ForcedPlace, ForceList, name_forced, place_of
 from plctool.debug.kept_changes import KeptChanges, kept_changes
+from plctool.debug.recording import Recording
 from plctool.debug.symbols import (
     SourceLine,
     SymbolTable,
@@ -32,6 +33,16 @@ from plctool.iec.types import ArrayType, StringType, StructType
 from plctool.image.file import image_crc, parse_image, read_program
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, AppState, LogEntry, Status, TaskInfo, went_down
+from plctool.link.traces import (
+    RunningTrace,
+    TraceConfig,
+    TraceOptions,
+    TraceState,
+    columns_of,
+    columns_on,
+    decode_config,
+    encode_config,
+)
 
 RESET_OPTIONS = {
     "warm": lib.RESET_OPTION_WARM,
@@ -426,9 +437,123 @@ class Controller(ABC):
             return DeviceError(f"{message}; {len(symbols)} more have no room: {advice}.", "force-full", error.result)
         if error.result == lib.MONITORING_ERR_NESTING_DEPTH:
             deep = max(symbols, key=lambda s: len(s.place[2]))
-            message = f"{deep.name} is at the end of more than {lib.FORCE_POINTERS} pointers"
+            message = f"{deep.name} is at the end of more than {lib.PLACE_POINTERS} pointers"
             return DeviceError(f"{message}; force it by the name that it was declared with.", "pointers", error.result)
         return error
+
+    # ---- traces ----
+
+    def trace(
+        self,
+        names: Sequence[str],
+        *,
+        task: str | None = None,
+        every: int = 1,
+        samples: int = 1000,
+        trigger: str | None = None,
+        before: int = 0,
+        level: bool = False,
+        wait: float | None = None,
+    ) -> Recording:
+        """Records variables in the cycles of a task, as an oscilloscope does, and returns when all `samples` are here.
+
+        `names`: of variables, structures and arrays; `@cycle`, `@late`, `@load` of the task. `task`: the first one by
+        default. `every`: its every n-th cycle. `trigger`: a condition such as "Main.x > 5" or the name of a BOOL, from
+        whose becoming true on samples are kept, and `before` of those before it; `level`: it need not have been false.
+        `wait`: seconds after which what is here then is returned. In the simulator time passes meanwhile.
+
+        Raises UsageError for what cannot be traced, DeviceError when the controller has no room or the trace is ended.
+        """
+        options = TraceOptions(every, samples, trigger, before, level)
+        with self.start_trace(names, options, task) as running:
+            return self.finish_trace(running, wait)
+
+    def start_trace(self, names: Sequence[str], options: TraceOptions, task: str | None = None) -> RunningTrace:
+        """Begins to record and returns at once; `poll` of what it returns reads what has been recorded."""
+        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+            raise UsageError(f'This takes a list of names, such as ["Main.a", "Main.b"], not {names!r}.')
+        table = self.symbols()
+        columns = columns_of(table, names)
+        index, info = self._task(task)
+        if info.kind != lib.KIND_CYCLIC and any(column.name == "@load" for column in columns):
+            raise UsageError(f"@load needs a cyclic task, and {info.name} is none; trace @cycle.", "not-traceable")
+        if options.name and any(known.name == options.name for known in self.traces()):
+            raise UsageError(
+                f"There is a trace {options.name}; end it with 'plctool trace --end {options.name}', or choose another "
+                "name.",
+                "trace-exists",
+            )
+        config = encode_config(table, columns, index, info.interval_us, options)
+        return RunningTrace(self, self.create_trace(config), decode_config(config), columns, info)
+
+    def finish_trace(self, running: RunningTrace, wait: float | None = None) -> Recording:
+        """Reads it until it is complete, for at most `wait` seconds."""
+        end = None if wait is None else self._now() + wait
+        while not running.is_complete and (end is None or self._now() < end):
+            if not running.poll():
+                self._pass_cycle(running.recording)
+        return running.recording
+
+    def traces(self) -> list[TraceConfig]:
+        """What is traced, by this tool and others."""
+        return [config for _, config in self._packets()]
+
+    def open_trace(self, name: str) -> RunningTrace:
+        """A trace that was begun with a name; its variables have the names of the symbols, if they are found."""
+        packet, config = self._packet(name)
+        table = None
+        with suppress(UsageError):
+            table = self._symbols_of(config.image_crc)
+        tasks = self.tasks()
+        if config.task >= len(tasks):
+            raise DeviceError(f"The program has no task for the trace {name}.", "no-task")
+        return RunningTrace(self, packet, config, columns_on(config, table), tasks[config.task])
+
+    def end_trace(self, name: str) -> None:
+        """Ends a trace that was begun with a name."""
+        self.delete_trace(self._packet(name)[0])
+
+    def _packet(self, name: str) -> tuple[int, TraceConfig]:
+        found = list(self._packets())
+        for packet, config in found:
+            if config.name.casefold() == name.casefold():
+                return packet, config
+        known = [config.name for _, config in found if config.name]
+        there = f"there are {', '.join(known)}" if known else "there is none with a name"
+        raise UsageError(f"There is no trace {name}; {there}.", "no-such-trace")
+
+    def _packets(self) -> Iterator[tuple[int, TraceConfig]]:
+        packet = 0
+        while (found := self.next_trace(packet)) is not None:
+            packet, data = found
+            yield packet, decode_config(data)
+
+    def _task(self, name: str | None) -> tuple[int, TaskInfo]:
+        """Index and statistics; the first one without a name."""
+        tasks = self.tasks()
+        for index, info in enumerate(tasks):
+            if name is None or info.name.casefold() == name.casefold():
+                return index, info
+        if name is None:
+            raise DeviceError("The program has no task.", "no-task")
+        raise UsageError(f"There is no task {name}; there are {', '.join(t.name for t in tasks)}.", "no-task")
+
+    @abstractmethod
+    def _pass_cycle(self, recording: Recording) -> None:
+        """Lets some time pass for the program."""
+
+    @abstractmethod
+    def create_trace(self, config: bytes) -> int:
+        """Begins a packet; as all with packets as TraceAccess says it."""
+
+    @abstractmethod
+    def delete_trace(self, packet: int) -> None: ...
+
+    @abstractmethod
+    def next_trace(self, packet: int) -> tuple[int, bytes] | None: ...
+
+    @abstractmethod
+    def read_trace(self, packet: int, first: int, sizes: Sequence[int]) -> TraceState: ...
 
     # ---- what each kind does its own way ----
 

@@ -14,6 +14,7 @@ from plctool.archives import MAX_BYTES, ArchiveError, inflate
 from plctool.controller import Closed, Controller, OtherTool
 from plctool.core import lib
 from plctool.debug.forced import ForcedPlace, ForceList
+from plctool.debug.recording import Recording
 from plctool.debug.symbols import SymbolTable, load_symbols
 from plctool.debug.variables import Change, Reading, Symbol, unreachable
 from plctool.errors import DeviceError, LinkError, UsageError, did_you_mean
@@ -23,7 +24,7 @@ from plctool.gateway.frames import BUSY
 from plctool.gateway.place import NoGateway
 from plctool.iec.types import Type
 from plctool.iec.values import decode, encode
-from plctool.link import file_services, io_services, services
+from plctool.link import file_services, io_services, services, traces
 from plctool.link.connection import SCAN_SECONDS, Choice, Connection, MessageLink, no_answer, patience_factor
 from plctool.link.file_services import SYMBOLS_NAME, FileList, Progress
 from plctool.link.io_services import IoDevice, IoModule
@@ -41,9 +42,11 @@ from plctool.link.names import Node
 from plctool.link.passwords import AskPassword, no_password
 from plctool.link.services import Identity, LogEntry, Stack, Status, TaskInfo
 from plctool.link.session import Session
+from plctool.link.traces import TraceState
 from plctool.link.transports import Link, can_transport, open_transport, parse_link, share_bus
 
 PASSWORD_VARIABLE = "PLC_PASSWORD"
+_TRACE_POLL = 0.05  # shortest time between two looks at a trace that has nothing new [s]
 _BUSY_POLL = 0.2  # shortest time between two looks at a device that another tool keeps to itself [s]
 
 
@@ -347,6 +350,24 @@ class Plc(Controller):
 
     def _read_forces(self) -> ForceList:
         return read_forced(self._session)
+
+    # ---- traces ----
+
+    def create_trace(self, config: bytes) -> int:
+        self._session.recover(self._session.application)
+        return traces.create(self._session, config)
+
+    def delete_trace(self, packet: int) -> None:
+        traces.delete(self._session, packet)
+
+    def next_trace(self, packet: int) -> tuple[int, bytes] | None:
+        return traces.next_packet(self._session, packet)
+
+    def read_trace(self, packet: int, first: int, sizes: Sequence[int]) -> TraceState:
+        return traces.read(self._session, packet, first, sizes)
+
+    def _pass_cycle(self, recording: Recording) -> None:
+        time.sleep(min(max(recording.interval_us / 1e6, _TRACE_POLL), 1.0))
 
     def _check_reachable(self, table: SymbolTable, symbols: Sequence[Symbol]) -> None:
         """Raises DeviceError when a pointer to one of the variables leads to no variable."""

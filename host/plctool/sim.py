@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
 from plctool.controller import Closed, Controller
 from plctool.core import error_name, give_back_core, lib, take_core
 from plctool.debug.forced import ForcedPlace, ForceList
+from plctool.debug.recording import Recording
 from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Change, Symbol, unreachable
@@ -25,10 +26,11 @@ from plctool.iec.areas import Area
 from plctool.iec.types import Type
 from plctool.image.file import image_crc, parse_image, read_program
 from plctool.image.targets import host_target
-from plctool.link import l7
+from plctool.link import l7, traces
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
 from plctool.link.session import no_application
+from plctool.link.traces import TraceState
 from plctool.sim_functions import SimFunctions
 from plctool.sim_io import SimIo, is_input, read_parameter, set_fault, set_modbus
 
@@ -40,6 +42,7 @@ _MAX_CYCLES = 0xFFFF_FFFF  # of one call of the C core
 _SECTOR = 4096
 _PROGRAM_UNIT = 8
 MAX_NS = 2**62  # at once; the clock goes twice as far
+_TRACE_MESSAGE = 64 * 1024  # bytes of samples at a time
 _NEVER = 2**63 - 1  # the last moment of that clock [ns]
 # What the C core runs before Python is asked whether the user wants it to end.
 _CYCLES_AT_ONCE = 100_000
@@ -413,7 +416,7 @@ class Simulator(Controller):
             _check_monitoring(lib.MONITORING_ERR_FORCE_FAILED)
         for symbol, place in changes:
             self._writable(symbol)
-            if len(place.hops) > lib.FORCE_POINTERS:
+            if len(place.hops) > lib.PLACE_POINTERS:
                 _check_monitoring(lib.MONITORING_ERR_NESTING_DEPTH)
             _check_monitoring(self._lib.ForceCheck(self._c_place(place)))
         for _, place in changes:
@@ -430,8 +433,39 @@ class Simulator(Controller):
         forced = (self._lib.ForceGet(index) for index in range(self._lib.ForceGetCount()))
         return ForceList(self._lib.ForceGetSerial(), self._lib.ForceGetRoom(), [_forced_place(f) for f in forced])
 
+    # ---- traces ----
+
+    def create_trace(self, config: bytes) -> int:
+        """It stays until it is ended: virtual time is no reason to forget it."""
+        kept = bytearray(config)
+        kept[self._ffi.offsetof("TRACE_CONFIG", "flags")] |= lib.TRACE_KEEP
+        packet, bad, error = self._ffi.new("RTS_UI32 *"), self._ffi.new("RTS_UI32 *"), self._ffi.new("MON_RESULT *")
+        result = self._lib.TraceCreate(bytes(kept), len(kept), packet, bad, error)
+        if result == lib.ERR_INVALID_REFERENCE:
+            raise traces.bad_place(error[0])
+        _check_trace(result)
+        return int(packet[0])
+
+    def delete_trace(self, packet: int) -> None:
+        _check_trace(self._lib.TraceDelete(packet))
+
+    def next_trace(self, packet: int) -> tuple[int, bytes] | None:
+        following, size = self._ffi.new("RTS_UI32 *", packet), self._ffi.new("RTS_UI32 *")
+        config = self._lib.TraceGetNext(following, size)
+        return None if config == self._ffi.NULL else (int(following[0]), bytes(self._ffi.buffer(config, size[0])))
+
+    def read_trace(self, packet: int, first: int, sizes: Sequence[int]) -> TraceState:
+        data, size = self._ffi.new("RTS_UI8[]", _TRACE_MESSAGE), self._ffi.new("RTS_UI32 *", _TRACE_MESSAGE)
+        state = self._ffi.new("TRACE_STATE *")
+        _check_trace(self._lib.TraceRead(packet, first, data, size, state))
+        packed = bytes(self._ffi.buffer(data, size[0]))
+        return traces.decode_state(bytes(self._ffi.buffer(state)), packed, sizes)
+
+    def _pass_cycle(self, recording: Recording) -> None:
+        self.run_for(max(recording.interval_us / 1000, 1))
+
     def _c_place(self, place: ForcedPlace) -> Any:
-        c = self._ffi.new("FORCE_PLACE *")
+        c = self._ffi.new("APP_PLACE *")
         c.area, c.pointers, c.size, c.mask = place.area, len(place.hops), place.size, place.mask
         c.offset[0 : 1 + len(place.hops)] = [place.offset, *place.hops]
         return c
@@ -516,6 +550,11 @@ def _check_monitoring(result: int) -> None:
     if result != lib.MONITORING_ERR_OK:
         name = l7.monitoring_error_name(result)
         raise DeviceError(f"The simulator refused the force: {name}.", l7.slug(name), result)
+
+
+def _check_trace(result: int) -> None:
+    with traces.explained():
+        l7.check_result(result, "trace")
 
 
 def _check(result: int, what: str) -> None:

@@ -20,6 +20,7 @@
 #include "CmpDevice.h"
 #include "CmpEventMgr.h"
 #include "CyclePhases.h"
+#include "FileStore.h"
 #include "CmpLogSrv.h"
 #include "CmpPlcShell.h"
 #include "CmpMonitor2.h"
@@ -27,6 +28,7 @@
 #include "CmpOperationControl.h"
 #include "CmpRouterEmbedded.h"
 #include "CmpSrv.h"
+#include "CmpTraceMgr.h"
 #include "CmpUserMgr.h"
 #include "NodeName.h"
 #include "Sim.h"
@@ -238,6 +240,39 @@ void CyclePhaseRemove(CYCLE_PHASE when, const CYCLE_ENTRY *entry)
 void IecCycleFindPhases(void)
 {
 }
+
+/* CmpTraceMgr.c keeps its packets; no task uses them. */
+RTS_RESULT IecTaskGetEntry(RTS_UI32 task, IEC_ENTRY *entry, IEC_CONTEXT **context)
+{
+    static IEC_CONTEXT made;
+
+    *entry = NULL;
+    *context = &made;
+    return task < fakes.task_count ? ERR_OK : ERR_INVALIDID;
+}
+
+void IecTaskGetTimes(RTS_UI32 task, RTS_UI32 *cycle_ns, RTS_UI32 *late_ns)
+{
+    RTS_UNUSED(task);
+    *cycle_ns = *late_ns = 0;
+}
+
+#if FILE_STORE_FILES > 0
+const FILE_ENTRY *FileStoreGet(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+    return NULL;
+}
+
+RTS_RESULT FileStoreRead(const FILE_ENTRY *entry, RTS_UI32 offset, void *data, RTS_UI32 size)
+{
+    RTS_UNUSED(entry);
+    RTS_UNUSED(offset);
+    RTS_UNUSED(data);
+    RTS_UNUSED(size);
+    return ERR_NO_CONSISTENCY;
+}
+#endif
 
 bool IecCycleMayRun(void)
 {
@@ -484,6 +519,9 @@ void fakes_hook(CMP_HOOK hook)
         CmpDevice_Hook,
         CmpAppSrv_Hook,
         CmpMonitor2_Hook,
+#if TRACE_BUFFER > 0
+        CmpTraceSrv_Hook,
+#endif
         CmpLogSrv_Hook,
         CmpPlcShell_Hook,
         CmpChannelServerEmbedded_Hook,

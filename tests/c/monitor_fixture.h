@@ -31,7 +31,7 @@ static void setup(void)
             fakes_area(area)[i] = (RTS_UI8)(i + 16 * area);
 }
 
-static void begin_request(void)
+static inline void begin_request(void)
 {
     BTagWriterInit(&writer, content, sizeof(content) - 20);
     BTagOpen(&writer, TAG_MON2_APPLICATION, BTAG_ALIGN_0);

@@ -203,15 +203,15 @@ static void a_full_list_refuses_the_first_one_that_has_no_room(void)
 
 static void pointers_are_noted_and_too_many_are_refused(void)
 {
-    RTS_UI8 code[5 + (FORCE_POINTERS + 1) * 6] = {MON2_OP_LD16, POINTER_AT, 0, MON2_OP_RAO, APP_AREA_DATA};
+    RTS_UI8 code[5 + (PLACE_POINTERS + 1) * 6] = {MON2_OP_LD16, POINTER_AT, 0, MON2_OP_RAO, APP_AREA_DATA};
     static const RTS_UI8 step[] = {MON2_OP_DER, MON2_POINTER_SIZE, MON2_OP_LD16, 0, 0, MON2_OP_ADD};
     BTAG entries;
 
-    for (RTS_UI32 i = 0; i <= FORCE_POINTERS; i++)
+    for (RTS_UI32 i = 0; i <= PLACE_POINTERS; i++)
         memcpy(code + 5 + 6 * i, step, sizeof(step));
     setup_forces();
     put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)(fakes_area(APP_AREA_DATA) + POINTER_AT)); /* to itself */
-    for (RTS_UI32 pointers = 1; pointers <= FORCE_POINTERS; pointers++) {
+    for (RTS_UI32 pointers = 1; pointers <= PLACE_POINTERS; pointers++) {
         begin_force();
         add_program(MON2_FORCE, 1, fakes_area(APP_AREA_DATA) + POINTER_AT, code, 5 + 6 * pointers);
         CHECK_EQUAL(send_force(), ERR_OK);
@@ -228,7 +228,7 @@ static void pointers_are_noted_and_too_many_are_refused(void)
     begin_force();
     add_program(MON2_UNFORCE, 1, "\0", code, 11); /* ends all the same */
     CHECK_EQUAL(send_force(), ERR_OK);
-    CHECK_EQUAL(list(0, &entries), FORCE_POINTERS - 1);
+    CHECK_EQUAL(list(0, &entries), PLACE_POINTERS - 1);
 }
 
 static void a_read_says_that_something_is_forced(void)

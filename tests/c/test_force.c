@@ -10,21 +10,21 @@
 
 enum { CYCLE_NS = 10000000, POINTER_AT = 32 };
 
-static FORCE_PLACE place_of(RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size)
+static APP_PLACE place_of(RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size)
 {
-    FORCE_PLACE place;
+    APP_PLACE place;
 
     memset(&place, 0, sizeof place);
     place.area = area;
     place.offset[0] = offset;
     place.size = size;
-    place.mask = FORCE_ALL_BITS;
+    place.mask = PLACE_ALL_BITS;
     return place;
 }
 
 static MON_RESULT force(RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size, RTS_UI64 value)
 {
-    FORCE_PLACE place = place_of(area, offset, size);
+    APP_PLACE place = place_of(area, offset, size);
     MON_RESULT result = ForceCheck(&place);
 
     return result == MONITORING_ERR_OK ? ForceSet(&place, value) : result;
@@ -32,7 +32,7 @@ static MON_RESULT force(RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size, RTS_UI64 va
 
 static void end(RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size)
 {
-    FORCE_PLACE place = place_of(area, offset, size);
+    APP_PLACE place = place_of(area, offset, size);
 
     ForceEnd(&place);
 }
@@ -112,7 +112,7 @@ static void a_value_of_each_size_leaves_what_is_around_it(void)
 
 static void forced_bits_leave_the_others_to_the_program(void)
 {
-    FORCE_PLACE place = place_of(APP_AREA_DATA, 0, 1);
+    APP_PLACE place = place_of(APP_AREA_DATA, 0, 1);
 
     begin_program();
     load();
@@ -175,7 +175,7 @@ static void put_pointer(uintptr_t value)
 
 static void a_pointer_is_followed_in_each_cycle(void)
 {
-    FORCE_PLACE place = place_of(APP_AREA_DATA, POINTER_AT, 4);
+    APP_PLACE place = place_of(APP_AREA_DATA, POINTER_AT, 4);
 
     place.pointers = 1;
     place.offset[1] = 4;
@@ -312,7 +312,7 @@ static void of_two_that_overlap_the_last_one_holds(void)
 
 static void what_cannot_be_forced_is_refused(void)
 {
-    FORCE_PLACE place = place_of(APP_AREA_DATA, 0, 2);
+    APP_PLACE place = place_of(APP_AREA_DATA, 0, 2);
 
     begin_program();
     load();

@@ -115,6 +115,17 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
         return SEED(0x1B, 0x60, APP "\x46\x04\0\0\0\0");
     case 32:
         return SEED(2, 0x20, "\x81\x01\x06\x11\x04" "SSSS");
+    case 33:
+        return SEED(0x60, 1, "\x01\x68" "\x4F\x3E\x2D\x1C" "pump\0\0\0\0\0\0\0\0\0\0\0\0" "\x02\x04\0\x02" "\x01\0\0\0" "\x20\0\0\0" "\x04\0\0\0" "\5\0\0\0\0\0\0\0"
+                         "\000\0\x04\xFF" "\x10\0\0\0" "\0\0\0\0\0\0\0\0\0\0\0\0"
+                         "\001\0\x04\xFF" "\x10\0\0\0" "\0\0\0\0\0\0\0\0\0\0\0\0"
+                         "\376\0\x04\xFF" "\4\0\0\0" "\0\0\0\0\0\0\0\0\0\0\0\0");
+    case 34:
+        return SEED(0x60, 2, "\x02\x04\x01\0\0\0");
+    case 35:
+        return SEED(0x60, 3, "\x02\x04\0\0\0\0");
+    case 36:
+        return SEED(0x60, 4, "\x02\x04\x01\0\0\0" "\x03\x04\0\0\0\0");
     default:
         return 0;
     }

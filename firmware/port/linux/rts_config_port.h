@@ -34,6 +34,7 @@
 #define SRV_NETWORKS 8
 #define FORCE_MAX 128
 #define OPERATION_CONTROL 1
+#define TRACE_BUFFER (4 * 1024 * 1024)
 #define TCP_BUFFER_SIZE 16384
 #define CAN_FD 1
 #define CAN_BLOCK_SIZE 0 /* the kernel has room */

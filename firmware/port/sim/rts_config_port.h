@@ -31,6 +31,9 @@
 #define SRV_OTHER_CLIENTS 1
 #define FORCE_MAX 128
 #define OPERATION_CONTROL 1
+#ifndef TRACE_BUFFER /* less for the C tests in QEMU */
+#define TRACE_BUFFER (1024 * 1024)
+#endif
 #define LOG_MAX_ENTRIES 64
 #define LOG_TEXT_SIZE 160
 #define CM_OWN_EXT_TABLES 8

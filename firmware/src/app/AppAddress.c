@@ -59,3 +59,27 @@ MON_RESULT AppAddressFollow(AREA_ADDRESS *address)
     memcpy(&pointer, memory, sizeof(pointer));
     return AppFindArea(pointer, &address->area, &address->offset) ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_POINTER;
 }
+
+MON_RESULT AppPlaceCheck(const APP_PLACE *place)
+{
+    RTS_UI32 size = place->size;
+
+    if (size == 0 || size > sizeof(RTS_UI64) || (size & (size - 1)) != 0 ||
+        (place->mask != PLACE_ALL_BITS && size != 1))
+        return MONITORING_ERR_UNSUPPORTED_DATATYPE;
+    return place->pointers <= PLACE_POINTERS ? MONITORING_ERR_OK : MONITORING_ERR_NESTING_DEPTH;
+}
+
+MON_RESULT AppPlaceFind(const APP_PLACE *place, AREA_ADDRESS *address, RTS_UI8 **at)
+{
+    MON_RESULT result = MONITORING_ERR_OK;
+    RTS_UI32 i;
+
+    address->area = place->area;
+    address->offset = place->offset[0];
+    for (i = 1; i <= place->pointers && result == MONITORING_ERR_OK; i++) {
+        result = AppAddressFollow(address);
+        address->offset += place->offset[i];
+    }
+    return result == MONITORING_ERR_OK ? AppAddressResolve(address, place->size, at) : result;
+}

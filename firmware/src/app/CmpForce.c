@@ -44,9 +44,9 @@ static CYCLE_ENTRY after_code = {put_all, NULL};
 
 /* ---- one value ---- */
 
-static RTS_UI32 store_of(const FORCE_PLACE *place, const RTS_UI8 *at)
+static RTS_UI32 store_of(const APP_PLACE *place, const RTS_UI8 *at)
 {
-    if (place->mask != FORCE_ALL_BITS)
+    if (place->mask != PLACE_ALL_BITS)
         return STORE_BITS;
     return ((uintptr_t)at & (place->size - 1u)) == 0 ? place->size : STORE_MISFIT;
 }
@@ -86,20 +86,11 @@ static RTS_INLINE void put(RTS_UI32 store, RTS_UI8 *at, const FORCED_VALUE *forc
     }
 }
 
-/* Finds a place by way of its pointers. An error while one of them leads to no variable, or to code. */
-static MON_RESULT find(const FORCE_PLACE *place, AREA_ADDRESS *address, RTS_UI8 **at)
+/* An error while a pointer leads to no variable, or to code. */
+static MON_RESULT find(const APP_PLACE *place, AREA_ADDRESS *address, RTS_UI8 **at)
 {
-    MON_RESULT result = MONITORING_ERR_OK;
-    RTS_UI32 i;
+    MON_RESULT result = AppPlaceFind(place, address, at);
 
-    address->area = place->area;
-    address->offset = place->offset[0];
-    for (i = 1; i <= place->pointers && result == MONITORING_ERR_OK; i++) {
-        result = AppAddressFollow(address);
-        address->offset += place->offset[i];
-    }
-    if (result == MONITORING_ERR_OK)
-        result = AppAddressResolve(address, place->size, at);
     return result == MONITORING_ERR_OK && address->area == APP_AREA_CODE ? MONITORING_ERR_OPERATION_DENIED : result;
 }
 
@@ -170,7 +161,7 @@ static void put_all(RTS_UI32 task, const IEC_CONTEXT *context)
 /* ---- the list ---- */
 
 /* Whether a task works on a copy of it, or may change it after the safe state. */
-static bool needs_search(const FORCE_PLACE *place)
+static bool needs_search(const APP_PLACE *place)
 {
     RTS_UI32 task;
 
@@ -185,24 +176,21 @@ static bool needs_search(const FORCE_PLACE *place)
     return !RTS_ONE_CORE;
 }
 
-MON_RESULT ForceCheck(const FORCE_PLACE *place)
+MON_RESULT ForceCheck(const APP_PLACE *place)
 {
-    RTS_UI32 size = place->size;
+    MON_RESULT result = AppPlaceCheck(place);
     AREA_ADDRESS address;
     RTS_UI8 *at;
 
-    if (size == 0 || size > sizeof(RTS_UI64) || (size & (size - 1)) != 0 ||
-        (place->mask != FORCE_ALL_BITS && size != 1))
-        return MONITORING_ERR_UNSUPPORTED_DATATYPE;
-    return find(place, &address, &at);
+    return result == MONITORING_ERR_OK ? find(place, &address, &at) : result;
 }
 
-static bool is_same(const FORCE_PLACE *a, const FORCE_PLACE *b)
+static bool is_same(const APP_PLACE *a, const APP_PLACE *b)
 {
     return memcmp(a, b, sizeof *a) == 0;
 }
 
-static RTS_UI32 index_of(const FORCE_PLACE *place)
+static RTS_UI32 index_of(const APP_PLACE *place)
 {
     RTS_UI32 i = 0;
 
@@ -211,12 +199,12 @@ static RTS_UI32 index_of(const FORCE_PLACE *place)
     return i;
 }
 
-bool ForceHas(const FORCE_PLACE *place)
+bool ForceHas(const APP_PLACE *place)
 {
     return index_of(place) < force.count;
 }
 
-static void remove_place(const FORCE_PLACE *place)
+static void remove_place(const APP_PLACE *place)
 {
     RTS_UI32 i = index_of(place);
 
@@ -244,7 +232,7 @@ static void note_change(bool had_some)
     IecCycleFindPhases();
 }
 
-static void append(const FORCE_PLACE *place, RTS_UI64 value)
+static void append(const APP_PLACE *place, RTS_UI64 value)
 {
     ENTRY *entry = &force.list[force.count];
 
@@ -259,7 +247,7 @@ static void append(const FORCE_PLACE *place, RTS_UI64 value)
     force.list[++force.count].store = STORE_END;
 }
 
-MON_RESULT ForceSet(const FORCE_PLACE *place, RTS_UI64 value)
+MON_RESULT ForceSet(const APP_PLACE *place, RTS_UI64 value)
 {
     bool had_some = force.count > 0;
     bool has_room;
@@ -276,7 +264,7 @@ MON_RESULT ForceSet(const FORCE_PLACE *place, RTS_UI64 value)
     return has_room ? MONITORING_ERR_OK : MONITORING_ERR_FORCE_FAILED;
 }
 
-void ForceEnd(const FORCE_PLACE *place)
+void ForceEnd(const APP_PLACE *place)
 {
     bool had_some = force.count > 0;
     RTS_UI32 lock = SysLockEnter();

@@ -65,11 +65,11 @@ static RTS_UI32 take(PROGRAM *program, RTS_UI32 size)
 }
 
 /* Goes on from the pointer at *address; where a force is parsed, notes it. */
-static MON_RESULT take_pointer(AREA_ADDRESS *address, FORCE_PLACE *place)
+static MON_RESULT take_pointer(AREA_ADDRESS *address, APP_PLACE *place)
 {
     if (FORCE_MAX == 0 || place == NULL)
         return AppAddressFollow(address);
-    if (place->pointers == FORCE_POINTERS)
+    if (place->pointers == PLACE_POINTERS)
         return MONITORING_ERR_NESTING_DEPTH;
     place->offset[place->pointers++] = address->offset;
     address->offset = 0;
@@ -78,7 +78,7 @@ static MON_RESULT take_pointer(AREA_ADDRESS *address, FORCE_PLACE *place)
 
 /* Takes "Ld16/Ld32 offset, Rao area" and any number of "Der pointer, Ld16/Ld32 offset, Add". With `place` no pointer is
  * followed, and *address has the area, and the offset after the last one. */
-static MON_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address, FORCE_PLACE *place)
+static MON_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address, APP_PLACE *place)
 {
     static const RTS_UI8 der[] = {MON2_OP_DER, MON2_POINTER_SIZE};
     RTS_UI32 wanted = MON2_OP_RAO;
@@ -156,7 +156,7 @@ static const RTS_UI8 *take_copy_head(PROGRAM *program)
 
 /* The address alone; to write also some bits at it, or a program that copies to it. *mask: NULL when this is not to
  * write. *place: see take_address. */
-static MON_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask, FORCE_PLACE *place)
+static MON_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask, APP_PLACE *place)
 {
     const RTS_UI8 *tail = mask != NULL ? take_copy_head(&program) : NULL;
     MON_RESULT result = take_address(&program, address, place);
@@ -440,7 +440,7 @@ static MON_RESULT write_variable(WRITE_VAR *var, bool commit)
 #if FORCE_MAX > 0
 static RTS_UI32 to_add; /* values that a request adds to the list, as far as it has been checked */
 
-static MON_RESULT check_force(const FORCE_PLACE *place)
+static MON_RESULT check_force(const APP_PLACE *place)
 {
     MON_RESULT result = ForceCheck(place);
 
@@ -451,7 +451,7 @@ static MON_RESULT check_force(const FORCE_PLACE *place)
     return result;
 }
 
-static MON_RESULT parse_force(WRITE_VAR *var, FORCE_PLACE *place)
+static MON_RESULT parse_force(WRITE_VAR *var, APP_PLACE *place)
 {
     AREA_ADDRESS address;
 
@@ -469,7 +469,7 @@ static MON_RESULT parse_force(WRITE_VAR *var, FORCE_PLACE *place)
 /* A place whose force ends may be one that cannot be reached any more. */
 static MON_RESULT force_variable(WRITE_VAR *var, bool commit)
 {
-    FORCE_PLACE place;
+    APP_PLACE place;
     RTS_UI64 value = 0;
     bool ends = var->action == MON2_UNFORCE;
     MON_RESULT result = parse_force(var, &place);
@@ -563,7 +563,7 @@ static void append_forced(BTAG_WRITER *reply, const FORCED_VALUE *forced)
     entry.pointers = forced->place.pointers;
     entry.size = forced->place.size;
     entry.mask = forced->place.mask;
-    for (RTS_UI32 i = 0; i <= FORCE_POINTERS; i++)
+    for (RTS_UI32 i = 0; i <= PLACE_POINTERS; i++)
         BytesPut32(entry.offset + 4 * i, forced->place.offset[i]);
     BytesPut32(entry.value, (RTS_UI32)forced->value);
     BytesPut32(entry.value + 4, (RTS_UI32)(forced->value >> 32));

@@ -19,12 +19,12 @@ CYCLE_ENTRY *cycle_phases[CYCLE_SAFE_STATE + 1];
 static struct {
     RTS_UI32 count; /* of those in the rows of phases */
     CYCLE_ENTRY row[PLACES];
-#if FORCE_MAX > 0
+#if CYCLE_PHASES_CHANGE
     RTS_UI32 taken; /* of `row` */
 #endif
 } phases;
 
-#if FORCE_MAX > 0
+#if CYCLE_PHASES_CHANGE
 #define TAKEN phases.taken
 #else
 #define TAKEN phases.count
@@ -49,13 +49,13 @@ RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run)
     entry = &phases.row[TAKEN];
     entry->run = run;
     append(when, entry);
-#if FORCE_MAX > 0
+#if CYCLE_PHASES_CHANGE
     phases.taken++;
 #endif
     return ERR_OK;
 }
 
-#if FORCE_MAX > 0
+#if CYCLE_PHASES_CHANGE
 void CyclePhaseAdd(CYCLE_PHASE when, CYCLE_ENTRY *entry)
 {
     entry->next = NULL;

@@ -43,6 +43,9 @@ typedef struct {
     RTS_UI32 max_ns;
     RTS_UI32 jitter_ns;
     RTS_UI64 sum_ns;
+#if TRACE_BUFFER > 0
+    RTS_I64 due_ns; /* of this cycle, while it is recorded */
+#endif
 } TASK;
 
 static struct {
@@ -232,7 +235,19 @@ static void run_phases_before(TASK *task)
         CyclePhasesRun(CYCLE_BEFORE_CODE, index_of(task), &task->context);
 }
 
-static void run_phases_after(TASK *task)
+static void record(TASK *task, RTS_I64 due_ns)
+{
+    if (cycle_phases[CYCLE_RECORD] == NULL)
+        return;
+#if TRACE_BUFFER > 0
+    task->due_ns = due_ns;
+#else
+    RTS_UNUSED(due_ns);
+#endif
+    CyclePhasesRun(CYCLE_RECORD, index_of(task), &task->context);
+}
+
+static void run_phases_after(TASK *task, RTS_I64 due_ns)
 {
     bool has_phases = CyclePhasesExist();
 
@@ -242,7 +257,7 @@ static void run_phases_after(TASK *task)
         AppImageCopyOut(index_of(task), &tasks.running);
     if (has_phases && SysAtomicLoad(&tasks.running)) {
         CyclePhasesRun(CYCLE_OUTPUTS, index_of(task), &task->context);
-        CyclePhasesRun(CYCLE_RECORD, index_of(task), &task->context);
+        record(task, due_ns);
     }
 }
 
@@ -261,7 +276,7 @@ static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
     if (!SysExceptTry(run_entry, task, &exception))
         return end_with_exception(task, exception.code, exception.address);
     if (task->has_phases)
-        run_phases_after(task);
+        run_phases_after(task, due_ns);
     elapsed_ns = SysTimeGetNs() - start_ns;
     account(task, start_ns - due_ns, elapsed_ns);
     if (watchdog_expired(task, SCHED_PROCESSOR_TIME ? used_ns(task) - used_before_ns : elapsed_ns))
@@ -502,6 +517,16 @@ RTS_RESULT IecCycleGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)
     info->jitter_us = task->jitter_ns / NS_PER_US;
     return ERR_OK;
 }
+
+#if TRACE_BUFFER > 0
+void IecTaskGetTimes(RTS_UI32 index, RTS_UI32 *cycle_ns, RTS_UI32 *late_ns)
+{
+    const TASK *task = &tasks.list[index];
+
+    *cycle_ns = saturate(SysTimeGetNs() - task->guard.start_ns);
+    *late_ns = saturate(task->guard.start_ns - task->due_ns);
+}
+#endif
 
 RTS_RESULT IecTaskGetEntry(RTS_UI32 index, IEC_ENTRY *entry, IEC_CONTEXT **context)
 {
