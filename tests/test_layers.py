@@ -33,7 +33,7 @@ FLOORS = (
     ("sim_functions",),
     ("device", "sim"),
     ("", "controller_documents", "sim_plant"),
-    ("port_check", "st_tests", "templates", "testing", "trace_file", "ui"),
+    ("port_check", "st_tests", "templates", "testing", "trace_file", "trace_plot", "ui"),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -87,9 +86,21 @@ class Recording:
 
     def rows(self) -> list[list[str]]:
         """The cells of each sample, the time [ms] first."""
-        texts = [[column.text(v) for v in values] for column, values in zip(self.columns, self.values, strict=True)]
-        times = [f"{time:.10g}" for time in self.times_ms]
+        return self.rows_from(0)
+
+    def rows_from(self, first: int) -> list[list[str]]:
+        """The same from a sample on."""
+        columns = zip(self.columns, self.values, strict=True)
+        texts = [[column.text(v) for v in values[first:]] for column, values in columns]
+        times = [f"{time:.10g}" for time in self.times_ms[first:]]
         return [list(row) for row in zip(times, *texts, strict=True)]
+
+    def newest(self, count: int) -> Recording:
+        """The last samples."""
+        values = [v[-count:] for v in self.values]
+        trigger = None if self.trigger is None else self.trigger - max(0, len(self) - count)
+        kept = trigger if trigger is not None and trigger >= 0 else None
+        return Recording(self.task, self.interval_us, self.columns, self.times_ns[-count:], values, kept, self.lost)
 
     def document(self) -> dict[str, Any]:
         """For machines."""
@@ -114,10 +125,7 @@ def number_reader(column: Column) -> Callable[[bytes], int | float]:
     base = base_of(column.type)
     if not isinstance(base, Elementary):
         base = ELEMENTARY[{1: "BYTE", 2: "WORD", 4: "DWORD", 8: "LWORD"}[column.type.size]]
-    code = {1: "B", 2: "H", 4: "I", 8: "Q"}[base.size]
     if base.kind is Kind.REAL:
-        code = "f" if base.size == 4 else "d"
-    elif base.signed:
-        code = code.lower()
-    unpack = struct.Struct(f"<{code}").unpack
-    return lambda data: unpack(data)[0]  # type: ignore[no-any-return]
+        return lambda data: float(decode(base, data))
+    signed = base.signed
+    return lambda data: int.from_bytes(data, "little", signed=signed)

@@ -36,6 +36,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("force", "values", "keep variables, inputs and outputs at a value, whatever the program and devices write"),
         Row("unforce", "values", "end what 'force' did"),
         Row("watch", "values", "print values of variables periodically"),
+        Row("trace", "trace", "record variables in each cycle of a task, as an oscilloscope does"),
         Row("ui", "ui", "show a page in a browser: live values, write, force, tasks, log, inputs and outputs"),
     ),
     "programs and images": (

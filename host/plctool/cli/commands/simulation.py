@@ -65,14 +65,14 @@ def run_arguments(command: Parser) -> None:
     )
     command.add_argument(
         "--trace", nargs="+", action="extend", default=[], type=utf8, metavar="NAME",
-        help="write the values after each cycle to a CSV file; may be repeated",
+        help="write the values after each cycle to a file; may be repeated",
     )  # fmt: skip
     command.add_argument(
         "-o",
         "--output",
         type=usable_path,
         metavar="FILE",
-        help="of --trace, - for the standard output; default: trace.csv",
+        help="of --trace: FILE.csv, .json, .html or .png, - for the standard output; default: trace.csv",
     )
     command.set_defaults(action=_run)
 
@@ -166,8 +166,17 @@ def _inputs(program: Path | Built, plant: Path | None) -> Iterator[Path]:
 
 def _run_traced(plc: Simulator, cycles: int | None, time_ms: float | None, trace: TraceFile) -> None:
     """As `run`, in steps."""
-    from plctool.trace_file import trace_csv
+    from plctool.trace_file import check_format, recording_of, render, run_recorded, trace_csv
 
+    if trace.path.suffix.lower() in (".json", ".html", ".png"):
+        check_format(trace.path)
+        recording = recording_of(plc, trace.names)
+        try:
+            run_recorded(plc, trace.names, cycles, time_ms, recording)
+        finally:
+            write_output(trace.path, render(recording, trace.path))
+        plc.check_running()
+        return
     lines: list[str] = []
     try:
         lines.extend(trace_csv(plc, trace.names, cycles, time_ms))
