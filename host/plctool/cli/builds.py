@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -161,21 +161,10 @@ def compiled(settings: Settings) -> BuildResult:
 
 
 def _compile(settings: Settings, target: str | None) -> BuildResult:
-    from plctool.compiler import compile_sources
+    from plctool.compiler import build
 
     is_own = target == settings.target  # else it is for this machine, whatever board the program is for
-    return compile_sources(
-        settings.files,
-        target=target,
-        level=settings.level,
-        checks=settings.checks,
-        debug=settings.debug,
-        warnings=settings.warnings,
-        board=settings.board if is_own else None,
-        firmware=settings.firmware if is_own else None,
-        limits=settings.limits,
-        dialect=settings.dialect,
-    )
+    return build(settings if is_own else replace(settings, target=target, board=None, firmware=None))
 
 
 def build_text(document: dict[str, Any]) -> str:

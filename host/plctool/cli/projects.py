@@ -4,40 +4,30 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from plctool.cli.links import project_link
-from plctool.compiler import IoFiles, Level, ProgramFiles, program_files
+from plctool.compiler import IoFiles, ProgramFiles, program_files
 from plctool.compiler.sources.dialect_of_files import dialect_of_files
 from plctool.compiler.sources.project import Project
+from plctool.compiler.sources.request import BuildRequest, request_of
 from plctool.compiler.syntax.warnings import WarningOptions, warning_options
 from plctool.errors import UsageError
 from plctool.project import DEFAULT_IMAGE, PROJECT_FILE, find_project
 
-DEFAULT_LEVEL: Level = 2
+DEFAULT_LEVEL = BuildRequest.level
 
 
 @dataclass(frozen=True)
-class Settings:
-    """`files`: what the program is made of; `output_named`: the command line says where `output` is; `own_folder`: the
-    project says so, so that its folder may be made; `dialect_file`: that for which the dialect was taken; the others as
-    in `compile_sources`."""
+class Settings(BuildRequest):
+    """`output_named`: the command line says where `output` is; `own_folder`: the project says so, so that its folder
+    may be made; `dialect_file`: that for which the dialect was taken."""
 
-    files: ProgramFiles
-    warnings: WarningOptions
     output: Path = Path(DEFAULT_IMAGE)
     output_named: bool = False
     own_folder: bool = False
-    target: str | None = None
-    level: Level = DEFAULT_LEVEL
-    checks: str = "all"
-    debug: bool = False
-    board: str | None = None
-    firmware: Path | None = None
-    limits: bool = True
-    dialect: str | None = None
     dialect_file: Path | None = None
 
     def every_file(self) -> Iterator[Path]:
@@ -54,22 +44,38 @@ def settings_of(args: argparse.Namespace) -> Settings:
     project = files.project
     if project is not None and project.link:  # a mistake in it is said before a device is wanted
         project_link(project.file, project.link_line, project.link)
+    named = getattr(args, "output", None)
     return Settings(
-        files,
-        _warnings(args, project),
-        output_named=getattr(args, "output", None) is not None,
-        own_folder=project is not None and getattr(args, "output", None) is None,
-        board=_board(args, project),
-        firmware=getattr(args, "firmware", None),
-        limits=not getattr(args, "no_limits", False),
-        **_with_dialect(files, _of_build(args, project)),
+        **vars(_request(args, files)),
+        output=named or (project.output if project is not None else Path(DEFAULT_IMAGE)),
+        output_named=named is not None,
+        own_folder=project is not None and named is None,
+        dialect_file=_dialect(args, files)[1],
     )
 
 
-def _with_dialect(files: ProgramFiles, chosen: dict[str, Any]) -> dict[str, Any]:
-    """What was chosen, with the dialect of the files when none was."""
-    found = None if "dialect" in chosen else dialect_of_files(files.source_files)
-    return chosen if found is None else {**chosen, "dialect": found[0], "dialect_file": found[1]}
+def _request(args: argparse.Namespace, files: ProgramFiles) -> BuildRequest:
+    """What the project asks for, where the command line says nothing else. A board has its own target."""
+    asked = request_of(files)
+    has_board = getattr(args, "board", None) or getattr(args, "firmware", None)
+    given = {name: getattr(args, name, None) for name in ("target", "level", "checks", "debug")}
+    chosen: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    return replace(
+        replace(asked, target=None) if has_board else asked,
+        **chosen,
+        warnings=_warnings(args, asked.warnings),
+        board=_board(args, files.project),
+        firmware=getattr(args, "firmware", None),
+        limits=not getattr(args, "no_limits", False),
+        dialect=_dialect(args, files)[0],
+    )
+
+
+def _dialect(args: argparse.Namespace, files: ProgramFiles) -> tuple[str | None, Path | None]:
+    """The dialect that is chosen; without a choice that of the files, and the file for which it is taken."""
+    chosen = getattr(args, "dialect", None) or request_of(files).dialect
+    found = dialect_of_files(files.source_files) if chosen is None else None
+    return (chosen, None) if found is None else found
 
 
 def settings_of_project(file: Path) -> Settings:
@@ -95,13 +101,10 @@ def needed_project() -> Path:
     return file
 
 
-def _warnings(args: argparse.Namespace, project: Project | None) -> WarningOptions:
+def _warnings(args: argparse.Namespace, asked: WarningOptions) -> WarningOptions:
     """Names that are not wanted add up."""
-    names = [*args.no_warn, *(project.no_warn if project is not None else ())]
-    werror = args.werror
-    if werror is None:
-        werror = project is not None and project.werror
-    return warning_options(names, as_errors=werror)
+    werror = asked.as_errors if args.werror is None else args.werror
+    return warning_options([*args.no_warn, *asked.disabled], as_errors=werror)
 
 
 def _board(args: argparse.Namespace, project: Project | None) -> str | None:
@@ -109,16 +112,3 @@ def _board(args: argparse.Namespace, project: Project | None) -> str | None:
     board: str | None = getattr(args, "board", None)
     asked = board or any(getattr(args, name, None) for name in ("firmware", "target", "device"))
     return board if asked or project is None else project.board
-
-
-def _of_build(args: argparse.Namespace, project: Project | None) -> dict[str, Any]:
-    """Those that were chosen: by the arguments, else by the project. A board has its own target."""
-    chosen = {}
-    has_board = getattr(args, "board", None) or getattr(args, "firmware", None)
-    for name in ("output", "target", "level", "checks", "debug", "dialect"):
-        value = getattr(args, name, None)
-        if value is None and project is not None and not (name == "target" and has_board):
-            value = getattr(project, name)
-        if value is not None:
-            chosen[name] = value
-    return chosen

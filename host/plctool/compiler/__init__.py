@@ -20,16 +20,18 @@ from plctool.image.targets import DEFAULT_TARGET
 
 if TYPE_CHECKING:
     from plctool.compiler.base.source import Source
+    from plctool.compiler.codegen.lower_unit import Options
     from plctool.compiler.front import CheckResult
     from plctool.compiler.image.build import BuildResult
     from plctool.compiler.semantics.python_functions import PythonFunctions
     from plctool.compiler.sources.imports import ImportedLibrary
+    from plctool.compiler.sources.request import BuildRequest
     from plctool.compiler.syntax.warnings import WarningOptions
     from plctool.image.board import Board
     from plctool.io.model import Description
 
 __all__ = [
-    "CompileError", "IoFiles", "Level", "ProgramFiles", "Sources", "check_sources", "check_with_tests",
+    "CompileError", "IoFiles", "Level", "ProgramFiles", "Sources", "build", "check_sources", "check_with_tests",
     "compile_sources", "io_sources", "library_sources", "load_io", "load_sources", "program_files",
     "source_date",
 ]  # fmt: skip
@@ -106,25 +108,26 @@ def check_with_tests(
     """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all.
     `load` gets the inputs and outputs for each of both. `dialect` as in `compile_sources`."""
     from plctool.compiler.base.internal import bugs_reported
-    from plctool.compiler.front import check_sources
+    from plctool.compiler.front import Trees, check_sources
     from plctool.compiler.syntax.warnings import ALL_WARNINGS
     from plctool.iec.dialect import find_dialect
 
-    wanted, system = warnings or ALL_WARNINGS, find_dialect(dialect)
+    wanted, system, trees = warnings or ALL_WARNINGS, find_dialect(dialect), Trees()
     with bugs_reported():
-        result = check_sources(sources, warnings=wanted, io=load(), libraries=libraries, dialect=system)
+        result = check_sources(sources, warnings=wanted, io=load(), libraries=libraries, dialect=system, trees=trees)
         if not result.has_tests:
             return result
         from plctool.compiler.semantics.unit_tests import TestSuite
 
         suite = TestSuite()
-        tests = check_sources(sources, tests=suite, warnings=wanted, io=load(), libraries=libraries, dialect=system)
+        tests = check_sources(
+            sources, tests=suite, warnings=wanted, io=load(), libraries=libraries, dialect=system, trees=trees
+        )
     found = dict.fromkeys([*result.diagnostics, *tests.diagnostics])
     found_sorted = sorted(found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
     return replace(result, program=result.program if tests.ok else None, diagnostics=found_sorted)
 
 
-@no_collection()
 def compile_sources(
     paths: Sources,
     *,
@@ -141,59 +144,58 @@ def compile_sources(
     python: PythonFunctions | None = None,
     dialect: str | None = None,
 ) -> BuildResult:
-    """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
-    said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
-    inputs and outputs; `libraries`: folders or .zips of those that it uses; both are in `ProgramFiles` already. Of a
-    project its files are taken, its options are for the command line. `board`: one that plctool knows, such as
-    mps2-an385/standard, to whose target and limits the program is held, so that another `target` is refused;
-    `firmware`: the ELF file of any board's firmware, which says the same; without
-    `limits` it may need more than any device has. `python`: functions that Python implements, in the simulator.
-    `dialect`: iec, codesys or twincat, where systems disagree about what a program means; by default that of its files.
+    """Compiles a program as `build` does. `io`: its inputs and outputs; `libraries`: folders or .zips of those that it
+    uses; both are in `ProgramFiles` already. Of a project its files are taken, not its options (`request_of`). The
+    others as in `BuildRequest`. Raises what `build` raises.
+    """
+    from plctool.compiler.sources.request import BuildRequest
+    from plctool.compiler.syntax.warnings import ALL_WARNINGS
+
+    request = BuildRequest(
+        program_files(paths, io, libraries),
+        target=target,
+        level=level,
+        checks=checks,
+        debug=debug,
+        warnings=warnings or ALL_WARNINGS,
+        board=board,
+        firmware=firmware,
+        limits=limits,
+        dialect=dialect,
+    )
+    return build(request, python)
+
+
+@no_collection()
+def build(request: BuildRequest, python: PythonFunctions | None = None) -> BuildResult:
+    """Compiles a program. `python`: functions that Python implements, in the simulator.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
     """
     from plctool.compiler.base.internal import bugs_reported
-    from plctool.compiler.codegen.lower_unit import Options, parse_checks
     from plctool.compiler.front import check_sources
     from plctool.compiler.image.build import build_program
     from plctool.compiler.image.fit import board_meant, check_program_fits
     from plctool.compiler.syntax.diagnostics import render_all
-    from plctool.compiler.syntax.warnings import ALL_WARNINGS
     from plctool.iec.dialect import find_dialect
-    from plctool.image.board import board_of, read_firmware
-    from plctool.image.targets import find_target
 
-    number, size = (2, True) if level == "s" else (level, False)
-    files = program_files(paths, io, libraries)
-    system = find_dialect(_dialect_of(files) if dialect is None else dialect)
+    files = request.files
+    system = find_dialect(_dialect_of(files) if request.dialect is None else request.dialect)
     description = files.load_io()
-    known = None
-    if board is not None or firmware is not None:
-        known = board_of(board, None if firmware is None else read_firmware(firmware))
-    processor = find_target(_target(target, known, description))
-    stacks = None
-    if firmware is not None and not processor.hosted:
-        from plctool.compiler.codegen.firmware_stacks import FirmwareStacks  # late, as it loads a reader of ELF files
-
-        stacks = FirmwareStacks(firmware, processor.machine)
-    options = Options(processor, number, parse_checks(checks), debug, size, stacks)
-    if known is not None and known.target != options.target.name:
-        raise UsageError(
-            f"{known.title} has a {known.target}, not a {options.target.name}; leave the target out, or name a board "
-            "that has it.",
-            "bad-target",
-        )
-    _check_device(known, description)
+    board = _board(request)
+    options = _options(request, board, description)
+    _check_device(board, description)
+    device = None if description is None else description.device
     if description is not None:
-        description.board = board_meant(options.target, known, description.device)
+        description.board = board_meant(options.target, board, device)
     sources = files.load_sources()
     imported = files.load_libraries()
     shown = [*sources, *io_sources(description), *library_sources(imported)]
     with bugs_reported():
         checked = check_sources(
             sources,
-            warnings=warnings or ALL_WARNINGS,
+            warnings=request.warnings,
             io=description,
             libraries=imported,
             python=python,
@@ -205,10 +207,41 @@ def compile_sources(
     info = replace(files.info, date=source_date())
     with bugs_reported():
         built = build_program(checked.program, options, info)
-    if limits:
-        check_program_fits(built, options.target, known, None if description is None else description.device)
+    if request.limits:
+        check_program_fits(built, options.target, board, device)
     found = checked.diagnostics
     return replace(built, warnings=found, rendered_warnings=render_all(found, shown))
+
+
+def _board(request: BuildRequest) -> Board | None:
+    """The board that a program is for, if one is named."""
+    from plctool.image.board import board_of, read_firmware
+
+    if request.board is None and request.firmware is None:
+        return None
+    return board_of(request.board, None if request.firmware is None else read_firmware(request.firmware))
+
+
+def _options(request: BuildRequest, board: Board | None, io: Description | None) -> Options:
+    """What the code generator is asked for. Raises UsageError for a target that the board does not have."""
+    from plctool.compiler.codegen.lower_unit import Options, parse_checks
+    from plctool.image.targets import find_target
+
+    target = find_target(_target(request.target, board, io))
+    stacks = None
+    if request.firmware is not None and not target.hosted:
+        from plctool.compiler.codegen.firmware_stacks import FirmwareStacks  # late, as it loads a reader of ELF files
+
+        stacks = FirmwareStacks(request.firmware, target.machine)
+    number, size = (2, True) if request.level == "s" else (request.level, False)
+    options = Options(target, number, parse_checks(request.checks), request.debug, size, stacks)
+    if board is not None and board.target != target.name:
+        raise UsageError(
+            f"{board.title} has a {board.target}, not a {target.name}; leave the target out, or name a board that has "
+            "it.",
+            "bad-target",
+        )
+    return options
 
 
 def _dialect_of(files: ProgramFiles) -> str | None:

@@ -1,12 +1,16 @@
 """The front end of the compiler: from sources to a typed program, or to diagnostics.
 
+`parse`, `declare`, `check` and `place` lead from each stage of `semantics/stages.py` to the next; `check_sources` does
+all of it.
+
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -15,23 +19,21 @@ from plctool.compiler.base.missing_names import declared_names
 from plctool.compiler.base.nesting import NestingError, room_for_nesting
 from plctool.compiler.base.source import Source
 from plctool.compiler.image.task_images import plan_images
-from plctool.compiler.semantics.allocation import report_overlaps
-from plctool.compiler.semantics.call_graph import report_shared_writes
-from plctool.compiler.semantics.configuration import configure
+from plctool.compiler.semantics import lints
 from plctool.compiler.semantics.io_channels import IoChannels, device_variables
+from plctool.compiler.semantics.participants import DeviceTasks, Files, Guest
 from plctool.compiler.semantics.permitted import check_declarations
 from plctool.compiler.semantics.program import Program
-from plctool.compiler.semantics.rules.builtin import is_built_in
-from plctool.compiler.semantics.uncalled_blocks import report_uncalled_blocks
+from plctool.compiler.semantics.stages import Checked, Declared, Parsed, Placed
 from plctool.compiler.semantics.world import World
 from plctool.compiler.sources.imports import ImportedLibrary, needed_parts
-from plctool.compiler.syntax.ast import Declaration
+from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.attributes import check_attributes, check_pragmas
 from plctool.compiler.syntax.broken_units import is_independent, remaining
 from plctool.compiler.syntax.conditions import names_asked_for
 from plctool.compiler.syntax.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
 from plctool.compiler.syntax.library import Library, standard_library
-from plctool.compiler.syntax.parser import Parsed, parse_all
+from plctool.compiler.syntax.parser import ParsedText, parse_all
 from plctool.compiler.syntax.warnings import ALL_WARNINGS, WarningOptions
 from plctool.compiler.typed.nodes import Pos, TypedProgram
 from plctool.iec.areas import Area
@@ -71,6 +73,7 @@ def check_sources(
     libraries: Sequence[ImportedLibrary] = (),
     python: PythonFunctions | None = None,
     dialect: Dialect = OWN,
+    trees: Trees | None = None,
 ) -> CheckResult:
     """Checks the files of a program together.
 
@@ -78,138 +81,112 @@ def check_sources(
     takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over.
     `warnings`: which of them are wanted. `io`: the inputs and outputs; a description is for one check.
     `libraries`: what the program uses besides the standard library. `python`: functions that Python implements, in the
-    simulator; raises UsageError for those that cannot be. `dialect`: the system whose rules it has. Whatever the
-    sources contain, the result is a program or diagnostics, never an exception.
+    simulator; raises UsageError for those that cannot be. `dialect`: the system whose rules it has. `trees`: keeps the
+    syntax trees for another check. Whatever the sources contain, the result is a program or diagnostics, never an
+    exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
-    program = Program(chosen)
-    diagnostics = program.world.diagnostics
-    diagnostics.options = warnings
-    program.world.dialect = diagnostics.dialect = dialect
-    program.world.io = IoChannels(io)
-    program.libraries = libraries
+    diagnostics = diagnostics_of(chosen, warnings, dialect)
+    guests: list[Guest] = [*((python,) if python is not None else ()), tests or DeviceTasks()]
+    parsed: Parsed | None = None
+    placed: Placed | None = None
+    with reporting(diagnostics, sources):
+        parsed = parse(sources, chosen, libraries, diagnostics, trees or Trees())
+        placed = _placed(parsed, io, guests)
+        diagnostics.settle(parsed.knows)
+    program = None if placed is None or diagnostics.errors else placed.program
+    return CheckResult(program, diagnostics.sorted(), parsed is not None and parsed.has_tests)
+
+
+def diagnostics_of(library: Library, warnings: WarningOptions = ALL_WARNINGS, dialect: Dialect = OWN) -> Diagnostics:
+    """Returns what collects the diagnostics of one check; there are no warnings about the library."""
+    return Diagnostics((s.path for s in library.sources), options=warnings, dialect=dialect)
+
+
+@contextmanager
+def reporting(diagnostics: Diagnostics, sources: Sequence[Source]) -> Iterator[None]:
+    """Runs stages. They end early when there are too many errors, or when something is nested too deeply, which is then
+    among the diagnostics."""
     with no_collection(), room_for_nesting():
-        typed = _guarded(program, sources, tests, python)
-    has_tests = bool(program.world.names.tests)
-    return CheckResult(None if diagnostics.errors else typed, diagnostics.sorted(), has_tests)
-
-
-def _guarded(
-    program: Program, sources: Sequence[Source], tests: TestSuite | None, python: PythonFunctions | None
-) -> TypedProgram | None:
-    """The check, with an end to errors and to nesting."""
-    try:
         try:
-            typed = _check(program, sources, tests, python)
-            world = program.world
-            world.diagnostics.settle(
-                lambda name: is_built_in(name) or world.names.lookup(name.casefold(), library=False) is not None
-            )
-            return typed
-        except NestingError as error:
-            program.world.nested_too_deeply(error)
-        except RecursionError:
-            program.world.diagnostics.error(
-                sources[0].pos(0), "nesting", "something in the program is nested too deeply"
-            )
-    except TooManyErrors:
-        pass
-    return None
+            try:
+                yield
+            except NestingError as error:
+                diagnostics.nested_too_deeply(error)
+            except RecursionError:
+                diagnostics.error(sources[0].pos(0), "nesting", "something in the program is nested too deeply")
+        except TooManyErrors:
+            pass
 
 
-def _check(
-    program: Program, sources: Sequence[Source], suite: TestSuite | None, python: PythonFunctions | None
-) -> TypedProgram | None:
-    world = program.world
-    declared = _names_asked_for(program, sources)
-    texts = [(source, parse_all(source, world.diagnostics.at(source).error, declared=declared)) for source in sources]
-    syntax = [d for d in world.diagnostics.sorted() if d.severity == "error"]
-    for source in sources:
-        world.diagnostics.found_by_reader(source)
-    if syntax or any(source.absent or _is_not_xml(source) for source in sources):
-        _check_the_others(program, texts, syntax)
+def _placed(parsed: Parsed, io: Description | None, guests: Sequence[Guest]) -> Placed | None:
+    """The stages after the first one, and the lints of each; None if the program cannot be declared."""
+    if parsed.broken:
+        _check_whole_units(parsed)
         return None
-    return _check_parsed(program, sources, texts, suite, python)
+    declared = declare(parsed, io, guests)
+    if declared is None:
+        return None
+    checked = check(declared)
+    lints.report(lints.CHECKED, checked)
+    placed = place(checked)
+    lints.report(lints.PLACED, checked)
+    return placed
 
 
-def _is_not_xml(source: Source) -> bool:
-    return any(found.code == "xml" for found in source.findings)
+# ---- parsing ----
 
 
-def _check_parsed(
-    program: Program,
+class Trees:
+    """Syntax trees of sources, for several checks of a program of which a few files change."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[Source, frozenset[str]], tuple[ParsedText, list[tuple[int, str, str]]]] = {}
+
+    def parse(self, source: Source, declared: frozenset[str], diagnostics: Diagnostics) -> ParsedText:
+        """Returns the tree of a text, and reports the errors in it. `declared`: what {IF defined(pou: NAME)} finds."""
+        report, reports = diagnostics.at(source).error, list[tuple[int, str, str]]()
+        known = self._known.get((source, declared))
+        if known is not None:
+            for error in known[1]:
+                report(*error)
+            return known[0]
+
+        def note(offset: int, code: str, message: str) -> None:
+            reports.append((offset, code, message))
+            report(offset, code, message)
+
+        text = parse_all(source, note, declared=declared)
+        if not _has_chart(text):  # a chart is changed when its unit is declared
+            self._known[source, declared] = (text, reports)
+        return text
+
+    def keep(self, sources: Sequence[Source]) -> None:
+        """Forgets all trees but those of these sources."""
+        wanted = set(sources)
+        self._known = {key: tree for key, tree in self._known.items() if key[0] in wanted}
+
+
+def _has_chart(text: ParsedText) -> bool:
+    units = (d for d in text.declarations if isinstance(d, ast.PouDecl))
+    return any(part.chart is not None for unit in units for part in (unit, *unit.members))
+
+
+def parse(
     sources: Sequence[Source],
-    texts: Sequence[tuple[Source, Parsed]],
-    suite: TestSuite | None,
-    python: PythonFunctions | None,
-) -> TypedProgram | None:
-    """All but the syntax."""
-    world = program.world
-    parsed = [(source, _looked_at(source, text, world.diagnostics)) for source, text in texts]
-    tests = None if suite is None else suite.begin(program)
-    if tests is not None:
-        parsed = tests.prepare(parsed)
-    if python is not None:
-        world.names.register(python.interface(), library=True)
-        world.names.rewritten = python.rewritten
-        parsed = [(source, python.rewritten(declarations)) for source, declarations in parsed]
-    for source, declarations in parsed:
-        world.names.register(declarations)
-        world.names.register_globals(declarations, source)
-    if not _import(program, sources):
-        return None
-    _declare_devices(world)
-    world.io.begin(world.names, world.diagnostics)
-    if not world.io.readable:
-        return None
-    program.declare_all()
-    if python is not None:
-        python.finish(program)
-    if tests is None:
-        application = configure(world, program.config)
-    else:
-        application = tests.configure()
-        tests.add()
-    program.check_bodies()
-    world.io.finish(world.allocation, application.tasks if tests is None else None, world.diagnostics)
-    if tests is None and application.tasks:
-        program.programs.report_unused()
-    world.calls.report_shared(application.tasks)
-    if tests is None and not world.diagnostics.errors:
-        report_shared_writes(application.tasks, world.diagnostics)
-        world.io.report_written_inputs(world.pous, world.diagnostics)
-        report_uncalled_blocks(world.pous, world.diagnostics)
-    allocation = world.allocation
-    _check_sizes(world, sources)
-    if not world.diagnostics.errors:  # else channels may have no addresses yet
-        report_overlaps(allocation.variables, world.diagnostics)
-    runs_nothing = not application.tasks and not world.names.tests and not world.names.program_symbols()
-    if runs_nothing and not world.diagnostics.errors and sources:
-        world.diagnostics.warning(sources[0].pos(0), "no-program", "there is no PROGRAM, so nothing would run")
-    typed = TypedProgram(
-        pous=world.pous,
-        globals=allocation.variables,
-        tasks=application.tasks,
-        area_sizes={area: allocation.sizes.get(area, 0) for area in Area},
-        defaults=world.defaults,
-        programs=program.programs.declared(),
-        startup=program.startup,
-        shutdown=program.shutdown,
-        aliases=world.names.aliases(),
-        accesses=program.config.accesses(),
-        constants=world.constants,
-        externals=program.external_functions(),
-        io=world.io.description,
-        may_recurse=program.may_recurse,
-        trail=program.trail,
-    )
-    if not world.diagnostics.errors:
-        plan_images(typed, world.diagnostics)
-    return typed
-
-
-def _names_asked_for(program: Program, sources: Sequence[Source]) -> frozenset[str]:
-    return declared_names_asked_for(program.world.names.library, program.libraries, sources)
+    library: Library,
+    libraries: Sequence[ImportedLibrary],
+    diagnostics: Diagnostics,
+    trees: Trees,
+) -> Parsed:
+    """Parses the files of a program. Those of its libraries are parsed as far as `declare` needs them."""
+    declared = declared_names_asked_for(library, libraries, sources)
+    texts = [(source, trees.parse(source, declared, diagnostics)) for source in sources]
+    trees.keep(sources)
+    syntax = [d for d in diagnostics.sorted() if d.severity == "error"]
+    for source in sources:
+        diagnostics.found_by_reader(source)
+    return Parsed(texts, library, libraries, diagnostics, syntax)
 
 
 def declared_names_asked_for(
@@ -220,6 +197,71 @@ def declared_names_asked_for(
     return names_asked_for([source.text for source in sources], lambda: names)
 
 
+def _check_whole_units(parsed: Parsed) -> None:
+    """Errors of the units without syntax errors: a mistake in one hides no others, nor a library that they need.
+    What may follow from the broken units waits."""
+    found = parsed.diagnostics
+    whole: list[tuple[Source, ParsedText]] = []
+    hidden: set[str] = set()
+    for source, text in parsed.texts:
+        hidden |= source.absent
+        if source.is_unreadable:
+            hidden |= declared_names(source.original or source.text)
+            continue
+        rest = remaining(source, text.declarations, [d.line for d in parsed.syntax if d.file == source.path])
+        hidden |= rest.hidden
+        whole.append((source, replace(text, declarations=rest.declarations)))
+    others = Diagnostics((s.path for s in parsed.library.sources), dialect=found.dialect, limit=sys.maxsize)
+    declared = declare(Parsed(whole, parsed.library, parsed.libraries, others))
+    if declared is not None:
+        place(check(declared))
+    for d in others.sorted():
+        pos = Pos(d.file, d.line, d.column)
+        if d.missing and d.missing.casefold() not in hidden:
+            found.missing(pos, d.missing, d.message)
+        elif d.severity == "error" and not d.missing and is_independent(d, (source for source, _ in whole), hidden):
+            found.error(pos, d.code, d.message)
+
+
+# ---- declaring ----
+
+
+def declare(
+    parsed: Parsed, io: Description | None = None, guests: Sequence[Guest] = (DeviceTasks(),)
+) -> Declared | None:
+    """Declares all that a program has, used or not. `io`: its inputs and outputs; `guests` take part in the check, and
+    one of them decides the tasks. None after an error from which many others would follow."""
+    program = Program(parsed.library, parsed.libraries, parsed.diagnostics, IoChannels(io))
+    world = program.world
+    files: Files = [(source, _looked_at(source, text, world.diagnostics)) for source, text in parsed.texts]
+    participants = [guest.begin(program) for guest in guests]
+    for participant in participants:
+        files = participant.after_parse(files)
+    for source, declarations in files:
+        world.names.register(declarations)
+        world.names.register_globals(declarations, source)
+    if not _import(program, parsed.sources):
+        return None
+    _declare_devices(world)
+    world.io.begin(world.names, world.diagnostics)
+    if not world.io.readable:
+        return None
+    program.declare_all()
+    applications = [participant.after_declare() for participant in participants]
+    application = next(a for a in applications if a is not None)
+    return Declared(program, application, parsed.sources, participants)
+
+
+def _looked_at(source: Source, text: ParsedText, diagnostics: Diagnostics) -> list[ast.Declaration]:
+    """The declarations of a file of the program, when what stands with them has been looked at."""
+    diagnostics.mute(source)
+    reports = diagnostics.at(source)
+    check_pragmas(text.pragmas, reports)
+    check_attributes(text.attributes, text.places, reports)
+    check_declarations(text.declarations, source, diagnostics)
+    return text.declarations
+
+
 def _import(program: Program, sources: Sequence[Source]) -> bool:
     """Parses what the program needs of its libraries. False after an error, from which many others would follow."""
     names, diagnostics = program.world.names, program.world.diagnostics
@@ -227,7 +269,7 @@ def _import(program: Program, sources: Sequence[Source]) -> bool:
     names.begin_imports(program.libraries)
     needed = needed_parts((source.text for source in sources), program.libraries)
     diagnostics.quiet(part.source.path for _, part in needed)
-    declared = _names_asked_for(program, [part.source for _, part in needed])
+    declared = declared_names_asked_for(names.library, program.libraries, [part.source for _, part in needed])
     for library, part in needed:
         diagnostics.found_by_reader(part.source)
         parsed = parse_all(part.source, diagnostics.at(part.source).error, part.start, part.end, declared)
@@ -246,40 +288,52 @@ def _declare_devices(world: World) -> None:
         world.names.register_globals(declarations, source)
 
 
-def _check_the_others(program: Program, texts: Sequence[tuple[Source, Parsed]], syntax: Sequence[Diagnostic]) -> None:
-    """Errors of the units without syntax errors: a mistake in one hides no others, nor a library that they need.
-    What may follow from the broken units waits."""
-    found = program.world.diagnostics
-    whole: list[tuple[Source, Parsed]] = []
-    hidden: set[str] = set()
-    for source, parsed in texts:
-        hidden |= source.absent
-        if _is_not_xml(source):
-            hidden |= declared_names(source.original or source.text)
-            continue
-        rest = remaining(source, parsed.declarations, [d.line for d in syntax if d.file == source.path])
-        hidden |= rest.hidden
-        whole.append((source, replace(parsed, declarations=rest.declarations)))
-    other = Program(program.world.names.library)
-    other.libraries = program.libraries
-    other.world.diagnostics.limit = sys.maxsize
-    _check_parsed(other, [source for source, _ in whole], whole, None, None)
-    for d in other.world.diagnostics.sorted():
-        pos = Pos(d.file, d.line, d.column)
-        if d.missing and d.missing.casefold() not in hidden:
-            found.missing(pos, d.missing, d.message)
-        elif d.severity == "error" and not d.missing and is_independent(d, (source for source, _ in whole), hidden):
-            found.error(pos, d.code, d.message)
+# ---- checking and placing ----
 
 
-def _looked_at(source: Source, parsed: Parsed, diagnostics: Diagnostics) -> list[Declaration]:
-    """The declarations of a file of the program, when what stands with them has been looked at."""
-    diagnostics.mute(source)
-    reports = diagnostics.at(source)
-    check_pragmas(parsed.pragmas, reports)
-    check_attributes(parsed.attributes, parsed.places, reports)
-    check_declarations(parsed.declarations, source, diagnostics)
-    return parsed.declarations
+def check(declared: Declared) -> Checked:
+    """Checks all bodies, and those of libraries that they need."""
+    declared.program.check_bodies()
+    for participant in declared.participants:
+        participant.after_check()
+    return Checked(declared.program, declared.application, declared.sources)
+
+
+def check_file(declared: Declared, path: str) -> None:
+    """Checks the bodies in one file alone, for an editor that shows their errors at once. `check` then does the rest;
+    lints about the whole program come after that."""
+    declared.program.check_bodies_in(path)
+
+
+def place(checked: Checked) -> Placed:
+    """Gives variables their offsets and tasks their images of inputs and outputs."""
+    program, diagnostics = checked.program, checked.diagnostics
+    world, allocation = program.world, program.world.allocation
+    allocation.place()
+    world.io.finish(allocation, diagnostics)
+    for call in allocation.once_placed:
+        call()
+    _check_sizes(world, checked.sources)
+    typed = TypedProgram(
+        pous=world.pous,
+        globals=allocation.variables,
+        tasks=checked.application.tasks,
+        area_sizes={area: allocation.sizes.get(area, 0) for area in Area},
+        defaults=world.defaults,
+        programs=program.programs.declared(),
+        startup=program.startup,
+        shutdown=program.shutdown,
+        aliases=world.names.aliases(),
+        accesses=program.config.accesses(),
+        constants=world.constants,
+        externals=program.external_functions(),
+        io=world.io.description,
+        may_recurse=program.may_recurse,
+        trail=program.trail,
+    )
+    if not diagnostics.errors:
+        plan_images(typed, diagnostics)
+    return Placed(checked, typed)
 
 
 def _check_sizes(world: World, sources: Sequence[Source]) -> None:

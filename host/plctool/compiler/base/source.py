@@ -67,6 +67,11 @@ class Source:
     findings: tuple[Finding, ...] = field(default=(), compare=False)
     absent: frozenset[str] = field(default=frozenset(), compare=False)
 
+    @property
+    def is_unreadable(self) -> bool:
+        """True for XML that is not well-formed, so that no text was made of it."""
+        return any(found.code == "xml" for found in self.findings)
+
     @cached_property
     def line_starts(self) -> list[int]:
         """Offsets of the first character of each line of the file."""

@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from plctool.compiler.semantics.conversions import elementary
 from plctool.compiler.semantics.scope import Scope
@@ -22,23 +22,26 @@ from plctool.iec.types import BOOL, Type, align_up, base_of
 
 
 class Allocation:
-    """Gives variables their place in the areas."""
+    """The variables that live in the areas, and their offsets there."""
 
     def __init__(self) -> None:
         self.sizes: dict[Area, int] = {area: 0 for area in Area if area is not Area.CODE}
         self.variables: list[Variable] = []
+        self.once_placed: list[Callable[[], None]] = []  # called when all offsets are known
 
     def add(self, variable: Variable) -> None:
-        """Places a variable at the end of its area, or notes one that has an address. Inputs and outputs without one
-        get it in the end (`io_channels.py`)."""
-        t, area = variable.type, variable.area
-        if variable.offset < 0 and area in (Area.INPUT, Area.OUTPUT):
-            self.variables.append(variable)
-            return
-        if variable.offset < 0:
-            variable.offset = align_up(self.sizes[area], t.align)
-        self.sizes[area] = max(self.sizes[area], variable.offset + t.size)
+        """Adds a variable, which gets its offset when all are known, unless it has an address."""
         self.variables.append(variable)
+
+    def place(self) -> None:
+        """Gives each variable without an address the next offset in its area. Inputs and outputs get theirs after
+        that (`io_channels.py`)."""
+        for variable in self.variables:
+            t, area = variable.type, variable.area
+            if variable.offset < 0 and area not in (Area.INPUT, Area.OUTPUT):
+                variable.offset = align_up(self.sizes[area], t.align)
+            if variable.offset >= 0:
+                self.sizes[area] = max(self.sizes[area], variable.offset + t.size)
 
 
 # ---- addresses ----

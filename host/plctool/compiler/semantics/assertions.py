@@ -52,7 +52,7 @@ class Bench:
         self._operands: dict[tuple[str, Type], Variable] = {}
         hidden = ((NUMBER, DINT), (FAILED, DINT), (TIME_NOW, TIME), (LTIME_NOW, LTIME), (LIVE, BOOL))
         self._hidden = {name: self._variable(name, t) for name, t in hidden}
-        world.clock = {"TIME": self._hidden[TIME_NOW], "LTIME": self._hidden[LTIME_NOW]}
+        world.clock.update({"TIME": self._hidden[TIME_NOW], "LTIME": self._hidden[LTIME_NOW]})
 
     def _variable(self, name: str, t: Type) -> Variable:
         made = Variable(name, t, Storage.AREA, _NOWHERE)

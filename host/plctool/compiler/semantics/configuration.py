@@ -182,9 +182,10 @@ DEFAULT_PROGRAMS = ("PLC_PRG", "MAIN")
 
 @dataclass
 class Application:
-    """The tasks."""
+    """The tasks. `of_tests`: they are those of unit tests, not of a device."""
 
     tasks: list[Task] = field(default_factory=list)
+    of_tests: bool = False
 
 
 def configure(world: World, config: InstanceConfig) -> Application:

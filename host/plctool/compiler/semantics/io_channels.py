@@ -211,18 +211,20 @@ class IoChannels:
 
     # ---- when all is known ----
 
-    def finish(self, allocation: Allocation, tasks: Sequence[Task] | None, diagnostics: Diagnostics) -> None:
-        """Gives the variables their addresses, and the channels type and place. `tasks`: None for unit tests, which
-        have none of the program's."""
+    def check_tasks(self, tasks: Sequence[Task], diagnostics: Diagnostics) -> None:
+        """Reports tasks that the description names and the program does not have, and events that no task waits for."""
+        if self.description is not None and not diagnostics.errors:
+            _check_tasks(self.description, [task.name for task in tasks], diagnostics)
+            _check_events(self.description, [task.external for task in tasks if task.external], diagnostics)
+
+    def finish(self, allocation: Allocation, diagnostics: Diagnostics) -> None:
+        """Gives the variables their addresses, and the channels type and offset."""
         self._report_unmapped(diagnostics)
         if self.description is None and self._unmapped:
             _lay_out_open(allocation)
         if self.description is None or diagnostics.errors:
             return
         self._report_devices(diagnostics)
-        if tasks is not None:
-            _check_tasks(self.description, [task.name for task in tasks], diagnostics)
-            _check_events(self.description, [task.external for task in tasks if task.external], diagnostics)
         for _, channel in self.description.channels:
             if channel.at_address:
                 self._reserve(channel, allocation)

@@ -48,18 +48,19 @@ class PlannedInstance:
 class Names:
     """What is declared under which name. Keys are case-folded."""
 
-    declared_instance: Callable[[PlannedInstance], Namespace]
-    """Declares an instance of a PROGRAM; set by what declares them."""
-
-    def __init__(self, library: Library, diagnostics: Diagnostics) -> None:
+    def __init__(
+        self, library: Library, diagnostics: Diagnostics, declared_instance: Callable[[PlannedInstance], Namespace]
+    ) -> None:
+        """`declared_instance` declares an instance of a PROGRAM."""
         self.library = library
         self.diagnostics = diagnostics
+        self._declared_instance = declared_instance
         self.namespaces: dict[str, str] = {}  # as written, by case-folded name
         self.configurations: list[ast.ConfigurationDecl] = []
         self.instance_blocks: list[ast.InstanceBlock] = []  # VAR_CONFIG and VAR_ACCESS
         self.tests: list[ast.TestDecl] = []
         self.has_members = False  # whether anything has methods, actions or properties
-        self.rewritten: Callable[[list[ast.Declaration]], list[ast.Declaration]] = list  # what unit tests replace
+        self._rewriters: list[Callable[[Sequence[ast.Declaration]], list[ast.Declaration]]] = []
         self.imported = ImportedNames((), self._duplicate)
         self._units: dict[str, Unit] = {}
         self._globals: dict[str, GlobalSymbol] = {}
@@ -69,6 +70,15 @@ class Names:
         self._enum_values: dict[str, list[TypeSymbol]] = {}
 
     # ---- making names known ----
+
+    def rewrite(self, rewriter: Callable[[Sequence[ast.Declaration]], list[ast.Declaration]]) -> None:
+        """Has the declarations of libraries changed before their names are known."""
+        self._rewriters.append(rewriter)
+
+    def _rewritten(self, declarations: list[ast.Declaration]) -> list[ast.Declaration]:
+        for rewriter in self._rewriters:
+            declarations = rewriter(declarations)
+        return declarations
 
     def register(self, declarations: Iterable[ast.Declaration], *, library: bool = False) -> None:
         """Makes the names of declarations known."""
@@ -102,7 +112,7 @@ class Names:
     def add_import(self, library: ImportedLibrary, source: Source, declarations: Sequence[ast.Declaration]) -> None:
         """Makes known what a part of a library declares."""
         put_into(library, declarations)
-        declarations = self.rewritten(list(declarations))
+        declarations = self._rewritten(list(declarations))
         for decl in declarations:
             if isinstance(decl, ast.PouDecl):
                 self.has_members = self.has_members or bool(decl.members) or decl.keyword is ast.Unit.INTERFACE
@@ -233,7 +243,7 @@ class Names:
         key = without_library(key)
         if key not in self._library_names:
             self._library_names[key] = None
-            self.register(self.rewritten(self.library.parse(key, self.diagnostics)), library=True)
+            self.register(self._rewritten(self.library.parse(key, self.diagnostics)), library=True)
         return self._library_names[key]
 
     def same_named(self, name: str) -> list[GlobalSymbol]:
@@ -337,7 +347,7 @@ class Names:
             if len(names) != 1:
                 return None
             key = names[0].casefold()
-        return self.declared_instance(self.planned[key])
+        return self._declared_instance(self.planned[key])
 
     # ---- suggestions ----
 

@@ -18,16 +18,17 @@ from plctool.compiler.semantics.declarations.type_declarations import TypeDeclar
 from plctool.compiler.semantics.declarations.unit_variables import UnitVariables
 from plctool.compiler.semantics.declarations.variables import Variables
 from plctool.compiler.semantics.generics import describes_any, is_generic
-from plctool.compiler.semantics.pitfalls import report_endless
+from plctool.compiler.semantics.io_channels import IoChannels
 from plctool.compiler.semantics.pools import write_pools
-from plctool.compiler.semantics.rules.control import report_unused, write_body
+from plctool.compiler.semantics.rules.control import write_body
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc_statements import statements_of
 from plctool.compiler.semantics.symbols import TypeSymbol
 from plctool.compiler.semantics.trail import reserve_trail
-from plctool.compiler.semantics.world import Declared, World
+from plctool.compiler.semantics.world import Declarers, World
 from plctool.compiler.sources.imports import ImportedLibrary
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.compiler.syntax.library import Library
 from plctool.compiler.typed.nodes import Pou, Variable
 
@@ -35,8 +36,18 @@ from plctool.compiler.typed.nodes import Pou, Variable
 class Program:
     """All parts of the check."""
 
-    def __init__(self, library: Library) -> None:
-        self.world = world = World(library)
+    def __init__(
+        self, library: Library, libraries: Sequence[ImportedLibrary], diagnostics: Diagnostics, io: IoChannels
+    ) -> None:
+        self.libraries = libraries
+        self.startup: Pou | None = None  # calls FB_Init
+        self.shutdown: Pou | None = None  # calls FB_Exit
+        self.may_recurse = False
+        self.trail: Variable | None = None
+        self.checked: list[Scope] = []  # of bodies without errors
+        self.world = World(library, diagnostics, io, self._declared_by)
+
+    def _declared_by(self, world: World) -> Declarers:
         self.types = TypeDeclarations(world)
         self.config = InstanceConfig(world, self.types)
         self.variables = Variables(world, self.types, self.config)
@@ -45,13 +56,7 @@ class Program:
         self._classes = Classes(world, self.types, self._functions)
         self._blocks = Blocks(world, self.types, self.variables, units, self._classes)
         self.programs = Programs(world, self.types, self.variables, units, self._classes)
-        self.libraries: Sequence[ImportedLibrary] = ()
-        self.startup: Pou | None = None  # calls FB_Init
-        self.shutdown: Pou | None = None  # calls FB_Exit
-        self.may_recurse = False
-        self.trail: Variable | None = None
-        world.names.declared_instance = self.programs.instance
-        world.declared = Declared(
+        return Declarers(
             type_of=self.types.type_of_symbol,
             type_named=self.types.named_type,
             type_written=lambda spec, scope: self.types.type_of(spec, scope)[0],
@@ -61,6 +66,7 @@ class Program:
             block=self._blocks.block,
             layout=self._blocks.layout,
             interface=self._classes.interface,
+            instance=self.programs.instance,
         )
 
     def declare_all(self) -> None:
@@ -84,12 +90,9 @@ class Program:
     def check_bodies(self) -> None:
         """Checks all bodies, and those of the library and of the programs they need; what is left over at the end."""
         world = self.world
-        checked = self._check_queue()
+        self._check_queue()
         while self.programs.declare_others():
-            checked += self._check_queue()
-        in_tests = world.names.members_in_tests()
-        for scope in checked:
-            report_unused(scope, in_tests)
+            self._check_queue()
         write_pools(world)
         self.startup, self.shutdown = construct(world)
         self.trail = reserve_trail(world)
@@ -100,24 +103,33 @@ class Program:
         world.dispatches.note_calls(world.calls)
         world.calls.report_recursion()
         self.may_recurse = world.calls.report_possible_recursion()
-        if not world.diagnostics.errors:
-            report_endless(world.loops, world.diagnostics)
 
-    def _check_queue(self) -> list[Scope]:
-        """Checks what is queued and what that needs; the scopes to look into for what is not used."""
-        checked: list[Scope] = []
-        world, bodies = self.world, self.world.bodies
+    def check_bodies_in(self, path: str) -> None:
+        """Checks the bodies in one file of the program; `check_bodies` then checks the others."""
+        more = True
+        while more:
+            self._classes.declare_members()
+            for scope, decl in self.world.bodies.take(path):
+                self._check_body(scope, decl)
+                self._classes.declare_members()
+            more = self.world.bodies.has(path) or self.programs.declare_others()
+
+    def _check_queue(self) -> None:
+        """Checks what is queued and what that needs."""
+        bodies = self.world.bodies
         self._classes.declare_members()
         while bodies:
-            scope, decl = bodies.next()
-            before = world.diagnostics.errors
-            try:
-                write_body(Checker(world, scope), statements_of(world, decl, scope))
-            except Exception as error:
-                note_position(error, scope.pos(decl.pos))
-                raise
-            if not scope.library and world.diagnostics.errors == before:  # else it may be used where the errors are
-                checked.append(scope)
+            self._check_body(*bodies.next())
             if bodies.only_library:
                 self._classes.declare_members()
-        return checked
+
+    def _check_body(self, scope: Scope, decl: ast.PouDecl) -> None:
+        world = self.world
+        before = world.diagnostics.errors
+        try:
+            write_body(Checker(world, scope), statements_of(world, decl, scope))
+        except Exception as error:
+            note_position(error, scope.pos(decl.pos))
+            raise
+        if not scope.library and world.diagnostics.errors == before:  # else it may be used where the errors are
+            self.checked.append(scope)

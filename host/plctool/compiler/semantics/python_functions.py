@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from plctool.compiler.base.source import Source
+from plctool.compiler.semantics.participants import Files, Participant
 from plctool.compiler.semantics.program import Program
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed.nodes import Direction, Pou
@@ -31,6 +32,10 @@ class PythonFunctions:
         self._numbers = {name.casefold(): number for number, name in enumerate(written)}
         self._written = {name.casefold(): name for name in written}
         self.units: list[Pou] = []
+
+    def begin(self, program: Program) -> Participant:
+        """Returns the participant in the check of this program."""
+        return _Calls(self, program)
 
     def rewritten(self, declarations: Sequence[ast.Declaration]) -> list[ast.Declaration]:
         """The declarations with these functions calling Python."""
@@ -74,6 +79,23 @@ class PythonFunctions:
             body.append(ast.Assign(pos, [ast.Name(pos, decl.name)], ast.Assigning.VALUE, ast.Name(pos, _RESULT)))
         attributes = {name: text for name, text in decl.attributes.items() if name not in ("external", "version")}
         return replace(decl, blocks=blocks, body=body, attributes=attributes)
+
+
+class _Calls(Participant):
+    """Puts calls of Python into one program."""
+
+    def __init__(self, functions: PythonFunctions, program: Program) -> None:
+        self._functions = functions
+        self._program = program
+
+    def after_parse(self, files: Files) -> Files:
+        names = self._program.world.names
+        names.register(self._functions.interface(), library=True)
+        names.rewrite(self._functions.rewritten)
+        return [(source, self._functions.rewritten(declarations)) for source, declarations in files]
+
+    def after_declare(self) -> None:
+        self._functions.finish(self._program)
 
 
 def _callable(pou: Pou) -> Pou:

@@ -27,6 +27,7 @@ from plctool.compiler.semantics.configuration import Application, configure, def
 from plctool.compiler.semantics.conversions import load, whole
 from plctool.compiler.semantics.declarations.type_declarations import May
 from plctool.compiler.semantics.mocks import Mocks, raising
+from plctool.compiler.semantics.participants import Files, Participant
 from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.statement_marks import StatementMarks
@@ -93,7 +94,7 @@ class TestSuite:
         return TestProgram(self, program)
 
 
-class TestProgram:
+class TestProgram(Participant):
     """Makes the tests a part of a program that is being checked, and notes in `suite` what they are."""
 
     def __init__(self, suite: TestSuite, program: Program) -> None:
@@ -107,31 +108,36 @@ class TestProgram:
 
     # ---- the steps of the check ----
 
-    def prepare(self, parsed: list[tuple[Source, list[ast.Declaration]]]) -> list[tuple[Source, list[ast.Declaration]]]:
+    def after_parse(self, files: Files) -> Files:
         """Adds to the syntax tree what MOCK and the coverage need."""
         names = self._world.names
         names.register([raising()], library=True)
-        everything = [decl for _, declarations in parsed for decl in declarations]
+        everything = [decl for _, declarations in files for decl in declarations]
         self._devices.wanted = any(d.faults for d in everything if isinstance(d, ast.TestDecl))
         if self._devices.wanted:
             names.register([host_function()], library=True)
         mocks = Mocks((d for d in everything if isinstance(d, ast.TestDecl)), self._world.diagnostics)
-        names.rewritten = mocks.rewritten
+        names.rewrite(mocks.rewritten)
         marks = self._suite.marks
         if marks is not None:
-            parsed = [(source, marks.marked(declarations)) for source, declarations in parsed]
+            files = [(source, marks.marked(declarations)) for source, declarations in files]
             names.register_globals([marks.variable(Source("", ""))], Source("", ""))
-        return [(source, mocks.rewritten(declarations)) for source, declarations in parsed]
+        return [(source, mocks.rewritten(declarations)) for source, declarations in files]
 
-    def configure(self) -> Application:
+    def after_declare(self) -> Application:
+        """Adds the tests, and the task that runs one of them."""
+        application = self._configure()
+        self._add()
+        return application
+
+    def _configure(self) -> Application:
         """The programs as the CONFIGURATION has them, so that their names are known; no task runs them. Without a
         CONFIGURATION there may be any number."""
         alone = len(default_programs(self._world)) == 1
         wanted = alone or self._world.names.configurations
         application = configure(self._world, self._program.config) if wanted else Application()
         self._devices.take_copies(application.tasks)
-        application.tasks = [self._task()]
-        return application
+        return Application([self._task()], of_tests=True)
 
     def _task(self) -> Task:
         pos = next((t.source.pos(t.pos) for t in self._world.names.tests), Pos("", 1, 1))
@@ -139,8 +145,7 @@ class TestProgram:
         runner.body = [Case(load(self._bench.place(NUMBER, pos)), self._branches, [], pos)]
         return Task("Tests", TaskKind.CYCLIC, 1, 10_000, [runner])
 
-    def add(self) -> None:
-        """Checks the tests."""
+    def _add(self) -> None:
         self._blocks = {p.decl.name.casefold(): _as_block(p) for p in self._world.names.program_symbols()}
         for symbol in self._blocks.values():
             self._world.declared.block(symbol)

@@ -12,14 +12,13 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from plctool.compiler.base.nesting import NestingError
 from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.allocation import Allocation, DirectVariables, module_address
 from plctool.compiler.semantics.call_graph import CallGraph
 from plctool.compiler.semantics.coercion import Coercion
 from plctool.compiler.semantics.dynamic_types import Dispatches
 from plctool.compiler.semantics.io_channels import IoChannels
-from plctool.compiler.semantics.names import Names
+from plctool.compiler.semantics.names import Names, PlannedInstance
 from plctool.compiler.semantics.pitfalls import Loop
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import (
@@ -28,6 +27,7 @@ from plctool.compiler.semantics.symbols import (
     FunctionInfo,
     GlobalSymbol,
     Member,
+    Namespace,
     PouSymbol,
     TypeSymbol,
     VarSymbol,
@@ -55,7 +55,6 @@ from plctool.compiler.typed.nodes import (
     Variable,
     VarPlace,
 )
-from plctool.iec.dialect import OWN
 from plctool.iec.types import (
     CLASS_NUMBER,
     UDINT,
@@ -95,12 +94,22 @@ class BodyQueue:
         """Takes one out."""
         return (self._own or self._library).popleft()
 
+    def has(self, path: str) -> bool:
+        """Whether some of a file of the program are to be checked."""
+        return any(scope.source.path == path for scope, _ in self._own)
+
+    def take(self, path: str) -> list[tuple[Scope, ast.PouDecl]]:
+        """Takes out those of a file of the program."""
+        taken = [body for body in self._own if body[0].source.path == path]
+        self._own = deque(body for body in self._own if body[0].source.path != path)
+        return taken
+
 
 # ---- what is declared when something first needs it ----
 
 
 @dataclass(frozen=True)
-class Declared:
+class Declarers:
     """Who declares what. Each of them says what is wrong the first time, and does nothing the second time."""
 
     type_of: Callable[[TypeSymbol], Type]
@@ -112,6 +121,7 @@ class Declared:
     block: Callable[[PouSymbol], BlockInfo | None]  # None when it contains itself
     layout: Callable[[PouSymbol], StructType | None]  # the type of a block, also while it is being declared
     interface: Callable[[PouSymbol], InterfaceType]
+    instance: Callable[[PlannedInstance], Namespace]
 
 
 # ---- what __NEW takes ----
@@ -144,19 +154,23 @@ class Pool:
 class World:
     """What every part of the check may use."""
 
-    declared: Declared
-    """Set by what declares."""
-
-    def __init__(self, library: Library) -> None:
-        self.dialect = OWN
-        self.diagnostics = Diagnostics(s.path for s in library.sources)
-        self.names = Names(library, self.diagnostics)
+    def __init__(
+        self,
+        library: Library,
+        diagnostics: Diagnostics,
+        io: IoChannels,
+        declared_by: Callable[[World], Declarers],
+    ) -> None:
+        """`declared_by` makes what declares, for this world; it is called when the world has all else."""
+        self.diagnostics = diagnostics
+        self.dialect = diagnostics.dialect
+        self.names = Names(library, diagnostics, lambda planned: self.declared.instance(planned))
         self.coerce = Coercion(self.diagnostics, self._text_of)
         self.calls = CallGraph(self.diagnostics)
         self.dispatches = Dispatches()
         self.allocation = Allocation()
         self.direct = DirectVariables(self.allocation)
-        self.io = IoChannels()
+        self.io = io
         self.bodies = BodyQueue()
         self.blocks: dict[StructType, BlockInfo] = {}
         self.open_members: dict[StructType, dict[str, VarSymbol]] = {}  # of structures: AT %I*, %Q*, %M*
@@ -170,9 +184,10 @@ class World:
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
         self.pools: dict[Type, Pool] = {}
         self.closers: dict[Type, Pou] = {}  # what ends the elements that a POINTER TO the type leads to
-        self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
+        self.clock: dict[str, Variable] = {}  # what TIME and LTIME read in unit tests
         self.pous: list[Pou] = []
         self.loops: list[tuple[Pou, Loop]] = []  # of the program, each with the unit it stands in
+        self.declared = declared_by(self)
 
     def scope(self, source: Source, *, library: bool = False) -> Scope:
         """An empty scope in a source."""
@@ -259,10 +274,6 @@ class World:
             self._texts[constant.value, constant.type] = variable
             self.allocation.add(variable)
         return variable
-
-    def nested_too_deeply(self, error: NestingError) -> None:
-        """Reports what goes beyond MAX_DEPTH."""
-        self.diagnostics.error(error.pos, "nesting", "this is nested too deeply; split it")
 
     def _text_of(self, character: Expr) -> Expr:
         """A CHAR or WCHAR as a text, by a function of the library."""

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from plctool.compiler.base.missing_names import Use, library_of, table
+from plctool.compiler.base.nesting import NestingError
 from plctool.compiler.base.source import Finding, Source
-from plctool.compiler.syntax.warnings import ALL_WARNINGS, WARNINGS, LineRanges, switched_off
+from plctool.compiler.syntax.warnings import ALL_WARNINGS, WARNINGS, LineRanges, WarningOptions, switched_off
 from plctool.compiler.typed.nodes import Pos
 from plctool.errors import UsageError, counted
 from plctool.errors import did_you_mean as did_you_mean
-from plctool.iec.dialect import OWN
+from plctool.iec.dialect import OWN, Dialect
 
 Severity = Literal["error", "warning"]
 
@@ -48,13 +49,20 @@ class TooManyErrors(Exception):
 
 
 class Diagnostics:
-    """Collects findings, each only once, and stops the check after `MAX_ERRORS` errors. There are no warnings about the
-    files in `quiet`."""
+    """Collects findings, each only once, and stops the check after `limit` errors. The files in `quiet` get no
+    warnings."""
 
-    def __init__(self, quiet: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        quiet: Iterable[str] = (),
+        *,
+        options: WarningOptions = ALL_WARNINGS,
+        dialect: Dialect = OWN,
+        limit: int = MAX_ERRORS,
+    ) -> None:
         self._quiet = frozenset(quiet)
-        self.options = ALL_WARNINGS
-        self.dialect = OWN
+        self.options = options
+        self.dialect = dialect
         self._muted: dict[tuple[str, str], LineRanges] = {}
         self._found: dict[Diagnostic, None] = {}
         self.incomplete: set[str] = set()  # units, case-folded, that lack what has an unknown type or base
@@ -62,11 +70,15 @@ class Diagnostics:
         self.errors = 0
         self._counted = 0  # errors that are counted to the limit
         self._unknown: set[str] = set()  # what was said of unknown names: said again it does not count
-        self.limit = MAX_ERRORS
+        self._limit = limit
 
     def error(self, pos: Pos, code: str, message: str) -> None:
         """Records an error; raises TooManyErrors when it is one too many."""
         self._add(pos, "error", code, message)
+
+    def nested_too_deeply(self, error: NestingError) -> None:
+        """Reports what goes beyond MAX_DEPTH."""
+        self.error(error.pos, "nesting", "this is nested too deeply; split it")
 
     def missing(self, pos: Pos, name: str, message: str) -> None:
         """Records that nothing is known by a name. These do not count: what a program needs is said in full."""
@@ -139,7 +151,7 @@ class Diagnostics:
             repeated = code == "unknown" and message in self._unknown
             self._unknown.add(message)
             self._counted += counts and not missing and not repeated
-            if self._counted >= self.limit:
+            if self._counted >= self._limit:
                 raise TooManyErrors
 
     def sorted(self) -> list[Diagnostic]:

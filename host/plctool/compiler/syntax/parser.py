@@ -143,7 +143,7 @@ def _is_name_after_all(token: Token, parser: Parser, text: str) -> bool:
 
 
 @dataclass
-class Parsed:
+class ParsedText:
     """A text: its declarations, the attributes in it and what is declared after them, its other pragmas."""
 
     declarations: list[ast.Declaration]
@@ -164,7 +164,7 @@ def parse_all(
     end: int | None = None,
     declared: frozenset[str] = frozenset(),
     tokens: list[Token] | None = None,
-) -> Parsed:
+) -> ParsedText:
     """All that a text holds. `declared`: what {IF defined(pou: NAME)} finds; `tokens` takes those that have a place in
     the grammar, with the types that they have there."""
     builder, new_parser = _machine()
@@ -187,4 +187,4 @@ def parse_all(
         else:
             recovery.handle(token)
     result = parser.values[0] if len(parser.values) == 1 else []
-    return Parsed(result if isinstance(result, list) else [], lexer.attributes, places, lexer.pragmas)
+    return ParsedText(result if isinstance(result, list) else [], lexer.attributes, places, lexer.pragmas)

@@ -73,7 +73,7 @@ def write_body(c: Checker, nodes: list[ast.Stmt]) -> None:
     try:
         pou.body = [*c.scope.prologue, *check_body(c, nodes)]
     except NestingError as error:
-        c.world.nested_too_deeply(error)
+        c.world.diagnostics.nested_too_deeply(error)
     c.world.pous.append(pou)
 
 

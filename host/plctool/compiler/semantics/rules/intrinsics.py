@@ -292,7 +292,7 @@ def _extreme(c: Checker, f: Applied) -> Expr:
 
 
 def _time(c: Checker, f: Applied) -> Expr:
-    if c.world.clock is not None:
+    if c.world.clock:
         variable = c.world.clock[f.name]
         return load(VarPlace(variable, variable.type, c.pos(f.node.pos)))
     return IntrinsicCall(Intrinsic[f.name], [], ELEMENTARY[f.name], c.pos(f.node.pos))

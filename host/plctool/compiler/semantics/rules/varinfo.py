@@ -52,8 +52,14 @@ def varinfo(c: Checker, node: ast.Call) -> Expr:
     info = c.world.declared.function(symbol, {})
     assert info is not None and isinstance(info.result, StructType)
     name = f"info of {args[0].pos} {c.scope.source.path}"
-    fixed = Variable(name, info.result, Storage.AREA, pos, initial=_facts(place, _written(args[0])), constant=True)
+    fixed = Variable(name, info.result, Storage.AREA, pos, constant=True)
+    written = _written(args[0])
+
+    def fill() -> None:
+        fixed.initial = _facts(place, written)
+
     c.world.allocation.add(fixed)
+    c.world.allocation.once_placed.append(fill)
     whole = place.base if isinstance(place, BitPlace) else place
     address = convert(AddressOf(whole, RawPointerType(BYTE), pos), LWORD)
     c.world.calls.add(c.scope.pou, info.pou, pos)

@@ -1,0 +1,109 @@
+"""What a program is between the stages of its compilation; `front.py` leads from one to the next.
+
+    Parsed    syntax trees
+    Declared  names, types, classes, variables, tasks: all that the program declares
+    Checked   typed bodies, and who calls whom
+    Placed    a typed program with offsets and images of inputs and outputs, which `image/build.py` builds
+
+Each is complete when it is made. A stage takes the previous one, so that nothing is checked that is not declared.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from plctool.compiler.base.source import Source
+from plctool.compiler.semantics.configuration import Application
+from plctool.compiler.semantics.participants import Participant
+from plctool.compiler.semantics.program import Program
+from plctool.compiler.semantics.rules.builtin import is_built_in
+from plctool.compiler.sources.imports import ImportedLibrary
+from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.diagnostics import Diagnostic, Diagnostics
+from plctool.compiler.syntax.library import Library
+from plctool.compiler.syntax.parser import ParsedText
+from plctool.compiler.typed.nodes import TypedProgram
+
+
+@dataclass(frozen=True)
+class Parsed:
+    """A program as its sources have it. `syntax`: the syntax errors in them."""
+
+    texts: Sequence[tuple[Source, ParsedText]]
+    library: Library
+    libraries: Sequence[ImportedLibrary]
+    diagnostics: Diagnostics
+    syntax: Sequence[Diagnostic] = ()
+
+    @property
+    def broken(self) -> bool:
+        """True if a text, or a part of one, is not known, so that the program as a whole cannot be declared."""
+        return bool(self.syntax) or any(source.absent or source.is_unreadable for source in self.sources)
+
+    @property
+    def sources(self) -> list[Source]:
+        return [source for source, _ in self.texts]
+
+    @property
+    def has_tests(self) -> bool:
+        """True if the program can be declared and has TEST blocks."""
+        return not self.broken and any(isinstance(d, ast.TestDecl) for _, t in self.texts for d in t.declarations)
+
+    @cached_property
+    def _names(self) -> set[str]:
+        """Those of units and global variables, case-folded."""
+        found = {name.casefold() for name in self.library.names()}
+        found |= {name.casefold() for library in self.libraries for name in library.by_name}
+        for declaration in (d for _, text in self.texts for d in text.declarations):
+            if isinstance(declaration, ast.PouDecl | ast.TypeDecl):
+                found.add(declaration.name.casefold())
+            elif isinstance(declaration, ast.GlobalBlock):
+                found |= {name.casefold() for line in declaration.block.decls for _, name in line.names}
+        return found
+
+    def knows(self, name: str) -> bool:
+        """True if something declares the name of a function or function block."""
+        return is_built_in(name) or name.rpartition(".")[2].casefold() in self._names
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A program whose bodies are not checked yet; they wait in its world."""
+
+    program: Program
+    application: Application
+    sources: Sequence[Source]
+    participants: Sequence[Participant]
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        return self.program.world.diagnostics
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A program whose variables have no offsets yet."""
+
+    program: Program
+    application: Application
+    sources: Sequence[Source]
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        return self.program.world.diagnostics
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A program that can be built, if its diagnostics have no errors."""
+
+    checked: Checked
+    program: TypedProgram
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        return self.checked.diagnostics
