@@ -12,7 +12,8 @@ from front_support import check, main
 import plctool.compiler
 from plctool.compiler import check_with_tests
 from plctool.compiler.front import Source, check_sources
-from plctool.compiler.syntax.warnings import WARNINGS, warning_options
+from plctool.compiler.semantics.lints import LINTS
+from plctool.compiler.syntax.warnings import GROUP_OF, GROUPS, WARNINGS, meant_by, warning_options
 from plctool.errors import UsageError
 from plctool.iec.dialect import find_dialect
 
@@ -293,6 +294,52 @@ def test_every_warning_is_in_the_documentation() -> None:
     text = (ROOT / "docs/language.md").read_text()
     rows = re.findall(r"^\| `([\w-]+)` \| (.*) \|$", text, re.MULTILINE)
     assert [(name, words.replace("`", "")) for name, words in rows] == list(WARNINGS.items())
+
+
+def test_every_group_is_in_the_documentation() -> None:
+    text = (ROOT / "docs/language.md").read_text()
+    items = re.findall(r"^- `([\w-]+)`, [^:`]*: ((?:`[\w-]+`,?\s+)*`[\w-]+`)\.$", text, re.MULTILINE)
+    listed = {group: re.findall(r"`([\w-]+)`", names) for group, names in items}
+    assert listed == {group: [name for name in WARNINGS if GROUP_OF[name] == group] for group in GROUPS}
+
+
+def test_every_lint_is_of_a_group() -> None:
+    assert {lint.group for lint in LINTS} <= set(GROUPS)
+
+
+def test_a_group_stands_for_its_warnings() -> None:
+    numbers = [name for name in WARNINGS if GROUP_OF[name] == "numbers"]
+    assert meant_by("numbers") == numbers
+    assert warning_options(["numbers", "unused"]).disabled == {*numbers, "unused"}
+
+
+def test_a_group_is_turned_off_by_option_and_by_pragma() -> None:
+    assert codes(SUSPICIOUS, "dead-code") == ["narrowing"]
+    assert codes(SUSPICIOUS, "Dead-Code, numbers") == []
+    assert codes("{warning disable dead-code}\n" + SUSPICIOUS) == ["narrowing"]
+
+
+# ---- one warning for one cause ----
+
+
+@pytest.mark.parametrize(
+    "loop", ["WHILE u >= 0 DO i := i + 1; END_WHILE;", "REPEAT i := i + 1; UNTIL u < 0 END_REPEAT;"]
+)
+def test_loop_whose_comparison_is_always_true_is_one_warning(loop: str) -> None:
+    text = main("u : UINT; i : INT;", loop)
+    assert codes(text) == ["always"]
+    assert codes(text, "always") == ["endless"]  # which then is the only one that says it
+
+
+def test_another_loop_that_never_ends_is_still_a_warning() -> None:
+    text = main("u : UINT; i : INT;", "IF u >= 0 THEN WHILE i > 0 DO u := u + 1; END_WHILE; END_IF;")
+    assert sorted(codes(text)) == ["always", "endless"]
+
+
+def test_timer_that_is_only_given_a_time_is_one_warning() -> None:
+    text = main("time : TIME := T#1s; t : TON := (PT := time);", "")
+    assert codes(text) == ["uncalled"]
+    assert codes(text, "uncalled") == ["unused"]
 
 
 SUSPICIOUS = main("unused : INT; i : SINT; j : INT;", "i := j;\nRETURN;\ni := 1;")

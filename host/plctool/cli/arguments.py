@@ -113,7 +113,7 @@ def add_warnings(parser: Parser) -> None:
         action="append",
         default=[],
         metavar="NAME,...",
-        help="do not report these warnings; may be repeated",
+        help="do not report these warnings or groups of them; may be repeated",
     )
     parser.add_argument("--werror", action=argparse.BooleanOptionalAction, help="treat warnings as errors")
 

@@ -1,5 +1,8 @@
-"""What is looked at in a whole program, stage by stage, and gives warnings. Warnings about one statement are with the
-rule of its node.
+"""Lints: what is looked at in a whole program, stage by stage, and gives warnings.
+
+Warnings about one statement are with the rule of its node; `syntax/warnings.py` has name, group and meaning of all.
+
+The order counts: a lint that has the same cause as an earlier one asks `Diagnostics.has()`, and is silent.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -15,6 +18,7 @@ from plctool.compiler.semantics.pitfalls import report_endless
 from plctool.compiler.semantics.rules.control import report_unused
 from plctool.compiler.semantics.stages import Checked
 from plctool.compiler.semantics.uncalled_blocks import report_uncalled_blocks
+from plctool.compiler.syntax.warnings import GROUP_OF
 
 CHECKED, PLACED = "checked", "placed"
 
@@ -29,6 +33,11 @@ class Lint:
     report: Callable[[Checked], None]
     of_device: bool = False
     despite_errors: bool = False
+
+    @property
+    def group(self) -> str:
+        """The group of warnings that it belongs to."""
+        return GROUP_OF[self.name]
 
 
 def _unused_variables(checked: Checked) -> None:
@@ -50,11 +59,11 @@ def _no_program(checked: Checked) -> None:
 
 
 LINTS = (
+    Lint("uncalled", CHECKED, lambda c: report_uncalled_blocks(c.program.world.pous, c.diagnostics), of_device=True),
     Lint("unused", CHECKED, _unused_variables, despite_errors=True),
     Lint("unused", CHECKED, _unused_programs, of_device=True, despite_errors=True),
     Lint("endless", CHECKED, lambda c: report_endless(c.program.world.loops, c.diagnostics)),
     Lint("task", CHECKED, lambda c: c.program.world.calls.report_shared(c.application.tasks), despite_errors=True),
-    Lint("uncalled", CHECKED, lambda c: report_uncalled_blocks(c.program.world.pous, c.diagnostics), of_device=True),
     Lint("no-program", CHECKED, _no_program),
     Lint("shared", PLACED, lambda c: report_shared_writes(c.application.tasks, c.diagnostics), of_device=True),
     Lint(

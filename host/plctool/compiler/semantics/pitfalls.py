@@ -91,11 +91,18 @@ def report_endless(loops: Iterable[tuple[Pou, Loop]], diagnostics: Diagnostics) 
     """Warns of the loops that never end once they run. Each comes with the unit it stands in."""
     effects = Effects()
     for pou, loop in loops:
-        if _is_left(loop):
+        if _is_left(loop) or _is_always(loop, diagnostics):
             continue
         why = _never_passed(loop) if isinstance(loop, For) else _never_met(loop, pou, effects)
         if why:
             diagnostics.warning(loop.pos, "endless", f"this loop never ends: {why}")
+
+
+def _is_always(loop: Loop, diagnostics: Diagnostics) -> bool:
+    """True if it was reported that a comparison in the condition is always TRUE or FALSE."""
+    condition = None if isinstance(loop, For) else loop.until if isinstance(loop, Repeat) else loop.condition
+    nodes = () if condition is None else walk(condition)
+    return any(isinstance(node, Binary) and diagnostics.has("always", node.pos) for node in nodes)
 
 
 def _is_left(loop: Loop) -> bool:

@@ -17,7 +17,7 @@ from plctool.compiler.codegen.lower_unit import parse_checks
 from plctool.compiler.sources.library_files import is_stand_in, libraries_at, no_library
 from plctool.compiler.sources.source_files import READERS
 from plctool.compiler.sources.toml_files import read_checked
-from plctool.compiler.syntax.warnings import WARNINGS
+from plctool.compiler.syntax.warnings import GROUPS, WARNINGS, meant_by
 from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import is_inside, read_utf8
 from plctool.iec.dialect import DIALECTS
@@ -254,10 +254,12 @@ def _checks(options: Table) -> str | None:
 def _warnings(options: Table) -> list[str]:
     names = []
     for entry in options.strings("no-warn"):
-        if entry.value in WARNINGS:
+        if meant_by(str(entry.value)):
             names.append(entry.value)
         else:
-            hint = did_you_mean(entry.value, WARNINGS) or f"; the names are {', '.join(WARNINGS)}"
+            hint = (
+                did_you_mean(entry.value, (*WARNINGS, *GROUPS)) or f"; the names are {', '.join((*GROUPS, *WARNINGS))}"
+            )
             options.mistakes.error(entry.pos, f"there is no warning '{entry.value}'{hint}")
     return names
 

@@ -65,6 +65,7 @@ class Diagnostics:
         self.dialect = dialect
         self._muted: dict[tuple[str, str], LineRanges] = {}
         self._found: dict[Diagnostic, None] = {}
+        self._reported: set[tuple[str, Pos]] = set()  # codes and where
         self.incomplete: set[str] = set()  # units, case-folded, that lack what has an unknown type or base
         self.waiting: list[tuple[Pos, Finding]] = []  # until all names are known
         self.errors = 0
@@ -97,6 +98,10 @@ class Diagnostics:
             self._add(pos, "error", code, f"{message}{_BY_OPTION}")
         else:
             self._add(pos, "warning", code, message)
+
+    def has(self, code: str, pos: Pos) -> bool:
+        """True if this was reported there: what has the same cause need not be."""
+        return (code, pos) in self._reported
 
     def quiet(self, paths: Iterable[str]) -> None:
         """There are no warnings about these files."""
@@ -146,6 +151,7 @@ class Diagnostics:
         if diagnostic in self._found:
             return
         self._found[diagnostic] = None
+        self._reported.add((code, pos))
         if severity == "error":
             self.errors += 1
             repeated = code == "unknown" and message in self._unknown

@@ -88,6 +88,8 @@ def report_unused(scope: Scope, elsewhere: Collection[str] = ()) -> None:
     for symbol in scope.names.values():
         if not isinstance(symbol, VarSymbol) or symbol.used or symbol.name.startswith("%"):
             continue
+        if scope.globals.diagnostics.has("uncalled", symbol.pos):
+            continue
         if symbol.role in (Role.LOCAL, Role.TEMP) and symbol.name.casefold() not in elsewhere:
             scope.globals.diagnostics.warning(symbol.pos, "unused", f"{symbol.name} is never used")
         elif symbol.role is Role.RESULT and symbol.name.casefold() not in INITIALISERS:
