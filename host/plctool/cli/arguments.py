@@ -37,6 +37,7 @@ def add_build_arguments(parser: Parser) -> None:
         "--no-limits", action="store_true", help="build also what no device that plctool knows has room for"
     )
     add_build_options(parser)
+    add_passes(parser)
     add_warnings(parser)
     add_io_files(parser)
 
@@ -84,6 +85,14 @@ def add_build_options(parser: Parser) -> None:
     parser.add_argument(
         "--debug", action=argparse.BooleanOptionalAction, help="optimise less, so that the code is close to its source"
     )
+
+
+def add_passes(parser: Parser) -> None:
+    parser.add_argument(
+        "--no-pass", action="append", default=[], metavar="NAME,...",
+        help="leave out passes of the code generator, to find the one that makes a difference; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--dump-after", metavar="NAME", help="print what this pass of the code generator leaves")
 
 
 def add_image(parser: Parser, built: str = "which is built first if it has changed") -> None:

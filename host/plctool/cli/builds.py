@@ -139,6 +139,8 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
         "needs": {name: need.known for name, need in result.needs.items()},
         "warnings": [diagnostic_document(w) for w in result.warnings],
     }
+    if settings.dump_after is not None:
+        document["dump"] = [line for text in result.dumps for line in text.expandtabs().splitlines()]
     if channels:
         document["io"] = io_documents.summary(result.symbols.io)
     return document, result.rendered_warnings
@@ -169,7 +171,8 @@ def _compile(settings: Settings, target: str | None) -> BuildResult:
 
 def build_text(document: dict[str, Any]) -> str:
     """What was built, and how old inputs may be."""
-    lines = [f"{document['image']}: {document['size']} bytes, CRC {document['crc']}"]
+    lines = [*document.get("dump", ())]
+    lines.append(f"{document['image']}: {document['size']} bytes, CRC {document['crc']}")
     if io := document.get("io"):
         lines.append(f"{counted(io['channels'], 'channel')} of inputs and outputs")
         if oldest := io["oldest_input"]:

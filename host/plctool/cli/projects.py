@@ -68,6 +68,8 @@ def _request(args: argparse.Namespace, files: ProgramFiles) -> BuildRequest:
         firmware=getattr(args, "firmware", None),
         limits=not getattr(args, "no_limits", False),
         dialect=_dialect(args, files)[0],
+        no_pass=tuple(getattr(args, "no_pass", ())),
+        dump_after=getattr(args, "dump_after", None),
     )
 
 

@@ -210,7 +210,7 @@ def build(request: BuildRequest, python: PythonFunctions | None = None) -> Build
     if request.limits:
         check_program_fits(built, options.target, board, device)
     found = checked.diagnostics
-    return replace(built, warnings=found, rendered_warnings=render_all(found, shown))
+    return replace(built, warnings=found, rendered_warnings=render_all(found, shown), dumps=options.passes.dumps)
 
 
 def _board(request: BuildRequest) -> Board | None:
@@ -225,6 +225,7 @@ def _board(request: BuildRequest) -> Board | None:
 def _options(request: BuildRequest, board: Board | None, io: Description | None) -> Options:
     """What the code generator is asked for. Raises UsageError for a target that the board does not have."""
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
+    from plctool.compiler.codegen.passes import parse_passes
     from plctool.image.targets import find_target
 
     target = find_target(_target(request.target, board, io))
@@ -234,7 +235,8 @@ def _options(request: BuildRequest, board: Board | None, io: Description | None)
 
         stacks = FirmwareStacks(request.firmware, target.machine)
     number, size = (2, True) if request.level == "s" else (request.level, False)
-    options = Options(target, number, parse_checks(request.checks), request.debug, size, stacks)
+    passes = parse_passes(request.no_pass, request.dump_after)
+    options = Options(target, number, parse_checks(request.checks), request.debug, size, stacks, passes)
     if board is not None and board.target != target.name:
         raise UsageError(
             f"{board.title} has a {board.target}, not a {target.name}; leave the target out, or name a board that has "

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from functools import cache
 from itertools import count
 from threading import Lock
+from typing import TypeVar
 
 import llvmlite.binding as llvm
 
@@ -24,6 +26,8 @@ _WORTH = 1.03  # such code is a little slower
 _NARROW = re.compile(r"^  (\S+) = (udiv|urem) (?:exact )?i(8|16) (\S+), (-?\d+)(.*)$", re.MULTILINE)
 _LONG_SHIFT = re.compile(r" = (?:shl|lshr|ashr) [a-z ]*i64 [^,]+, %|@llvm\.fsh[lr]\.i64\(i64 [^,]+, i64 [^,]+, i64 %")
 """Of 64 bits by a variable."""
+
+_Emitted = TypeVar("_Emitted", bytes, str)
 
 _code_generator = Lock()  # its options are those of the process
 
@@ -54,7 +58,8 @@ def optimised(part: Part, options: Options) -> tuple[llvm.ModuleRef, llvm.Target
     """The module after LLVM's standard pipeline of the level. Of a large program's level 2, what pays in code that is
     long and has few loops: level 1, and dead stores. It takes half the time, and the code is as fast and smaller.
     What is plain needs still less."""
-    target, opt_level = options.target, options.opt_level
+    target, passes = options.target, options.passes
+    opt_level = options.opt_level if passes.runs("optimise") else 0
     machine = target_machine(target, opt_level)
     module = llvm.parse_assembly(part.text, llvm.create_context())
     module.verify()
@@ -67,12 +72,16 @@ def optimised(part: Part, options: Options) -> tuple[llvm.ModuleRef, llvm.Target
         _simplify(module, builder)
     else:
         builder.getModulePassManager().run(module, builder)
-    if shorter:
+    passes.left(("optimise",), lambda: str(module))
+    if shorter and passes.runs("dead-stores"):
         _remove_dead_stores(module, builder)
-    if target.divides_words:
+    passes.left(("dead-stores",), lambda: str(module))
+    if target.divides_words and passes.runs("widen"):
         module = _widen(module)
-    if options.size and target.shortens:
+    passes.left(("widen",), lambda: str(module))
+    if options.size and target.shortens and passes.runs("shorten"):
         _shorten(module)
+    passes.left(("shorten",), lambda: str(module))
     return module, machine
 
 
@@ -130,20 +139,35 @@ def _run(manager: llvm.FunctionPassManager, module: llvm.ModuleRef, builder: llv
 def emit_object(part: Part, options: Options) -> bytes:
     """The ELF object of a module. A module that LLVM refuses is a bug of the lowering and raises RuntimeError."""
     module, machine = optimised(part, options)
-    if not options.size:
-        return _emitted(module, machine)
-    usual, lean = _emitted(module.clone(), machine), _emitted(module, machine, _LEAN)
-    return lean if _WORTH * code_size(lean) < code_size(usual) else usual
+    again = module.clone() if options.passes.dump_after == "lean" else None
+    chosen, switches = _chosen(module, machine, tries=(_LEAN,) if options.size and options.passes.runs("lean") else ())
+    if again is not None:
+        options.passes.left(("lean",), lambda: _emitted(again, machine.emit_assembly, switches))
+    return chosen
 
 
-def _emitted(module: llvm.ModuleRef, machine: llvm.TargetMachine, switches: tuple[str, ...] = ()) -> bytes:
-    """The object of a module with these options of the code generator, which changes the module."""
+def _chosen(
+    module: llvm.ModuleRef, machine: llvm.TargetMachine, tries: tuple[tuple[str, ...], ...]
+) -> tuple[bytes, tuple[str, ...]]:
+    """The object, and the options of LLVM's code generator with which it is smaller, if it is by far."""
+    best: bytes = _emitted(module.clone() if tries else module, machine.emit_object)
+    switches: tuple[str, ...] = ()
+    for options in tries:
+        other = _emitted(module, machine.emit_object, options)
+        if _WORTH * code_size(other) < code_size(best):
+            best, switches = other, options
+    return best, switches
+
+
+def _emitted(
+    module: llvm.ModuleRef, emit: Callable[[llvm.ModuleRef], _Emitted], switches: tuple[str, ...] = ()
+) -> _Emitted:
+    """What a module becomes with these options of the code generator, which changes the module."""
     with _code_generator:
         try:
             for switch in switches:
                 llvm.set_option("", f"{switch}=true")
-            data: bytes = machine.emit_object(module)
-            return data
+            return emit(module)
         finally:
             for switch in switches:
                 llvm.set_option("", f"{switch}=false")
@@ -152,7 +176,8 @@ def _emitted(module: llvm.ModuleRef, machine: llvm.TargetMachine, switches: tupl
 def emit_objects(parts: list[Part], options: Options) -> list[bytes]:
     """The objects of the parts of a program, several if it is large: side by side in processes of their own where
     the system can fork; the result is the same either way."""
-    if len(parts) < 2 or not hasattr(os, "fork") or (os.cpu_count() or 1) < 2:
+    alone = bool(options.passes.dump_after)  # or what the others keep would be lost
+    if alone or len(parts) < 2 or not hasattr(os, "fork") or (os.cpu_count() or 1) < 2:
         return [emit_object(part, options) for part in parts]
     _initialise()
     children = [_Child(part, options) for part in parts[1:]]

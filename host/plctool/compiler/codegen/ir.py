@@ -144,6 +144,10 @@ class Module:
         """A function that is not in the module; the first declaration of a name holds."""
         self._declarations.setdefault(name, declaration)
 
+    def whole(self) -> str:
+        """The module with all its functions."""
+        return self.text(d.function.definition(d.linkage) for d in self.functions.values())
+
     def text(self, functions: Iterable[str]) -> str:
         """The module in LLVM's assembly language, with these functions in it."""
         parts = [f'target triple = "{self._triple}"']

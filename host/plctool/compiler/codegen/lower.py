@@ -100,7 +100,10 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
         unit.module.add_helper(string_function(name, unit.target, unit.strings))
     pous = {name: pou for (pou, _), name in unit.pous.items()}
     bounds = [*dict.fromkeys(unit.bounds)]
-    return Lowered(parts(unit.module), tasks, functions, pous, unit.imports, bounds, unit.transient, unit.trail.lines)
+    options.passes.left(("sections", "memory", "lengths", "splice"), unit.module.whole)
+    made = parts(unit.module, cut=options.passes.runs("parts"))
+    options.passes.left(("parts",), lambda: "\n".join(f"; part {n}\n{part.text}" for n, part in enumerate(made, 1)))
+    return Lowered(made, tasks, functions, pous, unit.imports, bounds, unit.transient, unit.trail.lines)
 
 
 def _task_entry(unit: Unit, number: int, task: Task) -> str:
@@ -124,7 +127,8 @@ def _pou(unit: Unit, pou: Pou, effects: Effects, form: Form) -> None:
     signature = f"{returned_type(returned)} @{name}({parameter_list(pou, unit.handed, form, closed)})"
     fn = Function(signature, unit.attributes(pou), unit.inlining(pou, form))
     body = Body(unit, fn, pou, effects, form)
-    cut = [pou] if pou in unit.sections else sections(pou)
+    whole = pou in unit.sections or not unit.options.passes.runs("sections")
+    cut = [pou] if whole else sections(pou)
     if form is Form.RUN:
         write_calls(body, [unit.symbol(part) for part in unit.runs[pou]])
     elif len(cut) > 1:

@@ -441,6 +441,8 @@ class Frame:
         """What is at `ref` has been written, and is a string of this length if there is one. `known`: before, which
         still holds of all strings that are not part of it."""
         lengths = {}
+        if not self.unit.measures:
+            return
         if known and ref.direct and ref.pointer.fixed:
             here = range(ref.offset, ref.offset + ref.type.size)
             lengths = {
@@ -467,7 +469,7 @@ class Frame:
 
     def _memory(self) -> Memory:
         """What is known here."""
-        if self._known.since != self.fn.barriers or not self.unit.options.opt_level:
+        if self._known.since != self.fn.barriers or not self.unit.remembers:
             self._known = Memory(self.fn.barriers)
         return self._known
 

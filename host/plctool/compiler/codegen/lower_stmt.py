@@ -87,6 +87,8 @@ def _may_write_directly(frame: Body, target: Place, call: Call) -> bool:
 def _may_splice(frame: Body, target: Place, call: Call) -> bool:
     """Whether a call changes a string that is its first argument, and is not read by the others."""
     root = root_of(target)
+    if not frame.unit.options.passes.runs("splice"):
+        return False
     if root is None or not (call.args and _is_whole(target, root) and _is_whole(call.args[0], root)):
         return False
     apart = all(_is_apart(frame.pou, node, root) for node in walk(call.args[1:]))

@@ -5,12 +5,13 @@ A function enters the queue the first time something refers to it, so what is no
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
 
 from plctool.compiler.codegen.closed import Closed
 from plctool.compiler.codegen.ir import Module, escape
+from plctool.compiler.codegen.passes import Passes
 from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
 from plctool.compiler.codegen.trail import Trail
 from plctool.compiler.typed.nodes import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable, runtime_function
@@ -59,7 +60,7 @@ def parse_checks(text: str) -> frozenset[Check]:
 @dataclass(frozen=True)
 class Options:
     """How to compile. `debug`: keep the program closer to its source (no inlining across POUs); `size`: rather small
-    than fast; `firmware`: what is known of the C functions that it will call."""
+    than fast; `firmware`: what is known of the C functions that it will call; `passes`: which of them run."""
 
     target: Target
     opt_level: int = 2
@@ -67,6 +68,7 @@ class Options:
     debug: bool = False
     size: bool = False
     firmware: FirmwareStacks | None = None
+    passes: Passes = field(default_factory=Passes)
 
     @property
     def watchable(self) -> bool:
@@ -124,6 +126,8 @@ class Unit:
     def __init__(self, options: Options, area_sizes: dict[Area, int], defaults: dict[str, StructInit]) -> None:
         self.options = options
         self.target = options.target
+        self.remembers = options.opt_level > 0 and options.passes.runs("memory")
+        self.measures = options.passes.runs("lengths")
         self.module = Module(options.target.triple)
         self.area_sizes = area_sizes
         self.defaults = defaults

@@ -29,14 +29,14 @@ class Part:
     plain: bool = False
 
 
-def parts(module: Module) -> list[Part]:
-    """The parts of a module: one, or an even number of the same size, of plain functions and of others. A part has
-    copies of functions of others that may be inlined."""
+def parts(module: Module, *, cut: bool = True) -> list[Part]:
+    """The parts of a module: one if it is small or not to be `cut`, else an even number of the same size, of plain
+    functions and of others. A part has copies of functions of others that may be inlined."""
     functions = module.functions
     calls = {name: Counter(c for c in d.function.callees if c in functions) for name, d in functions.items()}
     _limit_growth(functions, calls)
-    if _size(functions) <= _WHOLE:
-        return [Part(module.text(d.function.definition(d.linkage) for d in functions.values()))]
+    if not cut or _size(functions) <= _WHOLE:
+        return [Part(module.whole())]
     plain = {name: d for name, d in functions.items() if _is_plain(d.function, functions)}
     if _size(plain) < _FEW:
         plain = {}

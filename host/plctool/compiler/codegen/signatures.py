@@ -11,6 +11,7 @@ call.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -144,17 +145,37 @@ class Signatures:
 
 def block_signatures(program: TypedProgram, options: Options) -> Signatures:
     """Of all function blocks that the program reaches."""
-    target = options.target
+    target, passes = options.target, options.passes
     given, calls, reached = _inputs_of_all_calls(program)
-    transient = {} if options.watchable else transient_variables(program, reached, given)
+    kept_all = options.watchable or not passes.runs("transient")
+    transient = {} if kept_all else transient_variables(program, reached, given)
     tried = {block: closed_block(block, target, calls[block]) for block, inputs in given.items() if inputs}
-    closed = {block: found for block, found in tried.items() if found is not None}
+    closed = {block: found for block, found in tried.items() if found is not None and passes.runs("closed")}
     handed = {}
     for block, inputs in given.items():
         unkept = [variable for variable in transient.get(block, ()) if variable in inputs]
         kept = [variable for variable in inputs if variable not in unkept]
-        handed[block] = unkept + _in_registers(kept, target, closed.get(block), len(unkept))
-    return Signatures({block: inputs for block, inputs in handed.items() if inputs}, transient, closed)
+        handed[block] = unkept
+        if passes.runs("registers"):
+            handed[block] += _in_registers(kept, target, closed.get(block), len(unkept))
+    found = Signatures({block: inputs for block, inputs in handed.items() if inputs}, transient, closed)
+    passes.left(("transient",), lambda: _listed(found.transient))
+    passes.left(("closed",), lambda: _closed_listed(found.closed))
+    passes.left(("registers",), lambda: _listed(found.handed))
+    return found
+
+
+def _listed(variables: Mapping[Pou, Sequence[Variable]]) -> str:
+    """A line for each block: its name, and these variables of it."""
+    return "\n".join(f"{block.name}: {', '.join(v.name for v in found)}" for block, found in variables.items() if found)
+
+
+def _closed_listed(closed: ClosedBlocks) -> str:
+    lines = []
+    for block, found in closed.items():
+        returned = "nothing" if found.returned is None else found.returned.name
+        lines.append(f"{block.name}: returns {returned}{', gets the context' if found.has_context else ''}")
+    return "\n".join(lines)
 
 
 def _inputs_of_all_calls(program: TypedProgram) -> tuple[HandedInputs, Counter[Pou], list[Pou]]:

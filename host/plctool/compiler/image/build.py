@@ -39,12 +39,14 @@ _CODE_ALIGN = int(lib.APP_CODE_ALIGN)
 @dataclass(frozen=True)
 class BuildResult:
     """An image and its symbols. `sizes`: bytes of code made from each POU's source, inlined copies included; `needs`:
-    what a device must have room for, by the names of `limits.py`."""
+    what a device must have room for, by the names of `limits.py`; `dumps`: what a pass has left of each
+    part, if that is asked for."""
 
     image: bytes
     symbols: SymbolTable
     sizes: dict[str, int] = field(default_factory=dict)
     needs: dict[str, Need] = field(default_factory=dict)
+    dumps: list[str] = field(default_factory=list)
     warnings: list[Diagnostic] = field(default_factory=list)
     rendered_warnings: list[str] = field(default_factory=list)
 

@@ -20,7 +20,8 @@ class BuildRequest:
     mps2-an385/standard, to whose target and limits the program is held, so that another `target` is refused.
     `firmware`: the ELF file of any board's firmware, which says the same. Without `limits` the program may need more
     than any device has. `dialect`: iec, codesys or twincat, where systems disagree about what a program means; None:
-    that of the files."""
+    that of the files. `no_pass`: passes of the code generator that are left out; `dump_after`: the pass whose result is
+    kept."""
 
     files: ProgramFiles
     target: str | None = None
@@ -32,6 +33,8 @@ class BuildRequest:
     firmware: Path | None = None
     limits: bool = True
     dialect: str | None = None
+    no_pass: tuple[str, ...] = ()
+    dump_after: str | None = None
 
 
 def request_of(files: ProgramFiles) -> BuildRequest:
