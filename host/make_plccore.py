@@ -28,6 +28,7 @@ SHARED = [
     "CmpForce.h",
     "CmpOperationControl.h",
     "CmpTraceMgr.h",
+    "CmpAppBP.h",
     "CmpIecTask.h",
     "CmpItf.h",
     "CmpLog.h",

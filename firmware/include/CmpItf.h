@@ -96,6 +96,8 @@ enum {
     CMPID_CmpOperationControl = 0x0034,
     CMPID_CmpTraceMgr = 0x0030,
     CMPID_CmpTraceSrv = 0x0031,
+    CMPID_CmpAppBP = 0x0032,
+    CMPID_CmpAppBPSrv = 0x0033,
 };
 
 /* Name of a component, "" when unknown. */

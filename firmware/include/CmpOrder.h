@@ -51,6 +51,9 @@ X(CmpOperationControl)
 #if HAS_CmpTraceMgr
 X(CmpTraceMgr)
 #endif
+#if HAS_CmpAppBP
+X(CmpAppBP)
+#endif
 #ifdef PORT_COMPONENTS
 PORT_COMPONENTS(X)
 #endif
@@ -66,6 +69,9 @@ X(CmpMonitor2)
 #endif
 #if HAS_CmpTraceMgr
 X(CmpTraceSrv)
+#endif
+#if HAS_CmpAppBP
+X(CmpAppBPSrv)
 #endif
 #if HAS_CmpIoMgrSrv
 X(CmpIoMgrSrv)

@@ -363,6 +363,39 @@ typedef struct {
     WIRE_UI32 capacity; /* how many samples there is room for */
 } TRACE_STATE;
 
+/* TAG_BP_RECORD (own): BP_BREAKPOINT. */
+typedef struct {
+    WIRE_UI32 code_offset;
+    WIRE_UI32 skip;
+    WIRE_UI32 hits;
+    RTS_UI8 relation;
+    RTS_UI8 kind;
+    WIRE_UI16 reserved;
+    RTS_UI8 area;
+    RTS_UI8 pointers;
+    RTS_UI8 size;
+    RTS_UI8 mask;
+    RTS_UI8 offset[16]; /* four numbers of 4 bytes */
+    RTS_UI8 value[8];
+} BP_RECORD;
+
+/* TAG_BP_STATE (own): BP_STATUS. */
+typedef struct {
+    WIRE_UI32 supported;
+    WIRE_UI32 attached;
+    WIRE_UI32 halted;
+    WIRE_UI32 serial;
+    WIRE_UI32 code;
+    WIRE_UI32 task;
+    WIRE_UI32 code_offset;
+    WIRE_UI32 stack_size;
+    RTS_UI8 stack[8];
+    RTS_UI8 area[48]; /* six numbers of 8 bytes */
+    WIRE_UI32 breakpoints;
+    WIRE_UI32 room;
+    WIRE_UI32 traps;
+} BP_STATE;
+
 /* TAG_LOG_ENTRY. */
 typedef struct {
     WIRE_UI32 component;
@@ -444,6 +477,8 @@ WIRE_SIZE(MON2_FORCED, 28);
 WIRE_SIZE(TRACE_PLACE, 20);
 WIRE_SIZE(TRACE_CONFIG, 64);
 WIRE_SIZE(TRACE_STATE, 28);
+WIRE_SIZE(BP_RECORD, 44);
+WIRE_SIZE(BP_STATE, 100);
 WIRE_SIZE(LOG_RECORD, 16);
 WIRE_SIZE(IO_STATE, 20);
 WIRE_SIZE(IO_PARAMETER, 16);

@@ -141,6 +141,7 @@ enum {
     SG_IOMGR = 0x0B,
     SG_USERMGR = 0x0C,
     SG_PLCSHELL = 0x11,
+    SG_APPLICATION_BP = 0x12,
     SG_MONITORING2 = 0x1B,
     SG_TRACE = 0x60, /* own */
 };
@@ -310,6 +311,33 @@ enum {
     TAG_TRACE_RECORD = 0x05,
     TAG_TRACE_STATE = 0x06,
     TAG_TRACE_SAMPLES = 0x07,
+};
+
+/* Breakpoints (own; docs/debugging.md). */
+enum {
+    SRV_BP_ATTACH = 0x60,
+    SRV_BP_DETACH = 0x61,
+    SRV_BP_STATUS = 0x62,
+    SRV_BP_SET = 0x63,
+    SRV_BP_CLEAR = 0x64,
+    SRV_BP_LIST = 0x65,
+    SRV_BP_TEMPORARY = 0x66,
+    SRV_BP_GO = 0x67,
+    SRV_BP_PAUSE = 0x68,
+    SRV_BP_READ_STACK = 0x69,
+    SRV_BP_WRITE_STACK = 0x6A,
+    TAG_BP_KEEP = 0x02,
+    TAG_BP_STATE = 0x03,
+    TAG_BP_RECORD = 0x04,
+    TAG_BP_OFFSET = 0x05,
+    TAG_BP_START = 0x06,
+    TAG_BP_OFFSETS = 0x07,
+    TAG_BP_MORE = 0x08,
+    TAG_BP_HOW = 0x09,
+    TAG_BP_SERIAL = 0x0A,
+    TAG_BP_DISTANCE = 0x0B,
+    TAG_BP_SIZE = 0x0C,
+    TAG_BP_DATA = 0x0D,
 };
 
 /* Inputs and outputs; what is in them is our own. */

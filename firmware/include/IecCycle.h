@@ -15,6 +15,7 @@
 #include "CmpStd.h"
 #ifndef RTS_CFFI
 #include "SysExcept.h"
+#include "rts_config.h"
 #endif
 
 /* Statistics of a task; times in us. Jitter is the largest deviation of a start from its due time. */
@@ -84,6 +85,20 @@ bool IecCycleMayRun(void);
 /* How long the cycle has taken until now, and how long after it was due it began; both end at 4.29 s. With TRACE_BUFFER,
  * from CYCLE_RECORD of this task. */
 void IecTaskGetTimes(RTS_UI32 task, RTS_UI32 *cycle_ns, RTS_UI32 *late_ns);
+
+#if BP_MAX > 0
+/* ---- for CmpAppBP ---- */
+
+/* The task that runs SysExceptTry with `arg`; IecTaskGetCount() if it is initialisation code. From any context. */
+RTS_UI32 IecCycleFindTask(const void *arg);
+/* No cycle of a task other than `task` starts until IecCycleRelease: what is due waits, and is late. Cycles that run
+ * end. From the context of a task. */
+void IecCycleHold(RTS_UI32 task);
+/* From any context. */
+void IecCycleRelease(void);
+/* The cycle of the task that calls it stood still for so long: statistics and watchdog do not count that. */
+void IecCycleStoodStill(RTS_UI32 task, RTS_I64 ns);
+#endif
 
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
  * simulator, between cycles. */

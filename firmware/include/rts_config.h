@@ -295,8 +295,23 @@
 /* 1: phases of the cycle come and go while tasks run. */
 #define CYCLE_PHASES_CHANGE (FORCE_MAX > 0 || TRACE_BUFFER > 0)
 
-/* Event callbacks that may be registered, all for components of a port but one each of CmpForce and
- * CmpOperationControl and two of CmpTraceMgr; five words each. 0: the application sends no events. */
+/* Breakpoints that a debugger may set at a time (CmpAppBP.h), and traps that the code may have at a time: those, and where
+ * a step may lead. 0: no debugger, and no flash for it. It needs HAS_CmpAppBP in cmp_list.c, SysDebug.h in the port,
+ * FORCE_MAX, and one of EVENT_MAX_CALLBACKS. */
+#ifndef BP_MAX
+#define BP_MAX 0
+#endif
+#ifndef BP_TRAPS
+#define BP_TRAPS (BP_MAX > 0 ? 4096 : 0)
+#endif
+
+/* A debugger that asks nothing for so long is gone: its breakpoints end, and what is halted goes on [ms]. 0: never. */
+#ifndef BP_ALIVE_MS
+#define BP_ALIVE_MS 5000
+#endif
+
+/* Event callbacks that may be registered, all for components of a port but one each of CmpForce,
+ * CmpOperationControl and CmpAppBP, and two of CmpTraceMgr; five words each. 0: the application sends no events. */
 #ifndef EVENT_MAX_CALLBACKS
 #define EVENT_MAX_CALLBACKS 8
 #endif

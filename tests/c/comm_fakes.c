@@ -224,6 +224,92 @@ RTS_UI8 *AppImageGetCopy(RTS_UI32 task, RTS_UI32 area, RTS_UI32 offset, RTS_UI32
 }
 #endif
 
+/* ---- breakpoints ---- */
+
+#if BP_MAX > 0
+RTS_RESULT AppBpAttach(bool keep)
+{
+    fakes.bp.attached++;
+    fakes.bp.kept = keep;
+    return fakes.bp.result;
+}
+
+void AppBpDetach(void)
+{
+    fakes.bp.detached++;
+}
+
+void AppBpAlive(void)
+{
+    fakes.bp.alive++;
+}
+
+void AppBpGetStatus(BP_STATUS *status)
+{
+    *status = fakes.bp.status;
+}
+
+RTS_RESULT AppBpSet(const BP_BREAKPOINT *breakpoint)
+{
+    if (fakes.bp.count == RTS_COUNT(fakes.bp.list))
+        return ERR_NOMEMORY;
+    fakes.bp.list[fakes.bp.count++] = *breakpoint;
+    return fakes.bp.result;
+}
+
+RTS_RESULT AppBpClear(RTS_UI32 offset)
+{
+    fakes.bp.cleared = offset;
+    return fakes.bp.result;
+}
+
+void AppBpClearAll(void)
+{
+    fakes.bp.count = 0;
+}
+
+bool AppBpGet(RTS_UI32 index, BP_BREAKPOINT *breakpoint)
+{
+    if (index >= fakes.bp.count)
+        return false;
+    *breakpoint = fakes.bp.list[index];
+    return true;
+}
+
+void AppBpClearTemporary(void)
+{
+    fakes.bp.temporary_count = 0;
+}
+
+RTS_RESULT AppBpAddTemporary(RTS_UI32 offset)
+{
+    if (fakes.bp.temporary_count == RTS_COUNT(fakes.bp.temporary))
+        return ERR_NOMEMORY;
+    fakes.bp.temporary[fakes.bp.temporary_count++] = offset;
+    return ERR_OK;
+}
+
+RTS_RESULT AppBpGo(RTS_UI32 how)
+{
+    fakes.bp.gone_on++;
+    fakes.bp.how = how;
+    return fakes.bp.result;
+}
+
+RTS_RESULT AppBpPause(void)
+{
+    fakes.bp.paused++;
+    return fakes.bp.result;
+}
+
+RTS_UI8 *AppBpGetStack(RTS_UI32 distance, RTS_UI32 size)
+{
+    RTS_UI32 room = sizeof fakes.bp.stack;
+
+    return size <= room && distance <= room - size ? fakes.bp.stack + distance : NULL;
+}
+#endif
+
 /* CmpForce.c keeps its list; no task uses it. */
 void CyclePhaseAdd(CYCLE_PHASE when, CYCLE_ENTRY *entry)
 {
@@ -521,6 +607,9 @@ void fakes_hook(CMP_HOOK hook)
         CmpMonitor2_Hook,
 #if TRACE_BUFFER > 0
         CmpTraceSrv_Hook,
+#endif
+#if BP_MAX > 0
+        CmpAppBPSrv_Hook,
 #endif
         CmpLogSrv_Hook,
         CmpPlcShell_Hook,

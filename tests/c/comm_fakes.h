@@ -10,6 +10,7 @@
 #include "CmpAppEmbedded.h"
 #include "CmpIecTask.h"
 #include "CmpItf.h"
+#include "CmpAppBP.h"
 #include "CmpLog.h"
 #include "CmpSrvNumbers.h"
 #include "SysTarget.h"
@@ -66,6 +67,18 @@ typedef struct {
 #if COMM_PASSWORD
     USER_VERIFIER password;
     RTS_RESULT password_result; /* of setting it */
+#endif
+#if BP_MAX > 0
+    struct {
+        RTS_RESULT result; /* of all that may fail */
+        BP_STATUS status;
+        BP_BREAKPOINT list[4];
+        RTS_UI32 count;
+        RTS_UI32 temporary[64];
+        RTS_UI32 temporary_count;
+        RTS_UI32 how, gone_on, paused, attached, kept, detached, alive, cleared;
+        RTS_UI8 stack[64];
+    } bp;
 #endif
     LOG_ENTRY log[FAKE_LOG_SIZE];
     RTS_UI32 log_count;

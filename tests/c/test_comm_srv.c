@@ -179,6 +179,12 @@ static void changing_services_need_a_login(void)
         {SG_TRACE, SRV_TRACE_DELETE},
         {SG_TRACE, SRV_TRACE_LIST},
         {SG_TRACE, SRV_TRACE_READ},
+        {SG_APPLICATION_BP, SRV_BP_ATTACH},
+        {SG_APPLICATION_BP, SRV_BP_SET},
+        {SG_APPLICATION_BP, SRV_BP_GO},
+        {SG_APPLICATION_BP, SRV_BP_WRITE_STACK},
+        {SG_APPLICATION_BP, SRV_BP_READ_STACK},
+        {SG_APPLICATION_BP, SRV_BP_TEMPORARY},
     };
     static const RTS_UI32 sessions[] = {0, 1, L7_SESSION_INITIAL, 0x80000000, 0xFFFFFFFF};
 

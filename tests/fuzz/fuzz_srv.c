@@ -126,6 +126,19 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
         return SEED(0x60, 3, "\x02\x04\0\0\0\0");
     case 36:
         return SEED(0x60, 4, "\x02\x04\x01\0\0\0" "\x03\x04\0\0\0\0");
+    case 37:
+        return SEED(0x12, 0x63, "\x04\x2C" "\x10\0\0\0\x02\0\0\0\0\0\0\0\x03\x01\0\0\0\x01\x04\xFF"
+                                "\x10\0\0\0\x04\0\0\0\0\0\0\0\0\0\0\0\x05\0\0\0\0\0\0\0");
+    case 38:
+        return SEED(0x12, 0x66, "\x07\x08\x10\0\0\0\x20\0\0\0" "\x08\x04\x01\0\0\0");
+    case 39:
+        return SEED(0x12, 0x67, "\x09\x04\x01\0\0\0" "\x0A\x04\0\0\0\0");
+    case 40:
+        return SEED(0x12, 0x69, "\x0B\x04\x08\0\0\0" "\x0C\x04\x10\0\0\0");
+    case 41:
+        return SEED(0x12, 0x6A, "\x0B\x04\x08\0\0\0" "\x0D\x04" "abcd");
+    case 42:
+        return SEED(0x12, 0x65, "\x06\x04\0\0\0\0");
     default:
         return 0;
     }

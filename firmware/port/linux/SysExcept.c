@@ -15,6 +15,7 @@
 #include "SysExcept.h"
 
 #include "IecStack.h"
+#include "SysDebug.h"
 
 #include <pthread.h>
 #include <signal.h>
@@ -53,6 +54,7 @@ static struct {
     pthread_once_t once;
     pthread_key_t key; /* its destructor frees the context of a thread that ends */
     int installed;
+    PF_SYS_DEBUG debugger; /* atomic */
     SIGNAL signal[6];
     CONTEXT context[MAX_CONTEXTS];
 } state = {
@@ -206,11 +208,68 @@ static void chain(const SIGNAL *signal, siginfo_t *info, void *ucontext)
     }
 }
 
+/* ---- the debugger ---- */
+
+void SysDebugSetHandler(PF_SYS_DEBUG handler)
+{
+    __atomic_store_n(&state.debugger, handler, __ATOMIC_RELEASE);
+}
+
+static SYS_DEBUG_ACTION ask_debugger(const CONTEXT *context, RTS_UI32 code, PLACE place)
+{
+    PF_SYS_DEBUG debugger = __atomic_load_n(&state.debugger, __ATOMIC_ACQUIRE);
+    SYS_DEBUG_STOP stop = {code, place.address, place.stack, context->stack.top, context->arg};
+    return debugger != NULL ? debugger(&stop) : SYS_DEBUG_LEAVE;
+}
+
+/* Whether IEC code goes on from a signal. */
+#if defined(__x86_64__)
+static bool goes_on(const CONTEXT *context, RTS_UI32 code, const siginfo_t *info, void *ucontext)
+{
+    enum { SINGLE_STEP = 0x100 };
+    greg_t *registers = ((ucontext_t *)ucontext)->uc_mcontext.gregs;
+    PLACE place = place_of(ucontext);
+    bool stepped = info->si_signo == SIGTRAP && info->si_code == TRAP_TRACE;
+    if (stepped) {
+        registers[REG_EFL] &= ~SINGLE_STEP;
+        (void)ask_debugger(context, RTSEXCPT_NOEXCEPTION, place);
+        return true;
+    }
+    if (info->si_signo == SIGTRAP) {
+        place.address--;
+        code = RTSEXCPT_BREAKPOINT;
+    }
+    SYS_DEBUG_ACTION action = ask_debugger(context, code, place);
+    if (action == SYS_DEBUG_LEAVE) {
+        return false;
+    }
+    registers[REG_RIP] = (greg_t)place.address;
+    if (action == SYS_DEBUG_PASS) {
+        registers[REG_EFL] |= SINGLE_STEP;
+    }
+    return true;
+}
+#else
+static bool goes_on(const CONTEXT *context, RTS_UI32 code, const siginfo_t *info, void *ucontext)
+{
+    RTS_UNUSED(info);
+    return ask_debugger(context, code, place_of(ucontext)) != SYS_DEBUG_LEAVE;
+}
+#endif
+
+static bool is_debugged(const CONTEXT *context)
+{
+    return __atomic_load_n(&state.debugger, __ATOMIC_RELAXED) != NULL && runs_iec_code(context);
+}
+
 static void on_fault(int number, siginfo_t *info, void *ucontext)
 {
     IecStackResetFlags();
     CONTEXT *context = self();
     SIGNAL *signal = find_signal(number);
+    if (is_debugged(context) && goes_on(context, fault_code(context, signal, info), info, ucontext)) {
+        return;
+    }
     if (begin_to_leave(context)) {
         leave(context, fault_code(context, signal, info), place_of(ucontext));
     }
@@ -405,10 +464,14 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
     IecStackResetFlags();
     CONTEXT *context = self();
+    PLACE place = {.address = address, .stack = (uintptr_t)stack};
+    if (is_debugged(context)) {
+        (void)ask_debugger(context, code, place);
+    }
     if (!begin_to_leave(context)) {
         fatal("an exception was raised outside of IEC code");
     }
-    leave(context, code, (PLACE){.address = address, .stack = (uintptr_t)stack});
+    leave(context, code, place);
 }
 
 /* At most one signal per round: a thread that does not get the processor would find all of them stacked on top of each

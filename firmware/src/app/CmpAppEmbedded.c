@@ -12,6 +12,7 @@
 #include "AppCommit.h"
 #include "../load/AppFunctions.h"
 #include "AppLife.h"
+#include "CmpAppBP.h"
 #include "CmpForce.h"
 #include "CmpLog.h"
 #include "SysFileFlash.h"
@@ -126,6 +127,10 @@ void AppGetStatus(APP_STATUS *status)
         status->op_state |= OS_EXCEPTION;
     if (AppCommitGet()->active != SLOT_NONE)
         status->op_state |= OS_BOOTPROJECT_VALID;
+#if BP_MAX > 0
+    if (AppBpIsHalted())
+        status->state = AS_HALT_ON_BP;
+#endif
     if (ForceGetCount() > 0)
         status->op_state |= OS_FORCE_ACTIVE;
 }

@@ -5,6 +5,7 @@
  */
 #include "CmpIecTask.h"
 
+#include "CmpAppBP.h"
 #include "CmpScheduleTimer.h"
 #include "SysExcept.h"
 #include "SysTime.h"
@@ -37,6 +38,7 @@ RTS_RESULT IecTaskCreateAll(const CDL_TASK *records, RTS_UI32 count, const IEC_C
 
 RTS_RESULT IecTaskStartAll(void)
 {
+    AppBpTasksStart();
     IecCycleStart();
     return SchedStart();
 }
@@ -45,6 +47,7 @@ RTS_RESULT IecTaskStartAll(void)
 RTS_NOINLINE void IecTaskStopAll(void)
 {
     IecCycleStop();
+    AppBpTasksStop();
     SchedStop();
     IecCycleCallOff();
 }

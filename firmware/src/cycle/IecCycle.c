@@ -16,6 +16,7 @@
 #include "CyclePhases.h"
 #include "SchedEvents.h"
 #include "SysAtomic.h"
+#include "SysDebug.h"
 #include "SysTime.h"
 #include "rts_config.h"
 
@@ -48,8 +49,14 @@ typedef struct {
 #endif
 } TASK;
 
+/* May cycles start? */
+enum { TASKS_STOP, TASKS_RUN, TASKS_HELD /* by a debugger, but for one task */ };
+
 static struct {
-    RTS_UI32 running; /* cycles may start */
+    RTS_UI32 running; /* TASKS_* */
+#if BP_MAX > 0
+    RTS_UI32 not_held; /* the one task, while the others are held */
+#endif
     RTS_UI32 count;
     bool time_started;
     RTS_I64 time_zero; /* SysTimeGetNs at which the time of the application is 0 */
@@ -215,7 +222,10 @@ static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
  * application. */
 static bool end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
-    SysAtomicStore(&tasks.running, 0);
+    SysAtomicStore(&tasks.running, TASKS_STOP);
+#if BP_MAX > 0
+    SysDebugWake(&tasks.running);
+#endif
     guard_end(&task->guard);
     AppEnterSafeState(); /* at once: main may be busy with the flash */
     AppHandleException((RTS_I32)index_of(task), code, address);
@@ -277,7 +287,7 @@ static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
         return end_with_exception(task, exception.code, exception.address);
     if (task->has_phases)
         run_phases_after(task, due_ns);
-    elapsed_ns = SysTimeGetNs() - start_ns;
+    elapsed_ns = SysTimeGetNs() - (BP_MAX > 0 ? task->guard.start_ns : start_ns);
     account(task, start_ns - due_ns, elapsed_ns);
     if (watchdog_expired(task, SCHED_PROCESSOR_TIME ? used_ns(task) - used_before_ns : elapsed_ns))
         return end_with_exception(task, RTSEXCPT_WATCHDOG, 0);
@@ -365,12 +375,60 @@ bool IecTaskBetweenCycles(void (*copy)(void))
     return true;
 }
 
+/* ---- a debugger holds the tasks ---- */
+
+#if BP_MAX > 0
+RTS_UI32 IecCycleFindTask(const void *arg)
+{
+    RTS_UI32 i = 0;
+
+    while (i < tasks.count && arg != &tasks.list[i])
+        i++;
+    return i;
+}
+
+void IecCycleHold(RTS_UI32 task)
+{
+    SysAtomicStore(&tasks.not_held, task);
+    (void)SysAtomicReplace(&tasks.running, TASKS_RUN, TASKS_HELD);
+}
+
+void IecCycleRelease(void)
+{
+    (void)SysAtomicReplace(&tasks.running, TASKS_HELD, TASKS_RUN);
+    SysDebugWake(&tasks.running);
+}
+
+void IecCycleStoodStill(RTS_UI32 task, RTS_I64 ns)
+{
+    tasks.list[task].guard.start_ns += ns;
+}
+
+/* Not in main, which has to serve the debugger. What waited is due when the wait ends. */
+static RTS_NOINLINE bool wait_for_turn(TASK *task, RTS_I64 due_ns)
+{
+    bool was_held = false;
+
+    while (SysAtomicLoad(&tasks.running) == TASKS_HELD && SysAtomicLoad(&tasks.not_held) != index_of(task) &&
+           SysDebugMayWait()) {
+        was_held = true;
+        SysDebugWait(&tasks.running, TASKS_HELD);
+    }
+    return SysAtomicLoad(&tasks.running) != TASKS_STOP ? run_cycle(task, was_held ? SysTimeGetNs() : due_ns) : false;
+}
+#define run_if_not_stopped(task, due_ns) wait_for_turn(task, due_ns)
+#else
+#define run_if_not_stopped(task, due_ns) false
+#endif
+
 bool IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 {
     TASK *task = &tasks.list[index];
 
     if (!RTS_ONE_CORE && APP_RETAIN_SIZE > 0 && is_wanted())
         make_moment(task);
+    if (BP_MAX > 0)
+        return SysAtomicLoad(&tasks.running) == TASKS_RUN ? run_cycle(task, due_ns) : run_if_not_stopped(task, due_ns);
     return SysAtomicLoad(&tasks.running) ? run_cycle(task, due_ns) : false;
 }
 
@@ -428,7 +486,7 @@ void IecCycleStart(void)
     if (!tasks.time_started)
         tasks.time_zero = SysTimeGetNs();
     tasks.time_started = true;
-    SysAtomicStore(&tasks.running, 1);
+    SysAtomicStore(&tasks.running, TASKS_RUN);
 }
 
 bool IecCycleMayStart(void)
@@ -438,7 +496,10 @@ bool IecCycleMayStart(void)
 
 void IecCycleStop(void)
 {
-    SysAtomicStore(&tasks.running, 0);
+    SysAtomicStore(&tasks.running, TASKS_STOP);
+#if BP_MAX > 0
+    SysDebugWake(&tasks.running);
+#endif
 }
 
 bool IecCycleMayRun(void)

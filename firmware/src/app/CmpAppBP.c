@@ -1,0 +1,647 @@
+/*
+ * CmpAppBP.c - breakpoints: the list, the traps in the code, and the task that is halted.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Main changes lists and traps under the lock; a task that met a trap looks into them under the lock. A trap is taken out
+ * for the one instruction with which its task goes on: another task that executes it just then does not halt.
+ */
+#include "CmpAppBP.h"
+
+#if BP_MAX > 0
+
+#include <string.h>
+
+#include "AppLife.h"
+#include "CmpEventMgr.h"
+#include "CmpLog.h"
+#include "IecCycle.h"
+#include "SysAtomic.h"
+#include "SysDebug.h"
+#include "SysExcept.h"
+#include "SysLock.h"
+#include "SysTime.h"
+
+/* Whose trap it is. */
+enum { TRAP_BREAKPOINT = 1, TRAP_TEMPORARY = 2 };
+
+typedef struct {
+    RTS_UI32 offset;
+    RTS_UI32 original;
+    RTS_UI32 owners; /* TRAP_*; 0: none */
+} TRAP;
+
+#define NO_TASK 0xFFFFFFFFu
+#define NOTHING 0xFFFFFFFFu
+
+enum { BP_RUNS, BP_HALTED };
+
+static struct {
+    RTS_UI32 attached; /* atomic */
+    bool keep;
+    bool active; /* traps are in the code: the tasks run */
+    RTS_UI32 alive_ms;
+    RTS_UI32 crc; /* of the image that the breakpoints belong to */
+    RTS_UI32 count;
+    BP_BREAKPOINT list[BP_MAX];
+    RTS_UI32 trap_count;
+    TRAP trap[BP_TRAPS];
+    RTS_UI32 step_task;                  /* whose temporary traps; NO_TASK: any */
+    RTS_UI32 passing[APP_MAX_TASKS + 1]; /* the trap that is out while a task executes its instruction */
+    RTS_UI32 owner;                      /* 1 + the task that is halted or steps; 0: none; atomic */
+    RTS_UI32 state;                      /* BP_RUNS, BP_HALTED; atomic */
+    RTS_UI32 serial;
+    SYS_DEBUG_STOP stop;
+} bp;
+
+static uintptr_t address_of(RTS_UI32 offset)
+{
+    return (uintptr_t)AppGetContext()->area[APP_AREA_CODE] + offset;
+}
+
+/* ---- traps, with the lock ---- */
+
+static TRAP *find_trap(RTS_UI32 offset)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < bp.trap_count; i++) {
+        if (bp.trap[i].offset == offset)
+            return &bp.trap[i];
+    }
+    return NULL;
+}
+
+static RTS_RESULT add_trap(RTS_UI32 offset, RTS_UI32 owner)
+{
+    TRAP *trap = find_trap(offset);
+    RTS_RESULT result = ERR_OK;
+
+    if (trap == NULL) {
+        if (bp.trap_count == BP_TRAPS)
+            return ERR_NOMEMORY;
+        trap = &bp.trap[bp.trap_count];
+        trap->offset = offset;
+        trap->owners = 0;
+        if (bp.active)
+            result = SysDebugWriteTrap(address_of(offset), &trap->original);
+        if (result != ERR_OK)
+            return result;
+        bp.trap_count++;
+    }
+    trap->owners |= owner;
+    return ERR_OK;
+}
+
+static void take_out(const TRAP *trap)
+{
+    if (bp.active && SysDebugIsTrap(address_of(trap->offset)))
+        SysDebugRestore(address_of(trap->offset), trap->original);
+}
+
+/* From the end on, so that those that move have been looked at. */
+static void remove_owner(RTS_UI32 owner)
+{
+    RTS_UI32 i = bp.trap_count;
+
+    while (i-- > 0) {
+        TRAP *trap = &bp.trap[i];
+        trap->owners &= ~owner;
+        if (trap->owners == 0) {
+            take_out(trap);
+            *trap = bp.trap[--bp.trap_count];
+        }
+    }
+}
+
+static void remove_trap(RTS_UI32 offset, RTS_UI32 owner)
+{
+    TRAP *trap = find_trap(offset);
+
+    if (trap == NULL)
+        return;
+    trap->owners &= ~owner;
+    if (trap->owners == 0) {
+        take_out(trap);
+        *trap = bp.trap[--bp.trap_count];
+    }
+}
+
+static void put_in_all(void)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < bp.trap_count; i++)
+        (void)SysDebugWriteTrap(address_of(bp.trap[i].offset), &bp.trap[i].original);
+    bp.active = true;
+}
+
+static void take_out_all(void)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < bp.trap_count; i++)
+        take_out(&bp.trap[i]);
+    bp.active = false;
+}
+
+/* ---- conditions ---- */
+
+static RTS_I64 sign_extend(RTS_UI64 value, RTS_UI32 size)
+{
+    RTS_UI32 unused = 64 - 8 * size;
+
+    return (RTS_I64)(value << unused) >> unused;
+}
+
+static double real_of(RTS_UI64 value, RTS_UI32 size)
+{
+    RTS_UI32 low = (RTS_UI32)value;
+    float small;
+    double large;
+
+    memcpy(&small, &low, sizeof small);
+    memcpy(&large, &value, sizeof large);
+    return size == sizeof small ? (double)small : large;
+}
+
+static RTS_UI32 bit_if(bool relates, RTS_UI32 one, RTS_UI32 other, RTS_UI32 third)
+{
+    return relates ? 1u << one | 1u << other | 1u << third : 0;
+}
+
+/* The bits of BP_EQUAL .. BP_GREATER_EQUAL that hold; of what cannot be ordered, that of BP_NOT_EQUAL. */
+static RTS_UI32 relations(bool less, bool equal, bool greater)
+{
+    RTS_UI32 found = bit_if(less, BP_LESS, BP_LESS_EQUAL, BP_NOT_EQUAL) |
+                     bit_if(equal, BP_EQUAL, BP_LESS_EQUAL, BP_GREATER_EQUAL) |
+                     bit_if(greater, BP_GREATER, BP_GREATER_EQUAL, BP_NOT_EQUAL);
+
+    return found != 0 ? found : 1u << BP_NOT_EQUAL;
+}
+
+static RTS_UI32 relations_of_reals(double a, double b)
+{
+    return relations(a < b, a >= b && a <= b, a > b);
+}
+
+static RTS_UI32 relations_of_signed(RTS_I64 a, RTS_I64 b)
+{
+    return relations(a<b, a == b, a> b);
+}
+
+static bool compares(const BP_CONDITION *condition, RTS_UI64 value)
+{
+    RTS_UI32 size = condition->place.size;
+    RTS_UI32 found;
+
+    if (condition->kind == BP_REAL)
+        found = relations_of_reals(real_of(value, size), real_of(condition->value, size));
+    else if (condition->kind == BP_SIGNED)
+        found = relations_of_signed(sign_extend(value, size), sign_extend(condition->value, size));
+    else
+        found = relations(value<condition->value, value == condition->value, value> condition->value);
+    return (found >> condition->relation & 1) != 0;
+}
+
+/* A pointer that leads nowhere makes no condition true. */
+static bool holds(const BP_CONDITION *condition)
+{
+    AREA_ADDRESS address;
+    RTS_UI64 value = 0;
+    RTS_UI8 *at;
+
+    if (condition->relation == BP_ALWAYS)
+        return true;
+    if (AppPlaceFind(&condition->place, &address, &at) != MONITORING_ERR_OK)
+        return false;
+    memcpy(&value, at, condition->place.size);
+    if (condition->place.mask != PLACE_ALL_BITS)
+        value = (value & condition->place.mask) != 0;
+    return compares(condition, value);
+}
+
+static bool is_valid(const BP_CONDITION *condition)
+{
+    AREA_ADDRESS address;
+    RTS_UI8 *at;
+    bool is_real = condition->kind == BP_REAL;
+
+    if (condition->relation == BP_ALWAYS)
+        return true;
+    if (condition->relation > BP_GREATER_EQUAL || condition->kind > BP_REAL ||
+        AppPlaceCheck(&condition->place) != MONITORING_ERR_OK ||
+        AppPlaceFind(&condition->place, &address, &at) != MONITORING_ERR_OK)
+        return false;
+    return !is_real || condition->place.size >= sizeof(float);
+}
+
+/* ---- in the task ---- */
+
+static BP_BREAKPOINT *find_breakpoint(RTS_UI32 offset)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < bp.count; i++) {
+        if (bp.list[i].offset == offset)
+            return &bp.list[i];
+    }
+    return NULL;
+}
+
+/* With the lock. */
+static bool is_hit(const TRAP *trap, RTS_UI32 task)
+{
+    BP_BREAKPOINT *breakpoint = find_breakpoint(trap->offset);
+    bool halts = false;
+
+    if (breakpoint != NULL && holds(&breakpoint->condition))
+        halts = ++breakpoint->hits > breakpoint->skip;
+    return halts || ((trap->owners & TRAP_TEMPORARY) != 0 && (bp.step_task == NO_TASK || bp.step_task == task));
+}
+
+/* The other tasks wait until the one that is halted has gone on. False when there is no debugger any more. */
+static bool become_owner(RTS_UI32 task)
+{
+    RTS_UI32 owner;
+
+    while (bp.active && SysAtomicLoad(&bp.attached)) {
+        owner = SysAtomicLoad(&bp.owner);
+        if (owner == task + 1 || (owner == 0 && SysAtomicReplace(&bp.owner, 0, task + 1)))
+            return true;
+        SysDebugWait(&bp.owner, owner);
+    }
+    return false;
+}
+
+static void give_up_owner(void)
+{
+    SysAtomicStore(&bp.owner, 0);
+    IecCycleRelease();
+    SysDebugWake(&bp.owner);
+}
+
+static void halt(const SYS_DEBUG_STOP *stop, RTS_UI32 task)
+{
+    RTS_I64 since_ns = SysTimeGetNs();
+    RTS_UI32 serial;
+
+    if (!become_owner(task))
+        return;
+    bp.stop = *stop;
+    serial = ++bp.serial;
+    IecCycleHold(task);
+    SysAtomicStore(&bp.state, BP_HALTED);
+    if (!bp.active || !SysAtomicLoad(&bp.attached)) /* it ended just now */
+        SysAtomicStore(&bp.state, BP_RUNS);
+    while (SysAtomicLoad(&bp.state) == BP_HALTED && bp.serial == serial) /* not another one already */
+        SysDebugWait(&bp.state, BP_HALTED);
+    IecCycleStoodStill(task, SysTimeGetNs() - since_ns);
+    if (!bp.active || !SysAtomicLoad(&bp.attached))
+        give_up_owner();
+}
+
+/* The trap of the instruction that was executed is put in again, unless it was removed meanwhile. */
+static void put_back(RTS_UI32 task)
+{
+    RTS_UI32 lock = SysLockEnter();
+    TRAP *trap = find_trap(bp.passing[task]);
+
+    if (trap != NULL && bp.active && !SysDebugIsTrap(address_of(trap->offset)))
+        (void)SysDebugWriteTrap(address_of(trap->offset), &trap->original);
+    bp.passing[task] = NOTHING;
+    SysLockLeave(lock);
+}
+
+static SYS_DEBUG_ACTION pass(RTS_UI32 offset, RTS_UI32 task)
+{
+    RTS_UI32 lock = SysLockEnter();
+    const TRAP *trap = find_trap(offset);
+    bool passes = trap != NULL && bp.active;
+
+    if (passes) {
+        take_out(trap);
+        bp.passing[task] = offset;
+    }
+    SysLockLeave(lock);
+    return passes ? SYS_DEBUG_PASS : SYS_DEBUG_GO;
+}
+
+static SYS_DEBUG_ACTION trapped(const SYS_DEBUG_STOP *stop, RTS_UI32 task, bool may_halt)
+{
+    RTS_UI32 offset = SysExceptCodeOffset(stop->address);
+    RTS_UI32 lock = SysLockEnter();
+    TRAP *trap = SysExceptIsCode(stop->address) ? find_trap(offset) : NULL;
+    bool is_ours = trap != NULL;
+    bool halts = is_ours && may_halt && is_hit(trap, task);
+
+    SysLockLeave(lock);
+    if (!is_ours) /* a trap of the compiler, or one that was taken out meanwhile */
+        return SysDebugIsTrap(stop->address) ? SYS_DEBUG_LEAVE : SYS_DEBUG_GO;
+    if (halts)
+        halt(stop, task);
+    return pass(offset, task);
+}
+
+static SYS_DEBUG_ACTION on_stop(const SYS_DEBUG_STOP *stop)
+{
+    RTS_UI32 task = IecCycleFindTask(stop->arg);
+    bool may_halt = task < IecTaskGetCount() && SysDebugMayWait();
+
+    if (task == IecTaskGetCount())
+        task = APP_MAX_TASKS;
+    if (stop->code == RTSEXCPT_NOEXCEPTION) {
+        put_back(task);
+        return SYS_DEBUG_GO;
+    }
+    if (stop->code == RTSEXCPT_BREAKPOINT)
+        return trapped(stop, task, may_halt);
+    if (may_halt)
+        halt(stop, task);
+    return SYS_DEBUG_LEAVE;
+}
+
+/* ---- in main ---- */
+
+static void go(void)
+{
+    SysAtomicStore(&bp.state, BP_RUNS);
+    SysDebugWake(&bp.state);
+}
+
+bool AppBpIsHalted(void)
+{
+    return SysAtomicLoad(&bp.state) == BP_HALTED;
+}
+
+/* Breakpoints of another image end. */
+static void check_image(void)
+{
+    if (bp.crc != AppGetImage()->crc)
+        AppBpClearAll();
+    bp.crc = AppGetImage()->crc;
+}
+
+static void forget_list(void)
+{
+    bp.count = 0;
+    remove_owner(TRAP_BREAKPOINT | TRAP_TEMPORARY);
+}
+
+void AppBpClearAll(void)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    forget_list();
+    SysLockLeave(lock);
+}
+
+RTS_RESULT AppBpAttach(bool keep)
+{
+    if (!SysDebugCanTrap())
+        return ERR_NOT_SUPPORTED;
+    check_image();
+    bp.keep = keep;
+    AppBpAlive();
+    if (!bp.attached)
+        bp.active = AppGetState() == AS_RUN;
+    SysAtomicStore(&bp.attached, 1);
+    SysDebugSetHandler(on_stop);
+    return ERR_OK;
+}
+
+/* The handler stays: a task may be on its way to it. */
+void AppBpDetach(void)
+{
+    SysAtomicStore(&bp.attached, 0);
+    AppBpClearAll();
+    go();
+    give_up_owner();
+}
+
+void AppBpAlive(void)
+{
+    bp.alive_ms = SysTimeGetMs();
+}
+
+static void check_alive(void)
+{
+    RTS_UI32 silent_ms = SysTimeGetMs() - bp.alive_ms;
+
+    if (BP_ALIVE_MS == 0 || !bp.attached || bp.keep || silent_ms <= BP_ALIVE_MS)
+        return;
+    LogAdd(CMPID_CmpAppBP, LOG_WARNING, ERR_TIMEOUT, "The debugger is gone: its breakpoints end, tasks go on");
+    AppBpDetach();
+}
+
+static RTS_RESULT check_place(RTS_UI32 offset)
+{
+    if (!bp.attached)
+        return ERR_INVALID_STATE;
+    if (AppGetState() == AS_NONE)
+        return ERR_APP_NOT_LOADED;
+    check_image();
+    return offset < AppGetImage()->code.size ? ERR_OK : ERR_OUT_OF_LIMITS;
+}
+
+/* With the lock. */
+static RTS_RESULT set_breakpoint(const BP_BREAKPOINT *breakpoint)
+{
+    BP_BREAKPOINT *entry = find_breakpoint(breakpoint->offset);
+    RTS_RESULT result;
+
+    if (entry == NULL && bp.count == BP_MAX)
+        return ERR_NOMEMORY;
+    result = add_trap(breakpoint->offset, TRAP_BREAKPOINT);
+    if (result != ERR_OK)
+        return result;
+    if (entry == NULL)
+        entry = &bp.list[bp.count++];
+    *entry = *breakpoint;
+    return ERR_OK;
+}
+
+RTS_RESULT AppBpSet(const BP_BREAKPOINT *breakpoint)
+{
+    RTS_RESULT result = check_place(breakpoint->offset);
+    RTS_UI32 lock;
+
+    if (result == ERR_OK && !is_valid(&breakpoint->condition))
+        result = ERR_PARAMETER;
+    if (result != ERR_OK)
+        return result;
+    lock = SysLockEnter();
+    result = set_breakpoint(breakpoint);
+    SysLockLeave(lock);
+    return result;
+}
+
+RTS_RESULT AppBpClear(RTS_UI32 offset)
+{
+    RTS_UI32 lock = SysLockEnter();
+    BP_BREAKPOINT *entry = find_breakpoint(offset);
+
+    if (entry != NULL) {
+        bp.count--;
+        memmove(entry, entry + 1, (RTS_SIZE)(&bp.list[bp.count] - entry) * sizeof *entry);
+        remove_trap(offset, TRAP_BREAKPOINT);
+    }
+    SysLockLeave(lock);
+    return entry != NULL ? ERR_OK : ERR_APP_BP_BREAKPOINT_NOT_SET;
+}
+
+bool AppBpGet(RTS_UI32 index, BP_BREAKPOINT *breakpoint)
+{
+    if (index >= bp.count)
+        return false;
+    *breakpoint = bp.list[index];
+    return true;
+}
+
+/* ---- steps ---- */
+
+void AppBpClearTemporary(void)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    remove_owner(TRAP_TEMPORARY);
+    SysLockLeave(lock);
+}
+
+/* A trap that is out while its task stands on it is no danger: the task is halted. */
+RTS_RESULT AppBpAddTemporary(RTS_UI32 offset)
+{
+    RTS_RESULT result = check_place(offset);
+    RTS_UI32 lock;
+
+    if (result != ERR_OK)
+        return result;
+    lock = SysLockEnter();
+    result = add_trap(offset, TRAP_TEMPORARY);
+    SysLockLeave(lock);
+    return result;
+}
+
+/* Another task may have to cause it. */
+static bool waits_for_event(RTS_UI32 task)
+{
+    IEC_TASK_INFO info;
+
+    return IecCycleGetInfo(task, &info) == ERR_OK && (info.kind == KIND_EVENT || info.kind == KIND_EXTERNAL);
+}
+
+RTS_RESULT AppBpGo(RTS_UI32 how)
+{
+    if (!AppBpIsHalted())
+        return ERR_INVALID_STATE;
+    if (how > BP_STEP_OUT)
+        return ERR_PARAMETER;
+    if (how == BP_GO)
+        AppBpClearTemporary();
+    bp.step_task = bp.owner - 1;
+    SysAtomicStore(&bp.state, BP_RUNS);
+    if (how == BP_GO || (how == BP_STEP_OUT && waits_for_event(bp.step_task)))
+        give_up_owner();
+    SysDebugWake(&bp.state);
+    return ERR_OK;
+}
+
+RTS_RESULT AppBpPause(void)
+{
+    if (!bp.attached || AppBpIsHalted())
+        return ERR_INVALID_STATE;
+    bp.step_task = NO_TASK;
+    give_up_owner(); /* a step that does not end, such as one that waits for an event */
+    return ERR_OK;
+}
+
+/* ---- looking ---- */
+
+void AppBpGetStatus(BP_STATUS *status)
+{
+    const RTS_UI32 *crc = &AppGetImage()->crc;
+    RTS_UI32 i;
+
+    memset(status, 0, sizeof *status);
+    status->supported = SysDebugCanTrap();
+    status->attached = bp.attached;
+    status->serial = bp.serial;
+    status->breakpoints = *crc == bp.crc ? bp.count : 0;
+    status->room = BP_MAX;
+    status->traps = BP_TRAPS;
+    status->code_offset = APP_NO_CODE_OFFSET;
+    for (i = 0; i < APP_AREA_COUNT && AppGetState() != AS_NONE; i++)
+        status->area[i] = (uintptr_t)AppGetContext()->area[i];
+    if (!AppBpIsHalted())
+        return;
+    status->halted = 1;
+    status->code = bp.stop.code;
+    status->task = bp.owner - 1;
+    if (SysExceptIsCode(bp.stop.address))
+        status->code_offset = SysExceptCodeOffset(bp.stop.address);
+    status->stack = bp.stop.stack;
+    status->stack_size = bp.stop.stack < bp.stop.end ? (RTS_UI32)(bp.stop.end - bp.stop.stack) : 0;
+}
+
+RTS_UI8 *AppBpGetStack(RTS_UI32 distance, RTS_UI32 size)
+{
+    BP_STATUS status;
+
+    AppBpGetStatus(&status);
+    if (size > status.stack_size || distance > status.stack_size - size || status.stack_size > RTS_IEC_STACK_SIZE)
+        return NULL;
+    return (RTS_UI8 *)(uintptr_t)status.stack + distance;
+}
+
+/* ---- tasks stop and start ---- */
+
+void AppBpTasksStop(void)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    if (bp.active)
+        take_out_all();
+    SysLockLeave(lock);
+    go();
+    SysDebugWake(&bp.owner);
+}
+
+void AppBpTasksStart(void)
+{
+    RTS_UI32 lock;
+
+    if (!bp.attached)
+        return;
+    check_image();
+    lock = SysLockEnter();
+    bp.owner = 0;
+    if (!bp.active)
+        put_in_all();
+    SysLockLeave(lock);
+}
+
+/* ---- the component ---- */
+
+static void reset(void)
+{
+    RTS_UI32 i;
+
+    CMP_CLEAR(bp);
+    for (i = 0; i < RTS_COUNT(bp.passing); i++)
+        bp.passing[i] = NOTHING;
+    SysDebugSetHandler(NULL);
+    SysDebugIsMain();
+}
+
+RTS_RESULT CmpAppBP_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT)
+        reset();
+    if (hook == CH_COMM_CYCLE)
+        check_alive();
+    if (hook == CH_EXIT_TASKS || hook == CH_EXIT)
+        AppBpDetach();
+    return ERR_OK;
+}
+
+#endif
