@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Never, Self, overload
 
 from plctool.core import lib
+from plctool.debug.breakpoints import Debugger
 from plctool.debug.forced import ForcedPlace, ForceList, name_forced, place_of
 from plctool.debug.kept_changes import KeptChanges, kept_changes
 from plctool.debug.recording import Recording
@@ -86,8 +87,8 @@ class ProgramStopped(DeviceError):
 
 @dataclass(frozen=True)
 class PlcStatus:
-    """`state` is "run", "stop", "exception" or "none"; `image_crc` is 0 without application. `forced`: the names of
-    the variables that are forced. `forbidden`: the operations that the program forbids now, of OPERATIONS."""
+    """`state` is "run", "halted", "stop", "exception" or "none"; `image_crc` is 0 without application. `forced`: the
+    names of the variables that are forced. `forbidden`: the operations that the program forbids now, of OPERATIONS."""
 
     state: AppState
     image_crc: int
@@ -136,6 +137,7 @@ class Controller(ABC):
     def __init__(self) -> None:
         self._tables: dict[int, SymbolTable] = {}  # by CRC of the image
         self._forces: ForceList | None = None  # that was read last
+        self._debugger: Debugger | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -554,6 +556,25 @@ class Controller(ABC):
 
     @abstractmethod
     def read_trace(self, packet: int, first: int, sizes: Sequence[int]) -> TraceState: ...
+
+    # ---- breakpoints ----
+
+    @property
+    def breakpoints(self) -> Debugger:
+        """Breakpoints, steps and what a halted program shows. Attached at the first use; a controller on a link takes
+        all breakpoints out when nothing has asked it for 5 s. Raises DeviceError if the controller has none."""
+        if self._debugger is None:
+            self._debugger = self._make_debugger()
+        return self._debugger
+
+    @abstractmethod
+    def _make_debugger(self) -> Debugger: ...
+
+    def end_debugging(self) -> None:
+        """All breakpoints end, and a halted program goes on."""
+        if self._debugger is not None:
+            self._debugger.close()
+            self._debugger = None
 
     # ---- what each kind does its own way ----
 

@@ -13,7 +13,9 @@ from typing import Any, cast
 from plctool.archives import MAX_BYTES, ArchiveError, inflate
 from plctool.controller import Closed, Controller, OtherTool
 from plctool.core import lib
+from plctool.debug.breakpoints import Debugger, DeviceCondition
 from plctool.debug.forced import ForcedPlace, ForceList
+from plctool.debug.halted import BpStatus
 from plctool.debug.recording import Recording
 from plctool.debug.symbols import SymbolTable, load_symbols
 from plctool.debug.variables import Change, Reading, Symbol, unreachable
@@ -24,7 +26,7 @@ from plctool.gateway.frames import BUSY
 from plctool.gateway.place import NoGateway
 from plctool.iec.types import Type
 from plctool.iec.values import decode, encode
-from plctool.link import file_services, io_services, services, traces
+from plctool.link import breakpoint_services, file_services, io_services, services, traces
 from plctool.link.connection import SCAN_SECONDS, Choice, Connection, MessageLink, no_answer, patience_factor
 from plctool.link.file_services import SYMBOLS_NAME, FileList, Progress
 from plctool.link.io_services import IoDevice, IoModule
@@ -47,6 +49,7 @@ from plctool.link.transports import Link, can_transport, open_transport, parse_l
 
 PASSWORD_VARIABLE = "PLC_PASSWORD"
 _TRACE_POLL = 0.05  # shortest time between two looks at a trace that has nothing new [s]
+_HALT_POLL = 0.02  # how often a device is asked whether its program is halted [s]
 _BUSY_POLL = 0.2  # shortest time between two looks at a device that another tool keeps to itself [s]
 
 
@@ -153,6 +156,7 @@ class Plc(Controller):
 
     def close(self) -> None:
         if not self._closed:
+            self.end_debugging()
             self._closed = True
             self._connection.close()
             self._session = self._connection = cast("Any", Closed("The connection is closed; connect again."))
@@ -369,6 +373,25 @@ class Plc(Controller):
     def _pass_cycle(self, recording: Recording) -> None:
         time.sleep(min(max(recording.interval_us / 1e6, _TRACE_POLL), 1.0))
 
+    def _make_debugger(self) -> Debugger:
+        return Debugger(_DebuggedPlc(self, self._session))
+
+    def read_symbols(self, symbols: Sequence[Symbol]) -> list[bytes | None]:
+        """Their bytes, one by one where they cannot be read together: None for what cannot be reached."""
+        if not symbols:
+            return []
+        table = self.symbols()
+        try:
+            return list(self._read(table, symbols).values)
+        except DeviceError:
+            if len(symbols) == 1:
+                return [None]
+        return [self.read_symbols([symbol])[0] for symbol in symbols]
+
+    def write_symbol(self, symbol: Symbol, change: Change) -> None:
+        """A change of a variable."""
+        self._write(self.symbols(), [(symbol, change)])
+
     def _check_reachable(self, table: SymbolTable, symbols: Sequence[Symbol]) -> None:
         """Raises DeviceError when a pointer to one of the variables leads to no variable."""
         for symbol, data in zip(symbols, self._read(table, symbols).values if symbols else (), strict=True):
@@ -416,6 +439,63 @@ class Plc(Controller):
             self.symbols()
             return True
         return False
+
+
+class _DebuggedPlc:
+    """What a controller on a link does for a debugger (`debug.breakpoints.Target`)."""
+
+    def __init__(self, plc: Plc, session: Session) -> None:
+        self._plc = plc
+        self._session = session
+
+    def attach(self, keep: bool) -> None:
+        breakpoint_services.attach(self._session, keep=keep)
+
+    def detach(self) -> None:
+        breakpoint_services.detach(self._session)
+
+    def status(self) -> BpStatus:
+        return breakpoint_services.status(self._session)
+
+    def set(self, offset: int, skip: int, condition: DeviceCondition | None) -> None:
+        breakpoint_services.set_breakpoint(self._session, offset, skip, condition)
+
+    def clear(self, offset: int) -> None:
+        breakpoint_services.clear_breakpoint(self._session, offset)
+
+    def hits(self) -> dict[int, int]:
+        return breakpoint_services.read_hits(self._session)
+
+    def temporary(self, offsets: Sequence[int]) -> None:
+        breakpoint_services.set_temporary(self._session, offsets)
+
+    def go(self, how: int, serial: int) -> None:
+        breakpoint_services.go(self._session, how, serial)
+
+    def pause(self) -> None:
+        breakpoint_services.pause(self._session)
+
+    def pass_time(self, seconds: float) -> float:
+        time.sleep(min(seconds, _HALT_POLL))
+        return _HALT_POLL
+
+    def table(self) -> SymbolTable:
+        return self._plc.symbols()
+
+    def task_names(self) -> list[str]:
+        return self.table().tasks
+
+    def read_areas(self, symbols: Sequence[Symbol]) -> list[bytes | None]:
+        return self._plc.read_symbols(symbols)
+
+    def write_area(self, symbol: Symbol, change: Change) -> None:
+        self._plc.write_symbol(symbol, change)
+
+    def read_stack(self, distance: int, size: int) -> bytes:
+        return breakpoint_services.read_stack(self._session, distance, size)
+
+    def write_stack(self, distance: int, data: bytes) -> None:
+        breakpoint_services.write_stack(self._session, distance, data)
 
 
 def _range(symbol: Symbol) -> AreaRange:

@@ -5,8 +5,8 @@ It is the same C core that runs on a controller, with the simulator port: a day 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
 
 from plctool.controller import Closed, Controller
 from plctool.core import error_name, give_back_core, lib, take_core
+from plctool.debug.breakpoints import Debugger, DeviceCondition
 from plctool.debug.forced import ForcedPlace, ForceList
+from plctool.debug.halted import BpStatus
 from plctool.debug.recording import Recording
 from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.debug.trace import Trace
@@ -33,6 +35,7 @@ from plctool.link.session import no_application
 from plctool.link.traces import TraceState
 from plctool.sim_functions import SimFunctions
 from plctool.sim_io import SimIo, is_input, read_parameter, set_fault, set_modbus
+from plctool.sim_worker import Worker
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
@@ -47,6 +50,7 @@ _NEVER = 2**63 - 1  # the last moment of that clock [ns]
 # What the C core runs before Python is asked whether the user wants it to end.
 _CYCLES_AT_ONCE = 100_000
 _NS_AT_ONCE = 3600 * 10**9
+_NS_DEBUGGED = 10**8  # the rest of which still passes when a halted program goes on
 
 
 class Simulator(Controller):
@@ -73,6 +77,7 @@ class Simulator(Controller):
         super().__init__()
         self._functions = functions or SimFunctions()
         self._plants: list[_Plant] = []
+        self._worker: Worker | None = None  # while a debugger is attached
         if symbols is not None:
             self.add_symbols(symbols)
         self._core = take_core()
@@ -142,6 +147,7 @@ class Simulator(Controller):
         """Shuts the runtime down."""
         if self._closed:
             return
+        self.end_debugging()
         with self._functions.while_running():
             self._closed = True
             self._lib.SimStop()
@@ -165,7 +171,7 @@ class Simulator(Controller):
         _check(self._lib.AppDownloadBegin(len(data), image_crc(data)), "The image is refused")
         _check(self._lib.AppDownloadWrite(0, data, len(data)), "The image cannot be stored")
         refusal = self._ffi.new("APP_REFUSAL *")
-        with self._functions.while_running():
+        with self._not_debugged(), self._functions.while_running():
             result = self._lib.AppDownloadEnd(refusal)
         l7.check_result(result, "download", self._ffi.string(refusal.text).decode("latin-1") if result else "")
         progress(len(data))
@@ -192,7 +198,7 @@ class Simulator(Controller):
     def stop(self) -> None:
         self._application_crc()
         self._check_allowed(lib.OPERATION_STOP, "stop")
-        with self._functions.while_running():
+        with self._not_debugged(), self._functions.while_running():
             result = self._lib.AppStopApplication()
         l7.check_result(result, "stop")
 
@@ -200,13 +206,13 @@ class Simulator(Controller):
         self._application_crc()
         if option != lib.RESET_OPTION_ORIGIN:
             self._check_allowed(lib.OPERATION_RESET, "reset")
-        with self._functions.while_running():
+        with self._not_debugged(), self._functions.while_running():
             result = self._lib.AppReset(option)
         l7.check_result(result, "reset")
 
     def restart(self) -> None:
         """Power off and on again: what is in flash survives."""
-        with self._functions.while_running():
+        with self._not_debugged(), self._functions.while_running():
             self._lib.SimStop()
             result = self._lib.SimStart()
         _check(result, "The simulator does not start")
@@ -329,8 +335,9 @@ class Simulator(Controller):
         if not isinstance(count, SupportsIndex) or not 0 <= count <= _MAX_CYCLES:
             raise UsageError(f"At most {_MAX_CYCLES} cycles are run at once, and at least 0, not {count!r}.", "cycles")
         left = int(count)
-        while left > 0 and self.raw_status().exception is None:
-            step = 1 if self._plants else min(left, _CYCLES_AT_ONCE)
+        self._check_not_halted()
+        while left > 0 and self.raw_status().exception is None and not self.is_halted:
+            step = 1 if self._plants or self._worker is not None else min(left, _CYCLES_AT_ONCE)
             self._run_cycles(step)
             left -= step
         if check:
@@ -341,8 +348,9 @@ class Simulator(Controller):
         limit = self.now_ns + lib.SIM_RUN_LIMIT_MS * 1_000_000
         while True:
             due = min([_NEVER, *(plant.due_ns for plant in self._plants)])
-            with self._functions.while_running():
-                result = self._lib.SimRunCyclesUntil(count, due)
+            result = self._timed(lambda count, due: self._lib.SimRunCyclesUntil(count, due), count, due)
+            if self.is_halted:
+                return
             if result != lib.ERR_PENDING or self.now_ns > limit:
                 break
             self._step_plants()
@@ -362,21 +370,63 @@ class Simulator(Controller):
         if not 0 <= ns < MAX_NS:
             raise UsageError(f"Time passes forwards, and for at most {MAX_NS // 10**9} s.", "time")
         end = self.now_ns + ns
-        while self._plants and (due := min(p.due_ns for p in self._plants)) <= end:
+        self._check_not_halted()
+        while not self.is_halted and self._plants and (due := min(p.due_ns for p in self._plants)) <= end:
             self._run_for(due - self.now_ns)
-            self._step_plants()
-        self._run_for(end - self.now_ns)
+            if not self.is_halted:
+                self._step_plants()
+        if not self.is_halted:
+            self._run_for(end - self.now_ns)
         if check:
             self.check_running()
 
     def _run_for(self, ns: int) -> None:
         end = self.now_ns + max(0, ns)
         while True:
-            with self._functions.while_running():
-                result = self._lib.SimRunFor(min(end - self.now_ns, _NS_AT_ONCE))
+            most = _NS_AT_ONCE if self._worker is None else _NS_DEBUGGED
+            result = self._timed(lambda ns: self._lib.SimRunFor(ns), min(end - self.now_ns, most))
+            if self.is_halted:
+                return
             _check(result, "Time does not advance")
             if self.now_ns >= end:
                 return
+
+    def _timed(self, call: Callable[..., int], *arguments: int) -> int:
+        """Lets time pass by a call of the C core; 0 if the program halted in it."""
+
+        def run() -> int:
+            with self._functions.while_running():
+                return call(*arguments)
+
+        return run() if self._worker is None else self._worker.run(run) or 0
+
+    # ---- breakpoints ----
+
+    @property
+    def is_halted(self) -> bool:
+        """Whether the program stands still in the middle of a cycle, and time with it."""
+        return self._worker is not None and self._worker.is_busy
+
+    def _check_not_halted(self) -> None:
+        if self.is_halted:
+            raise UsageError("The program is halted at a breakpoint; let it go on first.", "halted")
+
+    def _make_debugger(self) -> Debugger:
+        return Debugger(_DebuggedSimulator(self))
+
+    @contextmanager
+    def _not_debugged(self) -> Iterator[None]:
+        """For what stops the program: the cycle in which it is halted ends; its breakpoints are set again after it."""
+        if self._worker is None or self._debugger is None:
+            yield
+            return
+        self._lib.AppBpDetach()
+        self._worker.settle()
+        self._debugger.forget_halt()
+        try:
+            yield
+        finally:
+            self._debugger.install_again()
 
     def run_devices(self, ns: int) -> None:
         """In a function of the program: virtual time passes for the devices, and the program stands still in its cycle.
@@ -522,6 +572,113 @@ def _forced_place(forced: Any) -> ForcedPlace:
     p = forced.place
     offset, *hops = p.offset[0 : 1 + p.pointers]
     return ForcedPlace(p.area, offset, tuple(hops), p.size, p.mask, forced.value.to_bytes(8, "little")[: p.size])
+
+
+class _DebuggedSimulator:
+    """What a simulator does for a debugger (`debug.breakpoints.Target`)."""
+
+    def __init__(self, sim: Simulator) -> None:
+        self._sim = sim
+        self._ffi, self._lib = sim._ffi, sim._lib
+
+    def attach(self, keep: bool) -> None:
+        result = self._lib.AppBpAttach(keep)
+        if result == lib.ERR_NOT_SUPPORTED:
+            raise DeviceError("Breakpoints need an x86-64 processor here.", "no-breakpoints", result)
+        _check(result, "The debugger is refused")
+        if self._sim._worker is None:
+            self._sim._worker = Worker(lambda: bool(self._lib.AppBpIsHalted()))
+
+    def detach(self) -> None:
+        self._lib.AppBpDetach()
+        worker, self._sim._worker = self._sim._worker, None
+        if worker is not None:
+            worker.end()
+
+    def status(self) -> BpStatus:
+        c = self._ffi.new("BP_STATUS *")
+        self._lib.AppBpGetStatus(c)
+        return BpStatus(
+            bool(c.supported),
+            bool(c.attached),
+            bool(c.halted),
+            c.serial,
+            c.code,
+            c.task,
+            None if c.code_offset == lib.APP_NO_CODE_OFFSET else c.code_offset,
+            c.stack_size,
+            c.stack,
+            tuple(c.area),
+            c.breakpoints,
+            c.room,
+            c.traps,
+        )
+
+    def set(self, offset: int, skip: int, condition: DeviceCondition | None) -> None:
+        c = self._ffi.new("BP_BREAKPOINT *")
+        c.offset, c.skip = offset, skip
+        if condition is not None:
+            c.condition.relation, c.condition.kind = condition.relation, condition.kind
+            c.condition.place = self._sim._c_place(condition.place)[0]
+            c.condition.value = int.from_bytes(condition.place.value, "little")
+        _check(self._lib.AppBpSet(c), "The breakpoint cannot be set")
+
+    def clear(self, offset: int) -> None:
+        _check(self._lib.AppBpClear(offset), "The breakpoint cannot be cleared")
+
+    def hits(self) -> dict[int, int]:
+        c = self._ffi.new("BP_BREAKPOINT *")
+        found: dict[int, int] = {}
+        while self._lib.AppBpGet(len(found), c):
+            found[c.offset] = c.hits
+        return found
+
+    def temporary(self, offsets: Sequence[int]) -> None:
+        self._lib.AppBpClearTemporary()
+        for offset in offsets:
+            _check(self._lib.AppBpAddTemporary(offset), "The step cannot be made")
+
+    def go(self, how: int, serial: int) -> None:
+        _check(self._lib.AppBpGo(how), "The program does not go on")
+        if self._sim._worker is not None:
+            self._sim._worker.settle()
+
+    def pause(self) -> None:
+        _check(self._lib.AppBpPause(), "The program cannot be halted")
+
+    def pass_time(self, seconds: float) -> float:
+        before = self._sim.now_ns
+        self._sim.run_for(seconds=min(seconds, _NS_DEBUGGED / 1e9), check=False)
+        return seconds if self._sim.raw_status().exception else (self._sim.now_ns - before) / 1e9
+
+    def table(self) -> SymbolTable:
+        return self._sim.symbols()
+
+    def task_names(self) -> list[str]:
+        return self.table().tasks
+
+    def read_areas(self, symbols: Sequence[Symbol]) -> list[bytes | None]:
+        return [self._read_area(symbol) for symbol in symbols]
+
+    def _read_area(self, symbol: Symbol) -> bytes | None:
+        with suppress(DeviceError):
+            return self._sim._content(symbol)
+        return None
+
+    def write_area(self, symbol: Symbol, change: Change) -> None:
+        self._sim._write(self.table(), [(symbol, change)])
+
+    def read_stack(self, distance: int, size: int) -> bytes:
+        return bytes(self._stack(distance, size))
+
+    def write_stack(self, distance: int, data: bytes) -> None:
+        self._stack(distance, len(data))[:] = data
+
+    def _stack(self, distance: int, size: int) -> Any:
+        at = self._lib.AppBpGetStack(distance, size)
+        if at == self._ffi.NULL:
+            raise DeviceError("The stack of the program cannot be read there.", "no-stack")
+        return self._ffi.buffer(at, size)
 
 
 @dataclass

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from elftools.dwarf.callframe import FDE
+from elftools.dwarf.dwarf_expr import DWARFExprParser
 from elftools.dwarf.ranges import BaseAddressEntry
 from elftools.elf.elffile import ELFFile
 
@@ -43,12 +44,22 @@ class _Frame:
     return_address: int | None
 
 
+@dataclass(frozen=True)
+class StackFrame:
+    """A call that has not returned: `offset` in the code where it is, `stack` bytes from the stack pointer of the
+    innermost one to its own."""
+
+    offset: int
+    stack: int
+
+
 class DebugInfo:
     """Reads the objects of `Linked.debug`; the tables are made when first needed."""
 
     def __init__(self, objects: list[bytes]) -> None:
         self._scopes: list[tuple[int, int, int, Scope]] = []  # begin, end, depth
         self._functions: list[tuple[int, int, Any, int]] = []  # begin, end, how its frame changes, the stack pointer
+        self._variables: list[tuple[int, int, dict[str, int]]] = []  # begin, end, bytes from the stack pointer
         self._word = 8
         for data in objects:
             elf = ELFFile(io.BytesIO(data))
@@ -56,6 +67,7 @@ class DebugInfo:
             dwarf = elf.get_dwarf_info(relocate_dwarf_sections=False)
             for unit in dwarf.iter_CUs():
                 self._scopes += _Unit(dwarf, unit).scopes()
+                self._variables += _variables(dwarf, unit, _STACK_POINTER[elf["e_machine"]])
             self._functions += _functions(dwarf, _STACK_POINTER[elf["e_machine"]])
         self._scopes.sort(key=lambda scope: scope[:3])
         self._functions.sort(key=lambda function: function[0])
@@ -80,6 +92,37 @@ class DebugInfo:
             outermost = trace.words[max(trace.words)] - 1
             chains = [chain for chain in chains if chain[-1] == outermost and self._is_possible([offset, *chain])]
         return max(chains, key=len, default=[])
+
+    def function_at(self, offset: int) -> tuple[int, int] | None:
+        """Begin and end of the function that holds the code at `offset`."""
+        i = self._function(offset)
+        return None if i < 0 else self._functions[i][:2]
+
+    def variables(self, offset: int) -> dict[str, int]:
+        """What is on the stack in the function at `offset`, by name: bytes from its stack pointer."""
+        return next((names for begin, end, names in self._variables if begin <= offset < end), {})
+
+    def frames(self, offset: int | None, words: Mapping[int, int]) -> list[StackFrame]:
+        """The calls that have not returned, the innermost first. `words`: by distance from the stack pointer, the code
+        offsets to which calls may return. `offset` is None in a function that is not the program's: then the first
+        return address is that of the program's call of it."""
+        pointer = 0
+        found: list[StackFrame] = []
+        if offset is None:
+            distance, target = min(words.items(), default=(0, 0))
+            if not target:
+                return []
+            offset, pointer = target - 1, distance + self._word
+        while len(found) < _MOST_CALLS:
+            found.append(StackFrame(offset, pointer))
+            frame = self._frame(offset)
+            if frame is None or frame.return_address is None:
+                break
+            back = words.get(pointer + frame.size + frame.return_address)
+            if back is None:
+                break
+            offset, pointer = back - 1, pointer + frame.size
+        return found
 
     def _is_possible(self, chain: list[int]) -> bool:
         """No function calls itself, directly or by way of others: what says so was left by earlier calls."""
@@ -160,6 +203,29 @@ class _Unit:
                     base = entry.base_address
                 else:
                     yield base + entry.begin_offset, base + entry.end_offset
+
+
+def _variables(dwarf: Any, unit: Any, stack_pointer: int) -> Iterator[tuple[int, int, dict[str, int]]]:
+    """Of each function whose frame is found by its stack pointer, the variables that stay at one place of it."""
+    expressions = DWARFExprParser(dwarf.structs)
+
+    def parsed(die: Any, name: str) -> tuple[str, Any]:
+        value = die.attributes[name].value if name in die.attributes else []
+        operations = expressions.parse_expr(value) if isinstance(value, list) else []
+        if len(operations) != 1:
+            return "", 0
+        return operations[0].op_name, next(iter(operations[0].args), 0)
+
+    for die in unit.get_top_DIE().iter_children():
+        if die.tag != "DW_TAG_subprogram" or parsed(die, "DW_AT_frame_base")[0] != f"DW_OP_reg{stack_pointer}":
+            continue
+        begin = die.attributes["DW_AT_low_pc"].value
+        found = {}
+        for child in die.iter_children():
+            operation, distance = parsed(child, "DW_AT_location")
+            if child.tag in ("DW_TAG_variable", "DW_TAG_formal_parameter") and operation == "DW_OP_fbreg":
+                found[child.attributes["DW_AT_name"].value.decode()] = distance
+        yield begin, begin + die.attributes["DW_AT_high_pc"].value, found
 
 
 def _functions(dwarf: Any, stack_pointer: int) -> Iterator[tuple[int, int, Any, int]]:

@@ -28,7 +28,7 @@ from plctool.errors import UsageError
 from plctool.files import MAX_BINARY, read_regular, write_atomically
 from plctool.iec.addresses import parse_address
 from plctool.iec.type_descriptions import DescribedTypes, describe
-from plctool.iec.types import ELEMENTARY, ArrayType, OpenArrayType, StructType
+from plctool.iec.types import ELEMENTARY, ArrayType, OpenArrayType, StructType, Type
 from plctool.image.limits import Need
 from plctool.project import SYMBOL_SUFFIX
 
@@ -82,7 +82,8 @@ class SymbolTable:
     `made_of`: the fingerprint of sources and options (`cli/fresh_image.py`), empty if `build` did not write the file.
     `internal`: the variables of blocks of the standard library that are neither inputs nor outputs, by the name of the
     block.
-    `passed_lines`: those that the trail of an exception names by their numbers."""
+    `passed_lines`: those that the trail of an exception names by their numbers. `frames`: the types of what a debugger
+    finds on the stack (`frames.py`), by POU and name."""
 
     image_crc: int
     target: str
@@ -104,6 +105,7 @@ class SymbolTable:
     made_of: str = ""
     internal: dict[str, list[str]] = field(default_factory=dict)
     passed_lines: list[PassedLine] = field(default_factory=list)
+    frames: dict[str, dict[str, Type]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -219,6 +221,11 @@ class SymbolTable:
 
     # ---- code ----
 
+    @property
+    def debug_info(self) -> DebugInfo:
+        """What the compiler says about the code."""
+        return self._debug_info
+
     def address_to_line(self, code_offset: int) -> SourceLine | None:
         """The source line of a code offset; None when it is not the program's own code."""
         unit = self._unit_of(code_offset)
@@ -313,6 +320,7 @@ class SymbolTable:
         for block, names in self.unkept.items():
             if block in types:
                 types[block]["fields"] = [entry for entry in types[block]["fields"] if entry[0] not in names]
+        frames = {pou: _frame(variables, types) for pou, variables in self.frames.items()}
         document = {
             "format": FORMAT,
             "image_crc": self.image_crc,
@@ -335,6 +343,7 @@ class SymbolTable:
             "made_of": self.made_of,
             "internal": self.internal,
             "passed_lines": self.passed_lines,
+            "frames": frames,
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))
@@ -371,6 +380,7 @@ class SymbolTable:
                 document.get("made_of", ""),
                 document.get("internal", {}),
                 [PassedLine(pou, file, line) for pou, file, line in document.get("passed_lines", [])],
+                {p: {n: types.get(t) for n, t in v.items()} for p, v in document.get("frames", {}).items()},
             )
         except (ArchiveError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None
@@ -385,6 +395,12 @@ class SymbolTable:
             write_atomically(copy, text.encode())
         except (OSError, UsageError):
             return  # the cache only saves naming the file
+
+
+def _frame(variables: dict[str, Type], types: dict[str, Any]) -> dict[str, str]:
+    for t in variables.values():
+        describe(t, types)
+    return {name: t.name for name, t in variables.items()}
 
 
 def _read_need(entry: dict[str, Any] | None) -> Need | None:

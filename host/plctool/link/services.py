@@ -66,6 +66,7 @@ class AppState(StrEnum):
     RUN = "run"
     STOP = "stop"
     EXCEPTION = "exception"
+    HALTED = "halted"
 
 
 @dataclass(frozen=True)
@@ -227,7 +228,8 @@ def app_state(state: int, operating: int) -> AppState:
     """From AS_* and the OS_* flags."""
     if operating & lib.OS_EXCEPTION:
         return AppState.EXCEPTION
-    return {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN}.get(state, AppState.STOP)
+    known = {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN, lib.AS_HALT_ON_BP: AppState.HALTED}
+    return known.get(state, AppState.STOP)
 
 
 def start(session: Session) -> None:

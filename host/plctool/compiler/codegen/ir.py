@@ -105,11 +105,13 @@ class Module:
     def named_metadata(self, name: str, nodes: list[int]) -> None:
         self._named_metadata.append(f"!{name} = !{{{', '.join(f'!{n}' for n in nodes)}}}")
 
-    def add_compile_unit(self, file: int) -> int:
-        """The node that makes LLVM write debugging information, of which only lines are wanted. `file`: a DIFile."""
+    def add_compile_unit(self, file: int, *, variables: bool = False) -> int:
+        """The node that makes LLVM write debugging information: lines, and where `variables` on the stack are. `file`:
+        a DIFile."""
+        kind = "FullDebug" if variables else "LineTablesOnly"
         unit = self.distinct_metadata(
             f'!DICompileUnit(language: DW_LANG_C99, file: !{file}, producer: "plctool", isOptimized: true, '
-            "runtimeVersion: 0, emissionKind: LineTablesOnly)"
+            f"runtimeVersion: 0, emissionKind: {kind})"
         )
         self.named_metadata("llvm.dbg.cu", [unit])
         flags = ('!{i32 7, !"Dwarf Version", i32 4}', '!{i32 2, !"Debug Info Version", i32 3}')
@@ -186,6 +188,7 @@ class Function:
         self.writes = 0  # grows with all that ends a block or may write memory, but `store`
         self.scope = -1  # its DISubprogram
         self.debug = ""  # e.g. ', !dbg !7', added to every instruction
+        self.entry_debug = ""  # the same for `prologue`, if not that of what needs it
 
     # ---- instructions ----
 
@@ -217,6 +220,11 @@ class Function:
             self.begin(self.label("dead"))
         self._lines.append(f"  {text}{self.debug}")
         return len(self._lines) - 1
+
+    def declare_variable(self, pointer: Value, variable: int) -> None:
+        """Has the debugging information say that a DILocalVariable is at `pointer`, which is on the stack."""
+        location = self.debug.removeprefix(", !dbg ")
+        self._lines.append(f"    #dbg_declare(ptr {pointer}, !{variable}, !DIExpression(), {location})")
 
     def remove(self, line: int) -> None:
         """Takes out an instruction without a value."""
@@ -251,7 +259,7 @@ class Function:
         """Writes an instruction that gives a value, before all others of the function."""
         self._count += 1
         name = f"%v{self._count}"
-        self._prologue.append(f"  {name} = {text}{self.debug}")
+        self._prologue.append(f"  {name} = {text}{self.entry_debug or self.debug}")
         return Value(name)
 
     def alloca(self, size: int, align: int) -> Value:

@@ -12,6 +12,7 @@ from plctool.compiler.codegen import (  # noqa: F401  their rules
     lower_places,
     lower_stmt,
 )
+from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower_blocks import take_inputs
 from plctool.compiler.codegen.lower_frame import NO_CAPACITY, Body, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise
@@ -29,6 +30,7 @@ from plctool.compiler.codegen.signatures import (
     returned_variable,
 )
 from plctool.compiler.typed.nodes import Direction, Pou, PouKind, Variable, VarPlace
+from plctool.debug.frames import INSTANCE, POINTER_TO
 from plctool.iec.types import OpenArrayType, StringType, is_scalar
 
 
@@ -51,6 +53,8 @@ def write_body(frame: Body) -> None:
         if not (pou.no_init or (pou.cuts_result and var is pou.result)):  # whose size is the caller's
             frame.clear(frame.locals[var])
         initialise(frame, frame.locals[var], var.initial)
+    if frame.unit.options.steps:
+        _declare_variables(frame, pou)
     frame.statements(pou.body)
     fn.begin(frame.on_return)
     _give_outputs(frame, pou)
@@ -61,6 +65,24 @@ def write_body(frame: Body) -> None:
         value = frame.load(frame.ref(VarPlace(returned, returned.type, pou.pos)))
         fn.terminate(f"ret {value_type(returned.type)} {value}")
     frame.write_raises()
+
+
+def _declare_variables(frame: Body, pou: Pou) -> None:
+    """Has the debugging information say where the variables on the stack are, or pointers to others."""
+    for var, ref in frame.locals.items():
+        if ref.direct and ref.pointer != RESULT:
+            frame.declare_variable(var.name, ref.pointer)
+        else:
+            frame.declare_variable(POINTER_TO + var.name, _spilled(frame, ref.pointer))
+    if pou.instance is not None:
+        frame.declare_variable(POINTER_TO + INSTANCE, _spilled(frame, SELF))
+
+
+def _spilled(frame: Body, pointer: Value) -> Value:
+    """The place on the stack where a pointer is kept for debuggers."""
+    slot = frame.fn.slot("ptr")
+    frame.fn.do(f"store volatile ptr {pointer}, ptr {slot}")
+    return slot
 
 
 def write_calls(frame: Body, parts: list[str]) -> None:

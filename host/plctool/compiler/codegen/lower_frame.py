@@ -181,11 +181,18 @@ class Frame:
         """Starts line information."""
         self.fn.scope = self.unit.subprogram(name, pos)
         self.at(pos)
+        if self.unit.options.steps:
+            self.fn.entry_debug = self.fn.debug
 
     def at(self, pos: Pos) -> None:
         """What is written from now on belongs to the line of `pos`."""
         if self.fn.scope >= 0:
             self.fn.debug = self.unit.location(pos, self.fn.scope)
+
+    def declare_variable(self, name: str, pointer: Value) -> None:
+        """A debugger finds the variable at `pointer`, which is on the stack."""
+        if self.fn.scope >= 0 and self.pou is not None:
+            self.fn.declare_variable(pointer, self.unit.stack_variable(name, self.pou.pos, self.fn.scope))
 
     # ---- what is written for each kind of node ----
 

@@ -56,7 +56,7 @@ def for_loop(frame: Body, s: For) -> None:
     start = frame.value(s.start)
     stop, step = _stop_and_step(frame, s)
     known_step = known_integer(s.step)
-    var = frame.effects.owns_loop_variable(s, frame.pou) if frame.pou else None
+    var = _own_variable(frame, s)
     loop = _Loop(frame, s, stop, step, known_step, var)
     loop.set(start)
     body, following, end = fn.label("for"), fn.label("next"), fn.label("endfor")
@@ -82,7 +82,7 @@ def _loop_with_limits_of_each_turn(frame: Body, s: For) -> None:
     """The variable is set before `stop` is computed, in each turn again; `step` at the start and after each turn."""
     fn = frame.fn
     start, known_step = frame.value(s.start), known_integer(s.step)
-    var = frame.effects.owns_loop_variable(s, frame.pou) if frame.pou else None
+    var = _own_variable(frame, s)
     text, step = value_type(s.step.type), _step(frame, s)
     kept = None if known_step is not None else fn.slot(text)
     if kept is not None:
@@ -110,6 +110,13 @@ def _loop_with_limits_of_each_turn(frame: Body, s: For) -> None:
     loop.show()
     if var is not None:
         frame.shadows.pop(var, None)
+
+
+def _own_variable(frame: Body, s: For) -> Variable | None:
+    """The variable if only the loop writes it, which a debugger may do as well."""
+    if frame.pou is None or frame.unit.options.steps:
+        return None
+    return frame.effects.owns_loop_variable(s, frame.pou)
 
 
 def _check_subrange(frame: Body, s: For) -> None:

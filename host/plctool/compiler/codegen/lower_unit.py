@@ -71,6 +71,11 @@ class Options:
     passes: Passes = field(default_factory=Passes)
 
     @property
+    def steps(self) -> bool:
+        """Whether a debugger can step from statement to statement, and see the variables on the stack."""
+        return self.debug and self.opt_level == 0
+
+    @property
     def watchable(self) -> bool:
         """Whether blocks keep in memory what no call needs from the previous one, so that it can be watched."""
         return self.debug or not (self.size or self.opt_level >= FASTEST)
@@ -317,18 +322,27 @@ class Unit:
         return node
 
     def subprogram(self, name: str, pos: Pos) -> int:
-        """Debug scope of a function. Only line directives are made from it, no other debug information."""
+        """Debug scope of a function."""
         module = self.module
         file = self.file(pos.file)
         if self._compile_unit < 0:
             self._subroutine_type = module.metadata(f"!DISubroutineType(types: !{self.empty})")
-            self._compile_unit = module.add_compile_unit(file)
+            self._compile_unit = module.add_compile_unit(file, variables=self.options.steps)
         scope = module.distinct_metadata(
             f'!DISubprogram(name: "{name}", scope: !{file}, file: !{file}, line: {pos.line}, scopeLine: {pos.line}, '
             f"type: !{self._subroutine_type}, spFlags: DISPFlagDefinition, unit: !{self._compile_unit})"
         )
         self._scopes[scope, pos.file] = scope
         return scope
+
+    def stack_variable(self, name: str, pos: Pos, scope: int) -> int:
+        """The DILocalVariable of a name. Its type is in the symbol file."""
+        metadata = self.module.metadata
+        t = metadata('!DIBasicType(name: "iec", size: 8, encoding: DW_ATE_unsigned_char)')
+        return metadata(
+            f'!DILocalVariable(name: "{name}", scope: !{scope}, file: !{self.file(pos.file)}, line: {pos.line}, '
+            f"type: !{t})"
+        )
 
     def location(self, pos: Pos, scope: int) -> str:
         """The `, !dbg` suffix for instructions of a line, in the function with that scope."""

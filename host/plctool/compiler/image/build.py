@@ -20,11 +20,12 @@ from plctool.compiler.syntax.library import is_standard
 from plctool.compiler.typed.kept import kept_parts, kept_variables
 from plctool.compiler.typed.nodes import External, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
 from plctool.core import lib
+from plctool.debug.frames import INSTANCE
 from plctool.debug.symbols import CodeUnit, KeptName, SymbolTable, symbol_path
 from plctool.debug.variables import Symbol, constant_symbol
 from plctool.files import write_atomically
 from plctool.iec.areas import Area
-from plctool.iec.types import CLASS_NUMBER, base_of
+from plctool.iec.types import CLASS_NUMBER, Type, base_of
 from plctool.iec.values import encode
 from plctool.image.c_functions import find_c_function
 from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image, image_crc
@@ -75,7 +76,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo, keeps
         lowered = lower(program, options)
     objects = emit_objects(lowered.parts, options)
     linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], lowered.imports)
-    symbols = _symbols(program, lowered, linked, target, info.project)
+    symbols = _symbols(program, lowered, linked, target, info.project, steps=options.steps)
     kept = kept_parts(v for v in program.globals if keeps and v.area is Area.RETAIN)
     code, io = linked.code, None
     if program.io is not None and program.io.connectors:
@@ -186,7 +187,9 @@ def _part(task: Task, area: Area) -> ImagePart:
     return ImagePart(part.start // _UNIT, (part.end - part.start) // _UNIT, part.written, part.shared)
 
 
-def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Target, project: str) -> SymbolTable:
+def _symbols(
+    program: TypedProgram, lowered: Lowered, linked: Linked, target: Target, project: str, *, steps: bool
+) -> SymbolTable:
     named = (*program.globals, *program.accesses)
     variables = {v.name: Symbol(v.name, v.area.value, v.offset, v.type, v.bit, constant=v.constant) for v in named}
     units = []
@@ -217,6 +220,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         passed_lines=lowered.passed_lines,
         unkept=_unkept(lowered),
         internal=_internal(lowered),
+        frames=_frames(lowered) if steps else {},
     )
     # Without the variables that are not in memory the types are others than those of the program.
     return SymbolTable.from_json(table.to_json()) if table.unkept else table
@@ -251,6 +255,17 @@ def _temporaries(pou: Pou) -> list[str]:
     if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
         variables += [p.variable for p in pou.parameters]
     return [v.name for v in variables if "%" not in v.name]
+
+
+def _frames(lowered: Lowered) -> dict[str, dict[str, Type]]:
+    """The types of what is on the stack, or of what pointers on it lead to."""
+    found: dict[str, dict[str, Type]] = {}
+    for pou in lowered.pous.values():
+        variables = [*pou.locals, *(p.variable for p in pou.parameters)]
+        found[pou.name] = {v.name: v.type for v in variables if "%" not in v.name}
+        if pou.instance is not None:
+            found[pou.name][INSTANCE] = pou.instance
+    return found
 
 
 def _classes(program: TypedProgram) -> dict[str, int]:
