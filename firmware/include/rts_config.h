@@ -305,6 +305,11 @@
 #define BP_TRAPS (BP_MAX > 0 ? 4096 : 0)
 #endif
 
+/* 0: tasks run one after the other, in one thread, so that none runs while another one is halted. */
+#ifndef BP_HOLDS_TASKS
+#define BP_HOLDS_TASKS 1
+#endif
+
 /* A debugger that asks nothing for so long is gone: its breakpoints end, and what is halted goes on [ms]. 0: never. */
 #ifndef BP_ALIVE_MS
 #define BP_ALIVE_MS 5000

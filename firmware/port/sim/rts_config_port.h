@@ -35,6 +35,7 @@
 #define TRACE_BUFFER (1024 * 1024)
 #endif
 #define BP_MAX 128
+#define BP_HOLDS_TASKS 0
 #define BP_ALIVE_MS 0 /* its time does not go on by itself */
 #define LOG_MAX_ENTRIES 64
 #define LOG_TEXT_SIZE 160

@@ -390,7 +390,8 @@ RTS_UI32 IecCycleFindTask(const void *arg)
 void IecCycleHold(RTS_UI32 task)
 {
     SysAtomicStore(&tasks.not_held, task);
-    (void)SysAtomicReplace(&tasks.running, TASKS_RUN, TASKS_HELD);
+    if (BP_HOLDS_TASKS)
+        (void)SysAtomicReplace(&tasks.running, TASKS_RUN, TASKS_HELD);
 }
 
 void IecCycleRelease(void)
