@@ -78,7 +78,7 @@ def place(found: Halt) -> tuple[str, int]:
 
 
 def values(found: Halt, call: int = 0) -> dict[str, str]:
-    """The variables of a call as texts."""
+    """The variables of a call as ST writes them."""
     halted, at = found.halted, found.calls[call]
     return {n: halted.text(s) for n, s in (halted.locals(at) | halted.instance(at)).items() if n != "counter"}
 

@@ -30,10 +30,11 @@ FLOORS = (
     ("canopen", "gateway"),
     ("controller", "compiler", "sim_io"),
     ("fmt",),
-    ("sim_functions",),
+    ("sim_functions", "sim_worker"),
     ("device", "sim"),
     ("", "controller_documents", "sim_plant"),
     ("port_check", "st_tests", "templates", "testing", "trace_file", "trace_plot", "ui"),
+    ("dap",),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )

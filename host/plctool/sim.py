@@ -112,9 +112,9 @@ class Simulator(Controller):
         dialect: str | None = None,
     ) -> Simulator:
         """The program in source files and folders, compiled for this. `level`, `checks` and `dialect` as in
-        `compile_sources`, which says what is raised. `functions`: FUNCTIONs of the program, by name, that Python
-        implements: they get the values of the inputs, an `Output` for each VAR_OUTPUT and VAR_IN_OUT, and return the
-        result."""
+        `compile_sources`, which says what is raised; level 0 is for debugging, too. `functions`: FUNCTIONs of the
+        program, by name, that Python implements: they get the values of the inputs, an `Output` for each VAR_OUTPUT and
+        VAR_IN_OUT, and return the result."""
         # Only here: what runs images needs no compiler.
         from plctool.compiler import compile_sources
         from plctool.compiler.semantics.python_functions import PythonFunctions
@@ -123,7 +123,15 @@ class Simulator(Controller):
             if not callable(function):
                 raise UsageError(f"{name} in Python is {function!r}, which cannot be called.", "python")
         python = PythonFunctions(functions) if functions else None
-        built = compile_sources(paths, target=host_target(), level=level, checks=checks, python=python, dialect=dialect)
+        built = compile_sources(
+            paths,
+            target=host_target(),
+            level=level,
+            checks=checks,
+            debug=level == 0,
+            python=python,
+            dialect=dialect,
+        )
         connected = SimFunctions(functions, python.units) if python else None
         try:
             return cls(built.image, built.symbols, start=start, cycle_limit_ms=cycle_limit_ms, functions=connected)

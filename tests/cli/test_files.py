@@ -476,7 +476,7 @@ def test_diagnostics_are_the_same_documents_whatever_command_has_them(tool: Any,
     assert built["diagnostics"] == checked["diagnostics"]
 
 
-@pytest.mark.parametrize("command", ["debug", "online"])
+@pytest.mark.parametrize("command", ["online"])
 def test_commands_of_later_versions_say_so(tool: Any, command: str) -> None:
     done = tool(command, "Main.n=1", "--port", "/dev/x", "--json")
     assert done.status == 2

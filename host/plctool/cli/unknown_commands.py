@@ -10,7 +10,6 @@ from plctool.errors import UsageError, did_you_mean
 from plctool.project import IMAGE_SUFFIX
 
 _LATER = {
-    "debug": "there are no breakpoints; watch shows variables, trace records them",
     "online": "flash replaces the program, and keeps RETAIN variables",
 }
 _OTHER_NAMES = {

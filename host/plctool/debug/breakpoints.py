@@ -43,7 +43,7 @@ class DeviceCondition:
 @dataclass(frozen=True)
 class Breakpoint:
     """A breakpoint at a line. `line` is the one that has code. `hits`: it halts when it is met for this time, and after
-    that; `condition` and `log` are texts. `by_device`: the controller checks the condition, without a halt."""
+    that; `condition` and `log` are as typed. `by_device`: the controller checks the condition, without a halt."""
 
     number: int
     file: str

@@ -175,7 +175,10 @@ class Halted:
 
     def write(self, path: str, text: str, call: Call | None) -> Symbol:
         """Sets a variable to the value that a person typed. Raises UsageError."""
-        symbol = self.resolve(path, call)
+        return self.write_symbol(self.resolve(path, call), text)
+
+    def write_symbol(self, symbol: Symbol, text: str) -> Symbol:
+        """The same for a variable that was resolved."""
         if isinstance(symbol.type, StructType):
             raise UsageError(f"{symbol.name} has several parts; name one of them.", "no-value")
         change = symbol.change(symbol.parse(text))
