@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from plctool.cli.links import link_of
+from plctool.cli.output import say
 from plctool.errors import PlcError, UsageError
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ class Terminal:
         self._json = as_json
         self._asks = sys.stdin.isatty()
         self._debugger: Debugger = plc.breakpoints
-        self._debugger.output = print
+        self._debugger.output = say
         self._call = 0
         self._file = ""
         self._last = ""
@@ -113,7 +114,7 @@ class Terminal:
     def run(self) -> None:
         """Until `q`, or the end of the input."""
         if self._asks:
-            print("h lists the commands.")
+            say("h lists the commands.")
         for _ in count():
             try:
                 line = input("(debug) " if self._asks else "").strip()
@@ -126,7 +127,7 @@ class Terminal:
             try:
                 self._do(line)
             except PlcError as error:
-                print(error, flush=True)
+                say(str(error))
 
     def _do(self, line: str) -> None:
         if not line or line.startswith("#"):
@@ -162,7 +163,7 @@ class Terminal:
             raise UsageError(f"'{hits}' is not a number of hits.", "usage")
         file, line = self._place(place)
         made = self._debugger.set(file, line, condition=given.get("if", ""), hits=int(hits), log=given.get("log", ""))
-        print(f"breakpoint {made.number}: {Path(made.file).name}:{made.line}")
+        say(f"breakpoint {made.number}: {Path(made.file).name}:{made.line}")
 
     def _delete(self, text: str) -> None:
         if text == "all":
@@ -175,7 +176,7 @@ class Terminal:
     def _list(self, text: str) -> None:
         for b, hits in self._debugger.list():
             options = [f"if {b.condition}"] * bool(b.condition) + [f"log {b.log}"] * bool(b.log)
-            print(" ".join([f"{b.number}: {Path(b.file).name}:{b.line}", *options, f"({hits} hits)"]))
+            say(" ".join([f"{b.number}: {Path(b.file).name}:{b.line}", *options, f"({hits} hits)"]))
 
     # ---- going on ----
 
@@ -202,7 +203,7 @@ class Terminal:
             self._debugger.pause()
             halt = self._debugger.wait(5)
         if halt is None:
-            print("still running")
+            say("still running")
         else:
             self._show(halt)
 
@@ -221,11 +222,11 @@ class Terminal:
     def _show(self, halt: Halt) -> None:
         if self._json:
             calls = [{"pou": c.pou, "file": c.file, "line": c.line} for c in halt.calls]
-            print(json.dumps({"reason": halt.reason, "task": halt.task, "exception": halt.exception, "calls": calls}))
+            say(json.dumps({"reason": halt.reason, "task": halt.task, "exception": halt.exception, "calls": calls}))
             return
-        print(halt)
+        say(str(halt))
         if halt.calls:
-            print(_source_line(halt.calls[0].file, halt.calls[0].line))
+            say(_source_line(halt.calls[0].file, halt.calls[0].line))
 
     # ---- looking ----
 
@@ -236,7 +237,7 @@ class Terminal:
 
     def _where(self, text: str) -> None:
         for i, call in enumerate(self._halt().calls):
-            print(f"{'*' if i == self._call else ' '} {i}  {call.pou}, {call.file}:{call.line}")
+            say(f"{'*' if i == self._call else ' '} {i}  {call.pou}, {call.file}:{call.line}")
 
     def _frame(self, text: str) -> None:
         if not text.isdigit() or int(text) >= len(self._halt().calls):
@@ -250,21 +251,21 @@ class Terminal:
             return
         call = halt.calls[self._call]
         for name, symbol in (halt.halted.locals(call) | halt.halted.instance(call)).items():
-            print(f"{name} = {halt.halted.text(symbol)}")
+            say(f"{name} = {halt.halted.text(symbol)}")
 
     def _print(self, text: str) -> None:
         from plctool.debug.expressions import NAME
 
         if self._debugger.halt is None:
-            print(self._plc.sample([text]).texts[text])
+            say(self._plc.sample([text]).texts[text])
             return
         halted = self._halt().halted
         call = self._halt().calls[self._call] if self._halt().calls else None
         if NAME.fullmatch(text):
-            print(halted.text(halted.resolve(text, call)))
+            say(halted.text(halted.resolve(text, call)))
             return
         value: Any = halted.evaluate(text, call)
-        print(str(value).upper() if isinstance(value, bool) else value)
+        say(str(value).upper() if isinstance(value, bool) else str(value))
 
     def _set(self, text: str) -> None:
         name, sign, value = (part.strip() for part in text.partition(":="))
@@ -286,7 +287,7 @@ class Terminal:
         self._plc.unforce([text] if text else None)
 
     def _help(self, text: str) -> None:
-        print(HELP)
+        say(HELP)
 
 
 def _source_line(file: str, line: int) -> str:
