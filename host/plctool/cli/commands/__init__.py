@@ -37,6 +37,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("unforce", "values", "end what 'force' did"),
         Row("watch", "values", "print values of variables periodically"),
         Row("trace", "trace", "record variables in each cycle of a task, as an oscilloscope does"),
+        Row("debug", "debug", "set breakpoints, step, look at variables in the terminal"),
         Row("ui", "ui", "show a page in a browser: live values, write, force, tasks, log, inputs and outputs"),
     ),
     "programs and images": (
@@ -68,6 +69,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("io", "io", "show and check what is connected to the inputs and outputs"),
         Row("canopen", "canopen", "find, set up and watch CANopen devices; check EDS files"),
     ),
+    "editors": (Row("dap", "debug", "be the debug adapter of an editor, at the standard input and output"),),
     "plctool itself": (
         Row("demo", "about", "run a demonstration of all of it on this machine"),
         Row("completion", "about", "print the script that makes a shell complete this command"),

@@ -12,8 +12,12 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from plctool.cli import output
+from plctool.cli.arguments import add_link
+from plctool.cli.connections import connect
 from plctool.cli.links import link_of
 from plctool.cli.output import say
+from plctool.cli.parser import Parser
 from plctool.errors import PlcError, UsageError
 
 if TYPE_CHECKING:
@@ -41,49 +45,50 @@ force NAME := VALUE, unforce NAME
 q                quit: breakpoints end, the program goes on"""
 
 
-def add_debug_commands(command: Callable[..., argparse.ArgumentParser], add_link: Callable[..., None]) -> None:
-    """The arguments of both."""
-    debug = command(
-        "debug", "set breakpoints, step, look at variables in the terminal", json="print a JSON document for each halt"
-    )
-    debug.add_argument(
+def debug_arguments(command: Parser) -> None:
+    command.json_line_for_each("halt")
+    command.add_argument(
         "sources", type=Path, nargs="*", metavar="SOURCE|PROJECT",
         help="a program that runs in this process, on a virtual clock; without one, that of a device",
     )  # fmt: skip
-    add_link(debug, symbols=True)
-    dap = command("dap", "be the debug adapter of an editor, at the standard input and output")
-    dap.add_argument(
+    add_link(command, symbols=True)
+    command.set_defaults(action=_debug)
+
+
+def dap_arguments(command: Parser) -> None:
+    command.add_argument(
         "--listen", type=int, metavar="PORT", help="at a port of this machine instead, 0 for a free one, until Ctrl-C"
     )
+    command.set_defaults(action=_dap)
 
 
-def dap(args: argparse.Namespace, show: Callable[..., int]) -> int:
+def _dap(args: argparse.Namespace) -> int:
     """Serves an editor."""
     from plctool.dap.server import listen, serve_standard_streams
 
     if args.listen is None:
         serve_standard_streams()
-        return 0
+        return output.EXIT_OK
     if not 0 <= args.listen <= 65535:
         raise UsageError(f"{args.listen} is not a port; write a number from 0 to 65535.", "usage")
 
     def ready(port: int) -> None:
-        show(args, {"port": port}, lambda d: f"listening at 127.0.0.1, port {d['port']}")
+        output.show(args, {"port": port}, lambda d: f"listening at 127.0.0.1, port {d['port']}")
 
     with suppress(KeyboardInterrupt):
         listen(args.listen, ready)
-    return 0
+    return output.EXIT_OK
 
 
-def debug(args: argparse.Namespace, connect: Callable[[argparse.Namespace], Controller]) -> int:
+def _debug(args: argparse.Namespace) -> int:
     """Reads commands until the end of the input."""
-    with _debuggee(args, connect) as plc:
+    with _debuggee(args) as plc:
         Terminal(plc, as_json=args.json).run()
-    return 0
+    return output.EXIT_OK
 
 
 @contextmanager
-def _debuggee(args: argparse.Namespace, connect: Callable[[argparse.Namespace], Controller]) -> Iterator[Controller]:
+def _debuggee(args: argparse.Namespace) -> Iterator[Controller]:
     if not args.sources:
         link_of(args)
         with connect(args) as plc:
