@@ -81,7 +81,7 @@ class Reader:
         assert words[0] == "plctool", f"this test does not know how to run: {line}"
         done = subprocess.run(
             [sys.executable, "-m", "plctool", *words[1:]], cwd=self.folder, env=self.env | environment,
-            capture_output=True, text=True, timeout=180, check=False,
+            stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=180, check=False,
         )  # fmt: skip
         assert done.returncode == 0, f"{line}\nexit {done.returncode}\n{done.stdout}{done.stderr}"
 

@@ -235,7 +235,7 @@ class Debugger:
             if not isinstance(base, Elementary) or symbol.size not in _SIZES or symbol.fixed is not None:
                 return None
             place = place_of(symbol)
-            if len(place.hops) > lib.FORCE_POINTERS:
+            if len(place.hops) > lib.PLACE_POINTERS:
                 return None
             change = symbol.change(symbol.parse(match[3]))
             value = bytes([bool(any(change.data))]) if place.is_bits else change.data
