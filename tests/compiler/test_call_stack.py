@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pytest
+from checked_program import checked
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -100,7 +101,6 @@ def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
     return [(place.pou, place.line) for place in symbols.call_stack(exception.code_offset, exception.trace)]
 
 
-@pytest.mark.parametrize("level", LEVELS)
 @settings(max_examples=25)
 @given(units=UNITS, connected=st.booleans())
 @example(
@@ -121,27 +121,30 @@ def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
     ],
     connected=False,
 )
-def test_each_call_is_reported(tmp_path_factory, level: Level, units: list[Unit], connected: bool) -> None:
+def test_each_call_is_reported_at_each_level(tmp_path_factory, units: list[Unit], connected: bool) -> None:
     program = Program(units, connected)
     path = tmp_path_factory.mktemp("calls") / "calls.st"
     path.write_text(program.text)
-    built = compile_sources([path], level=level)
-    with Simulator(built.image, built.symbols) as plc:
-        plc.run_cycles(4, check=False)
-        assert places(plc, built.symbols) == program.places
+    once = checked([path])
+    for level in LEVELS:
+        built = once.built(level)
+        with Simulator(built.image, built.symbols) as plc:
+            plc.run_cycles(4, check=False)
+            assert places(plc, built.symbols) == program.places, level
 
 
-@pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("statement", ["n := n + n * 3 - 1; m := m + n;", "f(n := n); n := f.n + 1;"])
-def test_the_parts_of_a_long_body_are_one_place(tmp_path, level: Level, statement: str) -> None:
+def test_the_parts_of_a_long_body_are_one_place_at_each_level(tmp_path, statement: str) -> None:
     path = tmp_path / "long.st"
     block = "FUNCTION_BLOCK F VAR_INPUT n : DINT; END_VAR n := n * 3; END_FUNCTION_BLOCK"
     lines = [f"{block} PROGRAM Main VAR n, m : DINT; f : F; END_VAR", *[statement] * 2000, "n := 10 / (m - m);"]
     path.write_text("\n".join([*lines, "END_PROGRAM"]))
-    built = compile_sources([path], level=level)
-    with Simulator(built.image, built.symbols) as plc:
-        plc.run_cycles(1, check=False)
-        assert places(plc, built.symbols) == [("Main", len(lines))]
+    once = checked([path])
+    for level in LEVELS:
+        built = once.built(level)
+        with Simulator(built.image, built.symbols) as plc:
+            plc.run_cycles(1, check=False)
+            assert places(plc, built.symbols) == [("Main", len(lines))], level
 
 
 @pytest.mark.parametrize("level", LEVELS)

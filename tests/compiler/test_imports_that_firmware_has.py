@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from checked_program import CheckedProgram, checked
 
 from plctool.compiler import compile_sources
 from plctool.compiler.base.level import Level
@@ -49,7 +50,7 @@ def statements() -> tuple[list[str], list[str]]:
 
 
 @pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def program(tmp_path_factory: pytest.TempPathFactory) -> CheckedProgram:
     """One program for each group of statements: in a large function LLVM would hide what it does in a small one."""
     folder = tmp_path_factory.mktemp("operators")
     declared, body = statements()
@@ -60,13 +61,13 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text += f"FUNCTION Part{number} : BOOL\n{lines}\nEND_FUNCTION\n"
     calls = "\n".join(f"Part{number}();" for number in range(len(parts)))
     (folder / "m.st").write_text(f"{text}PROGRAM Main\n{calls}\nEND_PROGRAM\n")
-    return folder
+    return checked([folder])
 
 
 @pytest.mark.parametrize("level", [0, 1, 2, 3, "s"])
 @pytest.mark.parametrize("target", WITH_STUBS, ids=lambda target: target.name)
-def test_imports_are_those_of_the_processor(program: Path, target: Target, level: Level) -> None:
-    image = parse_image(compile_sources([program], target=target.name, level=level, limits=False).image)
+def test_imports_are_those_of_the_processor(program: CheckedProgram, target: Target, level: Level) -> None:
+    image = parse_image(program.built(level, target.name).image)
     found = {external.name: find_c_function(external.name, external.signature) for external in image.externals}
     missing = [name for name, function in found.items() if function is None or not function.is_registered(target)]
     assert found and not missing
