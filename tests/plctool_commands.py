@@ -1,4 +1,4 @@
-"""plctool's commands as processes of their own, without the imports that are most of the work of a short command.
+"""Commands of plctool and of pytest as processes of their own, without the imports, most of a short command's work.
 
 A server, this file as a program, has imported plctool and forks for each command. What that leaves out is the start of
 Python, the imports and the tables of the grammar; `python -m plctool` is tested in tests/cli and tests/docs.
@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import IO, Any, NoReturn
 
 IMPORTED = (
+    "pytest",
     "plctool.__main__",
     "plctool.cli.main",
     "plctool.compiler.image.build",
@@ -71,7 +72,20 @@ def run_plctool(
     words: Sequence[str], folder: Path, env: Mapping[str, str], timeout: float
 ) -> subprocess.CompletedProcess[str]:
     """Runs `plctool WORDS` in a folder; raises TimeoutExpired after `timeout` [s], as subprocess.run does."""
-    request = {"words": words, "folder": str(folder), "env": dict(env)}
+    return _run(["plctool", *words], folder, env, timeout)
+
+
+def run_pytest(
+    words: Sequence[str], folder: Path, env: Mapping[str, str], timeout: float
+) -> subprocess.CompletedProcess[str]:
+    """Runs `python -m pytest WORDS`, which may load plctool's plugin, in the same way."""
+    return _run(["pytest", *words], folder, env, timeout)
+
+
+def _run(
+    command: Sequence[str], folder: Path, env: Mapping[str, str], timeout: float
+) -> subprocess.CompletedProcess[str]:
+    request = {"command": command, "folder": str(folder), "env": dict(env)}
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err, open(os.devnull) as nothing:
         reader, writer = os.pipe()
         with open(reader) as told:
@@ -81,9 +95,9 @@ def run_plctool(
             pid = int(told.readline())
             if not select.select([told], [], [], timeout)[0]:
                 os.kill(pid, signal.SIGKILL)
-                raise subprocess.TimeoutExpired(["plctool", *words], timeout, _content(out), _content(err))
+                raise subprocess.TimeoutExpired(command, timeout, _content(out), _content(err))
             status = int(told.readline())
-        return subprocess.CompletedProcess(["plctool", *words], status, _content(out), _content(err))
+        return subprocess.CompletedProcess(command, status, _content(out), _content(err))
 
 
 def _content(file: IO[str]) -> str:
@@ -127,10 +141,14 @@ def _work(request: dict[str, Any], streams: list[int]) -> NoReturn:
     os.chdir(request["folder"])
     os.environ.clear()
     os.environ.update(request["env"])
-    sys.argv = ["plctool", *request["words"]]
+    sys.argv = request["command"]
     sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115 # buffered as a file
     try:
-        status = sys.modules["plctool.__main__"].run()
+        if sys.argv[0] == "pytest":
+            sys.path.insert(0, request["folder"])  # as `python -m` does
+            status = int(sys.modules["pytest"].main(sys.argv[1:]))
+        else:
+            status = sys.modules["plctool.__main__"].run()
     except SystemExit as end:
         status = end.code or 0
     except BaseException:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from test_pytest_plugin import run_pytest
 
 from plctool.st_tests import run_tests
 
@@ -228,8 +226,6 @@ def test_before_something_else_it_has_no_effect(tool, before: str) -> None:  # t
 
 def test_pytest_runs_such_tests() -> None:
     Path("tests.st").write_text(LOST_AND_BACK + LOST_AND_BACK.replace("5s", "3s").replace("back'", "back too soon'"))
-    command = [sys.executable, "-m", "pytest", "-p", "plctool.pytest_plugin", "-p", "no:cacheprovider"]
-    env = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=120, check=False)
+    done = run_pytest(Path.cwd())
     assert "1 failed, 1 passed" in done.stdout, done.stdout
     assert "tests.st:24: ASSERT_TRUE" in done.stdout

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import plctool_commands
 import pytest
 
 from plctool.templates import new_project
@@ -32,11 +33,12 @@ def test_in_python():
 """
 
 
+WORDS = ["-p", "plctool.pytest_plugin", "-p", "no:cacheprovider", "-v"]
+ALONE = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # where plctool is installed, the plugin would be loaded twice
+
+
 def run_pytest(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pytest", "-p", "plctool.pytest_plugin", "-p", "no:cacheprovider", "-v"]
-    env = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # where plctool is installed, it would be loaded twice
-    words = (*command, *options)
-    return subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, timeout=120, check=False)
+    return plctool_commands.run_pytest([*WORDS, *options], folder, os.environ | ALONE, timeout=120)
 
 
 @pytest.fixture
@@ -49,7 +51,8 @@ def project(scratch: Path) -> Path:
 
 def test_they_run_beside_tests_in_python_and_failures_show_their_line(project: Path) -> None:
     (project / "test_counter.py").write_text(PYTHON)
-    done = run_pytest(project)
+    command, env = [sys.executable, "-m", "pytest", *WORDS], os.environ | ALONE
+    done = subprocess.run(command, cwd=project, env=env, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 1
     assert "tests.st::counts by one PASSED" in done.stdout
     assert "tests.st::counts by two FAILED" in done.stdout
