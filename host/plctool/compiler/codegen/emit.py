@@ -45,8 +45,10 @@ def _initialise() -> None:
     llvm.set_option("", "-enable-machine-outliner=never")
 
 
+@cache
 def target_machine(target: Target, opt_level: int) -> llvm.TargetMachine:
-    """LLVM's code generator for a target."""
+    """Returns LLVM's code generator for a target: one for all programs of a process, because to make it takes a tenth
+    of the time of a small program. llvmlite lets one thread at a time use it."""
     _initialise()
     features = ",".join([target.features, *([target.features_for_speed] if opt_level >= FASTEST else [])])
     return llvm.Target.from_triple(target.triple).create_target_machine(
