@@ -306,6 +306,12 @@ typedef struct {
     WIRE_UI32 overruns;
 } TASK_INFO;
 
+/* TAG_TASK_LATENESS (own). One for each class of lateness in which starts were counted, in ascending order. */
+typedef struct {
+    WIRE_UI32 below_ns; /* where the class ends */
+    WIRE_UI32 count;
+} TASK_LATENESS;
+
 /* TAG_MON2_APPLICATION. */
 typedef struct {
     WIRE_UI32 session;

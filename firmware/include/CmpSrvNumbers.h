@@ -209,7 +209,8 @@ enum {
     SRV_APP_READ_APPLICATION_INFO = 0x29,
     SRV_APP_DOWNLOAD_COMPACT = 0x30,
     SRV_APP_GET_AREA_ADDRESS = 0x38,
-    SRV_APP_READ_TASK_INFO = 0x70, /* own */
+    SRV_APP_READ_TASK_INFO = 0x70,     /* own */
+    SRV_APP_READ_TASK_LATENESS = 0x74, /* own */
     TAG_APP_LOGOUT = 0x00,
     TAG_APP_LOGIN_NAME = 0x01,
     TAG_APP_DESCRIPTOR = 0x81,
@@ -247,7 +248,7 @@ enum {
 };
 
 /* Task information (own). */
-enum { TAG_TASK_INFO = 0x42 };
+enum { TAG_TASK_INFO = 0x42, TAG_TASK_LATENESS = 0x43 };
 
 /* Settings (4.11). */
 enum {

@@ -56,6 +56,18 @@ void IecCycleFindPhases(void);
 /* All but the overruns. ERR_INVALIDID when there is no such task. */
 RTS_RESULT IecCycleGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
 
+#if IEC_LATENESS
+/* How late cycles of a task began. Classes are narrow where lateness is small: the first ends at 256 ns, and each next one
+ * is at most a quarter wider than what it begins with. */
+enum { IEC_LATENESS_FIRST_NS = 256, IEC_LATENESS_CLASSES = 1 + 4 * 24 };
+typedef struct {
+    RTS_UI32 below_ns; /* where the class ends, and the next one begins; 0xFFFFFFFF: never */
+    RTS_UI32 count;    /* of starts since the application was loaded; wraps */
+} IEC_LATENESS_COUNT;
+/* ERR_INVALIDID when there is no such task or class. From main. */
+RTS_RESULT IecCycleGetLateness(RTS_UI32 task, RTS_UI32 number, IEC_LATENESS_COUNT *lateness);
+#endif
+
 /* The share of the time since the tasks were first started that all of them took, of every kind [%]; with several
  * processors it may be above 100. From main. */
 RTS_UI32 IecTaskGetLoad(void);

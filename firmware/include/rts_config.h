@@ -211,6 +211,12 @@
 #define SCHED_PROCESSOR_TIME 0
 #endif
 
+/* 1: the starts of each task's cycles are counted by how late they were (IecCycleGetLateness): 388 bytes of RAM for each
+ * task, and about 2 ns for each cycle. */
+#ifndef IEC_LATENESS
+#define IEC_LATENESS 0
+#endif
+
 /* Changed retain variables are saved at most this often [us]: what a power cut may lose against the wear of the flash.
  * A save takes the size of the area and 20 bytes, rounded up to 16, of one half of the retain log; a half is erased
  * when it is full. So 500 bytes that change all the time, saved every second in two halves of 8 KiB, erase each sector

@@ -42,7 +42,7 @@ from plctool.link.monitoring import (
 )
 from plctool.link.names import Node
 from plctool.link.passwords import AskPassword, no_password
-from plctool.link.services import Identity, LogEntry, Stack, Status, TaskInfo
+from plctool.link.services import Identity, Lateness, LogEntry, Stack, Status, TaskInfo
 from plctool.link.session import Session
 from plctool.link.traces import TraceState
 from plctool.link.transports import Link, can_transport, open_transport, parse_link, share_bus
@@ -277,6 +277,10 @@ class Plc(Controller):
 
     def tasks(self) -> list[TaskInfo]:
         return services.read_tasks(self._session)
+
+    def lateness(self) -> list[list[Lateness]]:
+        """How late the cycles of each task began, in the order of `tasks`."""
+        return services.read_lateness(self._session)
 
     def _now(self) -> float:
         return self._connection.now()

@@ -399,6 +399,24 @@ static void tasks_are_reported_with_their_times(void)
     CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_END_OF_OBJECT);
 }
 
+static void lateness_is_reported_of_each_task_without_empty_classes(void)
+{
+    BTAG_READER list;
+    BTAG tag;
+
+    setup();
+    fakes.task_count = 2;
+    begin_content();
+    CHECK(call(SRV_APP_READ_TASK_LATENESS));
+    list = reply.tags;
+    CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_OK);
+    CHECK(tag.id == TAG_TASK_LATENESS && tag.size == 16);
+    CHECK(BytesGet32(tag.data) == 2000 && BytesGet32(tag.data + 4) == 1);
+    CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_OK);
+    CHECK(tag.size == 16 && BytesGet32(tag.data + 8) == 3000 && BytesGet32(tag.data + 12) == 4);
+    CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_END_OF_OBJECT);
+}
+
 /* ---- what clients of others ask for ---- */
 
 static void a_single_cycle_and_deletion_need_the_session_of_the_application(void)
@@ -470,6 +488,7 @@ int main(void)
     RUN(list_names_the_application);
     RUN(info_reports_the_strings_of_the_image);
     RUN(tasks_are_reported_with_their_times);
+    RUN(lateness_is_reported_of_each_task_without_empty_classes);
     RUN(a_single_cycle_and_deletion_need_the_session_of_the_application);
     RUN(the_address_of_an_area_is_that_which_pointers_have);
     return test_result();

@@ -403,7 +403,7 @@ def test_ctrl_c_exits_130_without_a_word(tool: Any, watched: tuple[str, ...], mo
 
 DEVICE_COMMANDS = [
     ("flash", "small.cdl"), ("scan",), ("status",), ("start",), ("stop",), ("reset", "warm"), ("tasks",), ("log",),
-    ("read", "Main.count"), ("write", "Main.count=1"), ("watch", "Main.count"),
+    ("latency",), ("read", "Main.count"), ("write", "Main.count=1"), ("watch", "Main.count"),
 ]  # fmt: skip
 
 

@@ -342,6 +342,7 @@ class FakePlc:
         self.log: list[tuple[int, int, int, str, str]] = []  # handle, time, class, component, text
         self.shell_refusals: dict[str, tuple[str, int]] = {}  # words and error, by command
         self.tasks: list[tuple[list[int], str]] = []
+        self.lateness: list[list[list[tuple[int, int]]]] = [[]]  # one reply after the other, the last one again
         self.requests: list[tuple[int, int]] = []
         self.writes = 0
         self.forced: dict[tuple[int, int, int, int, bytes], bytes] = {}  # what by place
@@ -381,6 +382,7 @@ class FakePlc:
             (app, lib.SRV_APP_RESET): self._reset,
             (app, lib.SRV_APP_DOWNLOAD_COMPACT): self._download,
             (app, lib.SRV_APP_READ_TASK_INFO): self._task_info,
+            (app, lib.SRV_APP_READ_TASK_LATENESS): self._task_lateness,
             (app, lib.SRV_APP_READ_APPLICATION_INFO): self._info,
             (lib.SG_MONITORING2, lib.SRV_MON2_READ): self._read,
             (lib.SG_MONITORING2, lib.SRV_MON2_WRITE): self._write,
@@ -506,6 +508,12 @@ class FakePlc:
         return [
             bintag.data(lib.TAG_TASK_INFO, struct.pack("<10I", *numbers) + name.encode() + b"\0")
             for numbers, name in self.tasks
+        ]
+
+    def _task_lateness(self, tags: bintag.Tags) -> list[bintag.Tag]:
+        reply = self.lateness.pop(0) if len(self.lateness) > 1 else self.lateness[0]
+        return [
+            bintag.data(lib.TAG_TASK_LATENESS, b"".join(struct.pack("<2I", *pair) for pair in pairs)) for pairs in reply
         ]
 
     def _info(self, tags: bintag.Tags) -> list[bintag.Tag]:

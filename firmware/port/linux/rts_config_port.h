@@ -36,6 +36,7 @@
 #define OPERATION_CONTROL 1
 #define TRACE_BUFFER (4 * 1024 * 1024)
 #define BP_MAX 128
+#define IEC_LATENESS 1
 #define TCP_BUFFER_SIZE 16384
 #define CAN_FD 1
 #define CAN_BLOCK_SIZE 0 /* the kernel has room */

@@ -37,6 +37,7 @@
 #define BP_MAX 128
 #define BP_HOLDS_TASKS 0
 #define BP_ALIVE_MS 0 /* its time does not go on by itself */
+#define IEC_LATENESS 1
 #define LOG_MAX_ENTRIES 64
 #define LOG_TEXT_SIZE 160
 #define CM_OWN_EXT_TABLES 8

@@ -342,6 +342,33 @@ static RTS_RESULT read_task_info(SRV_REQUEST *request, BTAG_WRITER *reply)
 }
 #endif
 
+#if SRV_INFORMATION && IEC_LATENESS
+static void append_lateness(BTAG_WRITER *reply, const IEC_LATENESS_COUNT *lateness)
+{
+    TASK_LATENESS numbers;
+
+    BytesPut32(numbers.below_ns, lateness->below_ns);
+    BytesPut32(numbers.count, lateness->count);
+    BTagAppend(reply, &numbers, sizeof(numbers));
+}
+
+static RTS_RESULT read_task_lateness(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    IEC_LATENESS_COUNT lateness;
+
+    RTS_UNUSED(request);
+    for (RTS_UI32 i = 0; i < IecTaskGetCount(); i++) {
+        BTagOpen(reply, TAG_TASK_LATENESS, BTAG_ALIGN_0);
+        for (RTS_UI32 number = 0; IecCycleGetLateness(i, number, &lateness) == ERR_OK; number++) {
+            if (lateness.count != 0)
+                append_lateness(reply, &lateness);
+        }
+        BTagClose(reply);
+    }
+    return ERR_OK;
+}
+#endif
+
 /* ---- download ---- */
 
 /* The session that began the download which is open. */
@@ -548,6 +575,9 @@ static const SRV_SERVICE services[] = {
     {SRV_APP_READ_APPLICATION_LIST, RIGHT_STATE, read_application_list},
     {SRV_APP_READ_APPLICATION_INFO, RIGHT_STATE, read_application_info},
     {SRV_APP_READ_TASK_INFO, RIGHT_STATE, read_task_info},
+#if IEC_LATENESS
+    {SRV_APP_READ_TASK_LATENESS, RIGHT_STATE, read_task_lateness},
+#endif
 #endif
 #if SRV_OTHER_CLIENTS
     {SRV_APP_DELETE, RIGHT_DOWNLOAD, delete_app},

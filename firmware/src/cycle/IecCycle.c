@@ -47,6 +47,9 @@ typedef struct {
 #if TRACE_BUFFER > 0
     RTS_I64 due_ns; /* of this cycle, while it is recorded */
 #endif
+#if IEC_LATENESS
+    RTS_UI32 late[IEC_LATENESS_CLASSES];
+#endif
 } TASK;
 
 /* May cycles start? */
@@ -180,6 +183,49 @@ static void run_entry(void *arg)
     APP_CALL_ENTRY(task->entry, &task->context);
 }
 
+#if IEC_LATENESS
+
+enum { FIRST_BIT = 8, STEPS_BITS = 2, STEPS = 1 << STEPS_BITS }; /* of each power of 2 so many classes */
+RTS_STATIC_ASSERT(IEC_LATENESS_FIRST_NS == 1 << FIRST_BIT && IEC_LATENESS_CLASSES == 1 + STEPS * (32 - FIRST_BIT),
+                  classes_of_lateness_are_all_numbers);
+
+static RTS_UI32 lateness_class(RTS_UI32 ns)
+{
+    RTS_UI32 top;
+
+    if (ns < IEC_LATENESS_FIRST_NS)
+        return 0;
+    top = 31 - (RTS_UI32)__builtin_clz(ns);
+    return 1 + STEPS * (top - FIRST_BIT) + (ns >> (top - STEPS_BITS) & (STEPS - 1));
+}
+
+static RTS_UI32 lateness_end(RTS_UI32 number)
+{
+    RTS_UI32 shift = FIRST_BIT - STEPS_BITS + (number - 1) / STEPS;
+
+    if (number == 0)
+        return IEC_LATENESS_FIRST_NS;
+    return number < IEC_LATENESS_CLASSES - 1 ? (STEPS + 1 + (number - 1) % STEPS) << shift : 0xFFFFFFFFu;
+}
+
+RTS_RESULT IecCycleGetLateness(RTS_UI32 task, RTS_UI32 number, IEC_LATENESS_COUNT *lateness)
+{
+    if (task >= tasks.count || number >= IEC_LATENESS_CLASSES)
+        return ERR_INVALIDID;
+    lateness->below_ns = lateness_end(number);
+    lateness->count = SysAtomicLoad(&tasks.list[task].late[number]);
+    return ERR_OK;
+}
+
+static void count_lateness(TASK *task, RTS_UI32 late)
+{
+    task->late[lateness_class(late)]++;
+}
+
+#else
+#define count_lateness(task, late)
+#endif
+
 static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
 {
     RTS_UI32 elapsed = saturate(elapsed_ns);
@@ -196,6 +242,7 @@ static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
         task->max_ns = elapsed;
     if (late > task->jitter_ns)
         task->jitter_ns = late;
+    count_lateness(task, late);
     SysAtomicStore(&task->cycles, cycles + 1);
 }
 

@@ -34,6 +34,7 @@ _LAST_EXCEPTION = Layout("APP_LAST_EXCEPTION")
 _IMAGE = Layout("APP_IMAGE_IDENTITY")
 _CALL = Layout("EXCEPT_CALL")
 _TASK = Layout("TASK_INFO")
+_LATENESS = Layout("TASK_LATENESS")
 _POSITION = Layout("CDL_POSITION")
 _PACKED = Layout("CDL_PACKED")
 _LOG_RECORD = Layout("LOG_RECORD")
@@ -116,6 +117,14 @@ class TaskInfo:
     max_us: int
     jitter_us: int
     overruns: int
+
+
+@dataclass(frozen=True)
+class Lateness:
+    """`count` starts of cycles were late by less than `below_ns`, and not by less than the class before ends."""
+
+    below_ns: int
+    count: int
 
 
 @dataclass(frozen=True)
@@ -331,6 +340,27 @@ def read_tasks(session: Session) -> list[TaskInfo]:
         if tag == lib.TAG_TASK_INFO and isinstance(content, bytes) and len(content) >= _TASK.size:
             name = content[_TASK.size :].split(b"\0", 1)[0].decode(errors="replace")
             tasks.append(TaskInfo(name, *_TASK.unpack(content)))
+    return tasks
+
+
+def read_lateness(session: Session) -> list[list[Lateness]]:
+    """The classes of each task in which starts of cycles were counted, tasks in the order of `read_tasks`."""
+    try:
+        tags = session.recover(lambda: session.call(lib.SG_APPLICATION, lib.SRV_APP_READ_TASK_LATENESS))
+    except DeviceError as error:
+        if error.result != lib.ERR_L7_UNKNOWNCMD:
+            raise
+        raise DeviceError(
+            "The firmware of this device does not count how late cycles begin. Build it with IEC_LATENESS; "
+            "'plctool tasks' shows the latest one.",
+            "no-lateness",
+            error.result,
+        ) from None
+    tasks = []
+    for tag, content in tags:
+        if tag == lib.TAG_TASK_LATENESS and isinstance(content, bytes):
+            starts = range(0, len(content) - _LATENESS.size + 1, _LATENESS.size)
+            tasks.append([Lateness(*_LATENESS.unpack(content[at : at + _LATENESS.size])) for at in starts])
     return tasks
 
 

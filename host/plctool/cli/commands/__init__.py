@@ -53,6 +53,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("reset", "device", "reset the program; it is stopped afterwards"),
         Row("cycle", "device", "run one cycle of each task of a stopped program"),
         Row("tasks", "device", "show the times of the tasks"),
+        Row("latency", "latency", "show how late the cycles of each task began"),
         Row("forced", "values", "print what is forced"),
         Row("files", "files", "list, get, put and delete the files of a device"),
         Row("source", "source", "keep the sources of the program on the device, and get them back"),
