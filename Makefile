@@ -7,6 +7,7 @@
 # make size   flash and RAM of the bare-metal runtime, per component; plcrt of each processor
 # make linux-arm  plcrt for Linux on 64-bit and 32-bit Arm: build-aarch64-linux, build-armv7-linux
 # make test-linux-arm  the C tests and tests/e2e with these, in QEMU's user mode (ARGS="-k force"); some are in `make test`
+# make test-arm-system  plcrt on Debian's kernel for arm64 in a virtual machine, and a power cut
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
@@ -32,8 +33,8 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm lint format bench size wheel release run-release attack soak fuzz properties habits tree-sitter vsix test-editors all clean
-.PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm
+.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release attack soak fuzz properties habits tree-sitter vsix test-editors all clean
+.PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm run-test-arm-system
 VSCODE := editors/vscode
 NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
 
@@ -41,7 +42,7 @@ demo: $(VENV)/installed
 	$(BIN)/plctool demo
 
 # A make of its own, so that BUILDS sees what bootstrapping has just installed.
-test all bench size release linux-arm test-linux-arm: $(VENV)/dev
+test all bench size release linux-arm test-linux-arm test-arm-system: $(VENV)/dev
 	@$(MAKE) --no-print-directory run-$@
 
 run-test: run-all
@@ -57,10 +58,16 @@ run-linux-arm: $(LINUX_ARM:%=%/build.ninja)
 	set -e; for build in $(LINUX_ARM); do $(MESON) compile -C $$build plcrt; done
 	@size $(LINUX_ARM:%=%/firmware/port/linux/plcrt)
 
+# A whole system: Debian's kernel for arm64 in a virtual machine; skipped with the reason where that cannot run.
+run-test-arm-system: build/build.ninja build-aarch64-linux/build.ninja
+	$(MESON) compile -C build
+	$(MESON) compile -C build-aarch64-linux plcrt
+	tests/linux_arm/system build-aarch64-linux $(abspath $(BIN)/python) $(ARGS) || [ $$? -eq 77 ]
+
 run-test-linux-arm: build/build.ninja $(LINUX_ARM:%=%/build.ninja)
 	set -e; for build in build $(LINUX_ARM); do $(MESON) compile -C $$build; done
 	set -e; for build in $(LINUX_ARM); do $(MESON) test -C $$build --no-rebuild --suite c; done
-	$(BIN)/python tests/linux_arm/run.py $(LINUX_ARM) -- $(ARGS)
+	PYTHONPATH=$(abspath host):$(abspath build/host) $(BIN)/python tests/linux_arm/run.py $(LINUX_ARM) -- $(ARGS)
 
 quick: build/build.ninja
 	@ninja --quiet -C build under_attack
