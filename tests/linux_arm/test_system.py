@@ -55,7 +55,8 @@ class Machine:
             "-append", "console=ttyAMA0 panic=-1",
             "-netdev", f"user,id=net,restrict=on,hostfwd=tcp:127.0.0.1:{self.port}-10.0.2.15:11740",
             "-device", "virtio-net-device,netdev=net",
-            "-drive", f"file={self.disk},format=raw,if=none,id=disk,cache=writethrough", "-device", "virtio-blk-device,drive=disk",
+            "-drive", f"file={self.disk},format=raw,if=none,id=disk,cache=writethrough",
+            "-device", "virtio-blk-device,drive=disk",
         ]  # fmt: skip
         with self.console.open("ab") as console:
             self.process = subprocess.Popen(

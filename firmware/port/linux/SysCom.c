@@ -136,7 +136,7 @@ static bool drive_bus(int file, const SYSCOM_SETTINGS *wanted)
     }
     choose_drive(file, &rs485);
     bool taken = ioctl(file, TIOCSRS485, &rs485) == 0;
-    if (taken || errno == ENOTTY || errno == EINVAL) {
+    if (taken || errno == ENOTTY || errno == EINVAL || errno == ENOSYS) {
         errno = EOPNOTSUPP;
     }
     return taken && (rs485.flags & SER_RS485_ENABLED) != 0;

@@ -16,6 +16,7 @@ import plctool
 from plctool.compiler import IoFiles, compile_sources
 from plctool.device import Plc
 from plctool.errors import DeviceError, PlcError
+from plctool.image.targets import host_target
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.tanks import PlantServer, describe_tanks, examples
 
@@ -150,7 +151,8 @@ def run(console: Console) -> None:
 
             story.tell("Compile examples/tanks: Structured Text, and what it is connected to")
             begin = time.monotonic()
-            result = compile_sources([examples() / "tanks"], io=IoFiles(describe_tanks(folder, plant.port)))
+            io = IoFiles(describe_tanks(folder, plant.port))
+            result = compile_sources([examples() / "tanks"], target=host_target(), io=io)
             result.write(image)
             story.say(f"tanks.cdl: {image.stat().st_size} bytes of image, {time.monotonic() - begin:.2f} s")
 
