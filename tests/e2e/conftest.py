@@ -27,7 +27,7 @@ build_for_plcrt()
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items if TARGET in os.environ else []:
-        if reason := reason_to_skip(item.nodeid):
+        if reason := reason_to_skip(item.nodeid, os.environ[TARGET]):
             item.add_marker(pytest.mark.skip(reason=reason))
 
 
