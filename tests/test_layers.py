@@ -5,18 +5,12 @@ Every import counts: at the head of a module, in a function, and for the type ch
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Iterable, Iterator
-from functools import cache
+from collections.abc import Iterable
 from graphlib import CycleError, TopologicalSorter
 from itertools import combinations
-from pathlib import Path
 
 import pytest
-
-import plctool
-
-ROOT = Path(plctool.__file__).parent
+from import_graph import INTERNALS, MODULES, arrows, drawn, floors, imports, named_in
 
 # From the ground up; the packages and modules of one line do not know each other. "" is what `import plctool` gives.
 FLOORS = (
@@ -66,39 +60,6 @@ NOT_BELOW = {
 CLI = ("cli.commands", "cli.command_line", "cli.manual", "cli.main")
 
 
-def _module(path: Path) -> str:
-    """The name of a module below plctool; of a package that of its folder."""
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix("__init__").removesuffix(".")
-
-
-MODULES = {_module(path): path for path in ROOT.rglob("*.py")}
-
-
-@cache
-def imports(module: str) -> frozenset[str]:
-    """The modules of plctool that a module imports."""
-    return frozenset(i for i in _named_in(MODULES[module].read_text()) if i != module)
-
-
-def _named_in(source: str) -> Iterator[str]:
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "imports are absolute here"
-            names = [f"{node.module}.{alias.name}" for alias in node.names]
-        else:
-            continue
-        for name in names:
-            if name.split(".")[0] == "plctool":
-                yield _found(name.removeprefix("plctool").removeprefix("."))
-
-
-def _found(name: str) -> str:
-    """The module that a dotted name below plctool means, or that it is a name in."""
-    return name if name in MODULES else name.rpartition(".")[0]
-
-
 def _is_in(module: str, package: str) -> bool:
     return module == package or (package != "" and module.startswith(package + "."))
 
@@ -143,7 +104,7 @@ def test_no_room_of_the_compiler_imports_the_whole() -> None:
 
 def test_imports_are_found_wherever_they_are() -> None:
     source = "from plctool.a import b\ndef f():\n    import plctool.c.d\nif TYPE_CHECKING:\n    from plctool import e"
-    assert len(list(_named_in(source))) == 3
+    assert len(list(named_in(source))) == 3
     assert "compiler" in imports("cli.commands.programs")  # in a function only
     assert "debug.symbols" in imports("device")
 
@@ -179,3 +140,18 @@ def test_parts_of_the_command_line_do_not_know_what_is_above_them(module: str) -
 @pytest.mark.parametrize(("package", "others"), [*APART, *NOT_BELOW.items()])
 def test_package_does_not_know_what_is_kept_apart(package: str, others: tuple[str, ...]) -> None:
     assert _edges(package, others) == set()
+
+
+# ---- the picture ----
+
+
+def test_pictures_in_the_documentation_are_those_of_the_imports() -> None:
+    text = INTERNALS.read_text()
+    assert "```imports compiler\n" in text
+    assert drawn(text) == text, "run tests/import_graph.py"
+
+
+def test_rooms_of_the_compiler_are_few() -> None:
+    rooms = arrows("compiler")
+    assert len(rooms) <= 12
+    assert max(floors(rooms).values()) <= 8
