@@ -5,13 +5,15 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from plctool.compiler.base.missing_names import known_name_like
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import convert, elementary, error_value, place_of, settle
 from plctool.compiler.semantics.generics import bounds_of
 from plctool.compiler.semantics.rules import intrinsics
 from plctool.compiler.semantics.rules.arguments import packed, packed_and_pointed_to, size_of
-from plctool.compiler.semantics.rules.conversion_calls import conversion, conversion_hint
+from plctool.compiler.semantics.rules.conversion_calls import conversion_hint, find_conversion
 from plctool.compiler.semantics.rules.intrinsics import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.members import space_of
 from plctool.compiler.semantics.rules.places import changeable_place, named_place
@@ -276,15 +278,19 @@ _PLACES = ("__POUNAME", "__POSITION")
 _FUNCTIONS = intrinsics.FUNCTIONS | _ON_VARIABLES
 
 
-def built_in_call(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr | None:
-    """The call of a built-in function; None when there is none of that name."""
+def find_built_in(c: Checker, name: str) -> Callable[[ast.Call, Type | None], Expr] | None:
+    """The rule of a built-in function or a conversion; None when there is none of that name."""
     if name in _OF_VARIABLES:
-        return of_variable(c, name, node, expected)
+        return lambda node, expected: of_variable(c, name, node, expected)
     if name in _PLACES:
-        return _place(c, name, node)
+        return lambda node, expected: _place(c, name, node)
     function = _FUNCTIONS.get(name)
     if function is None:
-        return conversion(c, name, node, expected)
+        return find_conversion(c, name)
+    return lambda node, expected: _applied(c, name, function, node, expected)
+
+
+def _applied(c: Checker, name: str, function: BuiltIn, node: ast.Call, expected: Type | None) -> Expr:
     args = _checked_arguments(c, name, function, node, expected)
     if args is None:
         return error_value(c.pos(node.pos))

@@ -16,7 +16,6 @@ from plctool.compiler.semantics.rules.arguments import (
     bind,
     has_enable,
     input_value,
-    named_function,
     packed,
     parameter_names,
     refer,
@@ -24,11 +23,12 @@ from plctool.compiler.semantics.rules.arguments import (
     split_enable,
     too_short,
 )
+from plctool.compiler.semantics.rules.callees import BlockCall, ProgramCall, resolve_statement
 from plctool.compiler.semantics.rules.calls import body_dispatch, call, called_variable
-from plctool.compiler.semantics.rules.members import bound_member, called_program, is_called_by_name, variable_value
+from plctool.compiler.semantics.rules.members import bound_member, is_called_by_name, variable_value
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.rules.pools import DELETE, delete
-from plctool.compiler.semantics.symbols import ERROR, NOTHING, BlockInfo, GlobalSymbol, ProgramInfo, Role, VarSymbol
+from plctool.compiler.semantics.symbols import ERROR, NOTHING, BlockInfo, ProgramInfo, Role
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed.nodes import (
     Assign,
@@ -109,23 +109,6 @@ def program_arguments(
         if taken is not None:
             behind.append(taken)
     return (before, behind) if ok else None
-
-
-def called_instance(c: Checker, call: ast.Call) -> Expr | None:
-    """The instance a call statement is about; None when it calls a function."""
-    callee = call.callee
-    if bound_member(c, callee, called=True) is not None or named_function(c, callee) is not None:
-        return None
-    if isinstance(callee, ast.Name):
-        symbol = c.scope.lookup(callee.name)
-        if symbol is None and callee.name.upper() == "SUPER" and c.scope.cls is not None:
-            return c.expr(ast.Deref(callee.pos, callee))
-        if not isinstance(symbol, VarSymbol | GlobalSymbol):
-            return None
-        if isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT:
-            return None
-    e = c.expr(callee)
-    return e if (isinstance(e.type, StructType) and e.type in c.world.blocks) or e.type is ERROR else None
 
 
 def block_call(c: Checker, call: ast.Call, instance: Expr) -> list[Statement]:
@@ -269,15 +252,14 @@ def _called(c: Checker, node: ast.Call) -> list[Statement]:
     """A call of a program, of an instance or of a function."""
     if called_variable(c, node) is not None:
         return []
-    program = called_program(c, node.callee)
-    if program is not None:
-        names = {symbol.name.casefold() for symbol, _ in program.parameters}
-        return enabled(c, node, names, lambda plain: program_call(c, plain, program))
-    instance = called_instance(c, node)
-    if instance is not None:
-        block = c.world.blocks.get(instance.type) if isinstance(instance.type, StructType) else None
-        members = block.members if block is not None else ()
-        return enabled(c, node, members, lambda plain: block_call(c, plain, instance))
+    match resolve_statement(c, node.callee):
+        case ProgramCall(program):
+            names = {symbol.name.casefold() for symbol, _ in program.parameters}
+            return enabled(c, node, names, lambda plain: program_call(c, plain, program))
+        case BlockCall(instance):
+            block = c.world.blocks.get(instance.type) if isinstance(instance.type, StructType) else None
+            members = block.members if block is not None else ()
+            return enabled(c, node, members, lambda plain: block_call(c, plain, instance))
     return enabled(c, node, parameter_names(c, node), lambda plain: _function_statement(c, plain))
 
 

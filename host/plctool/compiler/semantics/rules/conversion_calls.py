@@ -6,6 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from difflib import get_close_matches
 
 from plctool.compiler.base.source import Source
@@ -81,6 +82,8 @@ def _no_error(offset: int, code: str, message: str) -> None:
 
 # ---- conversions by name ----
 
+_Rule = Callable[[ast.Call, Type | None], Expr]
+
 _CONVERSION = re.compile(r"(?:ANY_|(?P<source>\w+?)_)?(?P<how>TO|TRUNC)_(?P<target>\w+)")
 _BITCAST = re.compile(r"(?P<source>[A-Z]+)_AS_(?P<target>[A-Z]+)")
 _FROM_BCD = re.compile(r"(?:(?P<source>[A-Z]+)_)?BCD_TO_(?P<target>[A-Z]+)")
@@ -88,17 +91,17 @@ _TO_BCD = re.compile(r"(?:(?P<source>[A-Z]+)_)?TO_BCD(?:_(?P<target>[A-Z]+))?")
 _ENDIAN = re.compile(r"(?:TO|FROM)_(?P<order>BIG|LITTLE)_ENDIAN")
 
 
-def conversion(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr | None:
-    """The call of a conversion; None when the name is none."""
+def find_conversion(c: Checker, name: str) -> Callable[[ast.Call, Type | None], Expr] | None:
+    """The rule of a conversion; None when the name is not one."""
     if name in ("TRUNC", "TRUNC_INT"):
-        return _trunc(c, name, node, expected)
-    if match := _ENDIAN.fullmatch(name):
-        return _byte_order(c, name, node, swaps=match["order"] == "BIG")
-    for pattern, make in _PATTERNS:
+        return lambda node, expected: _trunc(c, name, node, expected)
+    if endian := _ENDIAN.fullmatch(name):
+        return lambda node, expected: _byte_order(c, name, node, swaps=endian["order"] == "BIG")
+    for pattern, find in _PATTERNS:
         match = pattern.fullmatch(name)
-        result = None if match is None else make(c, name, match, node)
-        if result is not None:
-            return result
+        rule = None if match is None else find(c, name, match)
+        if rule is not None:
+            return rule
     return None
 
 
@@ -138,16 +141,21 @@ def _conversion_type(c: Checker, name: str) -> Type | None:
     return None
 
 
-def _by_types(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Expr | None:
+def _by_types(c: Checker, name: str, match: re.Match[str]) -> _Rule | None:
     """`INT_TO_REAL(x)`, `TO_REAL(x)`, `REAL_TRUNC_INT(x)`"""
     source = _conversion_type(c, match["source"]) if match["source"] else None
     target = _conversion_type(c, match["target"])
     if target is None or (match["source"] and source is None):
         return None
+    truncates = match["how"] == "TRUNC"
+    return lambda node, expected: _converted(c, name, source, target, node, truncates=truncates)
+
+
+def _converted(c: Checker, name: str, source: Type | None, target: Type, node: ast.Call, *, truncates: bool) -> Expr:
     e = as_number(settle(_operand(c, name, node, source)))
     if e.type is ERROR:
         return e
-    if match["how"] == "TRUNC":
+    if truncates:
         return _truncated(c, name, e, target, node)
     if isinstance(e.type, StringType) or isinstance(target, StringType):
         return _text_conversion(c, e, target, node)
@@ -234,12 +242,12 @@ def _truncated(c: Checker, name: str, e: Expr, target: Type, node: ast.Call) -> 
     return c.coerce(_from_real(e, to, rounding=Rounding.ZERO), target)
 
 
-def _bitcast_call(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Expr | None:
+def _bitcast_call(c: Checker, name: str, match: re.Match[str]) -> _Rule | None:
     """`REAL_AS_DWORD(x)`: the bits, not the value."""
     source, target = ELEMENTARY.get(match["source"]), ELEMENTARY.get(match["target"])
     if source is None or target is None or source.bits != target.bits or BOOL in (source, target):
         return None
-    return _bitcast(_operand(c, name, node, source), target)
+    return lambda node, expected: _bitcast(_operand(c, name, node, source), target)
 
 
 def _byte_order(c: Checker, name: str, node: ast.Call, *, swaps: bool) -> Expr:
@@ -258,13 +266,17 @@ def _byte_order(c: Checker, name: str, node: ast.Call, *, swaps: bool) -> Expr:
     return _bitcast(swapped, base) if is_real else convert(swapped, e.type)
 
 
-def _from_bcd(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Expr | None:
+def _from_bcd(c: Checker, name: str, match: re.Match[str]) -> _Rule | None:
     """`WORD_BCD_TO_UINT(x)`, `BCD_TO_UINT(x)`"""
     source, target = ELEMENTARY.get(match["source"] or ""), ELEMENTARY.get(match["target"])
     if target is None or target.kind not in NUMBERS:
         return None
     if match["source"] and (source is None or source.kind is not Kind.BIT):
         return None
+    return lambda node, expected: _read_bcd(c, name, source, target, node)
+
+
+def _read_bcd(c: Checker, name: str, source: Elementary | None, target: Elementary, node: ast.Call) -> Expr:
     e = _number(c, name, node, source)
     if e.type is ERROR:
         return e
@@ -275,7 +287,7 @@ def _from_bcd(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Ex
     return convert(call, target)
 
 
-def _to_bcd(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Expr | None:
+def _to_bcd(c: Checker, name: str, match: re.Match[str]) -> _Rule | None:
     """`UINT_TO_BCD_WORD(x)`, `TO_BCD_WORD(x)`, `UINT_TO_BCD(x)`"""
     source, target = ELEMENTARY.get(match["source"] or ""), ELEMENTARY.get(match["target"] or "")
     if match["source"] and (source is None or source.kind not in NUMBERS):
@@ -284,6 +296,10 @@ def _to_bcd(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Expr
         target = BITS[source.bits]
     if target is None or target.kind is not Kind.BIT:
         return None
+    return lambda node, expected: _written_bcd(c, name, source, target, node)
+
+
+def _written_bcd(c: Checker, name: str, source: Elementary | None, target: Elementary, node: ast.Call) -> Expr:
     e = _number(c, name, node, source)
     base = elementary(e.type)
     if e.type is ERROR or base is None:

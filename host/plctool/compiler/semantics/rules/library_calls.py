@@ -235,10 +235,8 @@ def _group_type(
     return result
 
 
-def overload_call(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr | None:
-    """`SIN` stands for SIN__REAL or SIN__LREAL, as the arguments need it. None when there is no such function."""
-    if not c.world.names.library.overloads(name.casefold()):
-        return None
+def overload_call(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr:
+    """`SIN` stands for SIN__REAL or SIN__LREAL, as the arguments need it."""
     values = _argument_values(c, node, expected)
     if values is None:
         return error_value(c.pos(node.pos))
