@@ -27,9 +27,11 @@ from qemu import Board  # noqa: E402
 from plctool.debug.symbols import symbol_path  # noqa: E402
 from plctool.device import Plc  # noqa: E402
 from plctool.link.connection import Connection  # noqa: E402
+from plctool.link.traces import RunningTrace, TraceOptions  # noqa: E402
 
 VARIABLES = 11
 FORCED = 8
+TRACED = 8
 ENOUGH = 200  # counts
 PATIENCE = 30.0  # [s]
 
@@ -153,6 +155,26 @@ def count_forced(machine: str, firmware: Firmware, folder: Path) -> list[int]:
     return [counter.count(irq, end), counter.count(irq, end, force_and_end), counter.count(irq, end, force)]
 
 
+def count_traced(machine: str, firmware: Firmware, folder: Path) -> list[int]:
+    """A cycle with nothing traced, one after that has ended, and one with TRACED REALs."""
+    names = [f"v{i}" for i in range(TRACED)]
+    text = program(f"VAR n : DINT; {', '.join(names)} : REAL; END_VAR", "n := n + 1;")
+    counter = Counter(machine, firmware, compile_text(text, TARGETS[machine], folder, checks="none"), folder)
+    running: list[RunningTrace] = []
+
+    def trace_and_end(plc: Plc) -> None:
+        plc.start_trace(["Main.v0"], TraceOptions()).end()
+        time.sleep(0.05)
+
+    def trace(plc: Plc) -> None:
+        if not running:
+            running.append(plc.start_trace([f"Main.{name}" for name in names], TraceOptions(keep=True)))
+        time.sleep(0.05)
+
+    irq, end = "AlarmIrq", firmware.functions["main"]
+    return [counter.count(irq, end), counter.count(irq, end, trace_and_end), counter.count(irq, end, trace)]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("machine", choices=TARGETS)
@@ -174,6 +196,8 @@ def main() -> None:
         alone, shared = count_images(args.machine, firmware, Path(folder))
         can_force = "mon_force" in firmware.functions
         forced = count_forced(args.machine, firmware, Path(folder)) if can_force else []
+        can_trace = "TraceCreate" in firmware.functions
+        traced = count_traced(args.machine, firmware, Path(folder)) if can_trace else []
         lines = count_lines(args.machine, firmware, Path(folder)) if "IoDrvGpio_Hook" in firmware.functions else []
     print(f"{args.machine}: instructions of the runtime, {args.firmware.stem}")
     print(f"{cycle:6}  a task cycle: from the alarm's interrupt back to the main loop")
@@ -186,6 +210,9 @@ def main() -> None:
     if forced:
         print(f"{forced[2] - forced[0]:6}  more for {FORCED} forced numbers")
         print(f"{forced[1] - forced[0]:6}  more when the force of all has ended")
+    if traced:
+        print(f"{traced[2] - traced[0]:6}  more for {TRACED} traced REALs")
+        print(f"{traced[1] - traced[0]:6}  more when the trace has ended")
     print(f"{one:6}  a request that reads one variable")
     print(f"{(more - one) / (VARIABLES - 1):6.0f}  each further variable")
 

@@ -215,16 +215,20 @@ static void look_for_trigger(PACKET *packet)
 
 /* ---- the cycle ---- */
 
-/* Copies time and values into a sample, where the largest values come first, so that all are aligned. */
+/* Copies time and values into a sample, where the largest values come first, so that all are aligned. A run of words costs
+ * a few instructions for each. */
 static RTS_INLINE void copy_sample(const PACKET *packet, RTS_UI8 *to)
 {
-    const STEP *step;
+    const STEP *step = packet->steps;
     RTS_UI32 i;
 
-    for (step = packet->steps; step->copy != COPY_END; to += step->size, step++) {
+    while (step->copy != COPY_END) {
         const volatile RTS_UI8 *at = step->at;
         if (step->copy == 4) {
-            *(RTS_UI32 *)(void *)to = *(const volatile RTS_UI32 *)(const volatile void *)at;
+            do {
+                *(RTS_UI32 *)(void *)to = *(const volatile RTS_UI32 *)(const volatile void *)step->at;
+                to += 4;
+            } while ((++step)->copy == 4);
             continue;
         }
         if (step->copy == COPY_SEARCHED)
@@ -234,6 +238,8 @@ static RTS_INLINE void copy_sample(const PACKET *packet, RTS_UI8 *to)
         else
             for (i = 0; i < step->size; i++)
                 to[i] = at[i];
+        to += step->size;
+        step++;
     }
 }
 

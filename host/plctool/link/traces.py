@@ -153,7 +153,7 @@ def _traceable(symbol: Symbol) -> Symbol:
 def encode_config(
     table: SymbolTable, columns: Sequence[Column], task: int, interval_us: int, options: TraceOptions
 ) -> bytes:
-    """What a packet for these columns is created with. Raises UsageError for a trigger that is none."""
+    """What a packet for these columns is created with. Raises UsageError for an invalid trigger."""
     _check_options(options)
     places = [place for place, _ in _records(columns)]
     if len(places) > lib.TRACE_MAX_RECORDS:
@@ -292,7 +292,7 @@ def decode_config(data: bytes) -> TraceConfig:
 def _place(entry: Any) -> ForcedPlace:
     offset, *hops = _OFFSETS.unpack(entry.offset)
     if entry.pointers > lib.PLACE_POINTERS or entry.size not in (1, 2, 4):
-        raise bintag.malformed("a trace has a place that is none")
+        raise bintag.malformed("a trace has an invalid place")
     return ForcedPlace(entry.area, offset, tuple(hops[: entry.pointers]), entry.size, entry.mask)
 
 
