@@ -26,7 +26,7 @@ FLOORS = (
     ("fmt",),
     ("sim_functions", "sim_worker"),
     ("device", "sim"),
-    ("", "controller_documents", "sim_plant"),
+    ("", "controller_documents", "dump_file", "sim_plant"),
     ("port_check", "st_tests", "templates", "testing", "trace_file", "trace_plot", "ui"),
     ("dap",),
     ("cli", "pytest_plugin"),

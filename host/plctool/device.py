@@ -359,6 +359,24 @@ class Plc(Controller):
     def _read_forces(self) -> ForceList:
         return read_forced(self._session)
 
+    # ---- dumps ----
+
+    def areas(self, table: SymbolTable) -> list[tuple[int, int, bytes]]:
+        """Each memory area of the program as far as its variables go: APP_AREA_*, what pointers to it contain (0:
+        unknown), its bytes."""
+        sizes: dict[int, int] = {}
+        for symbol in table.variables.values():
+            if symbol.fixed is None and symbol.pointer is None:
+                sizes[symbol.area] = max(sizes.get(symbol.area, 0), symbol.offset + symbol.size)
+        ranges = [AreaRange(area, 0, size) for area, size in sorted(sizes.items()) if size]
+        contents = read_memory(self._session, table.image_crc, ranges).values
+        places = [services.area_address(self._session, r.area) for r in ranges]
+        return [(r.area, a, c) for r, a, c in zip(ranges, places, contents, strict=True) if c is not None]
+
+    def pointer_size(self) -> int:
+        """Bytes of an address on the processor of the controller."""
+        return services.pointer_size(self._session)
+
     # ---- traces ----
 
     def create_trace(self, config: bytes) -> int:

@@ -297,6 +297,32 @@ def end_all_forces(session: Session) -> None:
     _check_control(reply, "unforce")
 
 
+def _area_address(session: Session, area: int) -> bytes | None:
+    """Where a memory area begins, as many bytes as a pointer has; None from a firmware that does not say it."""
+
+    def request() -> bintag.Tags:
+        number = session.application().session
+        tags = [bintag.u32(lib.TAG_APP_SESSION, number), bintag.u32(lib.TAG_APP_AREA, area)]
+        return session.call(lib.SG_APPLICATION, lib.SRV_APP_GET_AREA_ADDRESS, tags)
+
+    try:
+        return session.recover(request).find(lib.TAG_APP_AREA_ADDRESS)
+    except DeviceError as error:
+        if error.result in (lib.ERR_L7_UNKNOWNCMD, lib.ERR_APP_MAPPED_AREA_NOT_FOUND):
+            return None
+        raise
+
+
+def area_address(session: Session, area: int) -> int:
+    """What pointers to the beginning of a memory area contain; 0 from a firmware that does not say it."""
+    return int.from_bytes(_area_address(session, area) or b"", "little")
+
+
+def pointer_size(session: Session) -> int:
+    """Bytes of an address on the processor of the device; 4 from a firmware that does not say it."""
+    return len(_area_address(session, lib.APP_AREA_DATA) or bytes(4))
+
+
 def reset(session: Session, option: int) -> None:
     """`option` is RESET_OPTION_*; origin deletes the application."""
     look(session)
