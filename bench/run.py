@@ -19,6 +19,7 @@ import overheads
 import serial_share
 import tanks
 import targets
+import tracing
 
 from plctool.compiler import IoFiles, compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -214,6 +215,7 @@ def main() -> None:
     bench_serial()
     bench_can()
     links.main()
+    tracing.main()
     latency.main()
     modbus.main()
 
