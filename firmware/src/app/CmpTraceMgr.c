@@ -66,8 +66,9 @@ static struct {
     RTS_UI32 last_id;
     bool is_recording; /* the phase is registered */
     bool has_kept;     /* persistent packets have begun */
-    RTS_UI64 pool[POOL_UNITS];
 } trace;
+
+static RTS_UI64 pool[POOL_UNITS]; /* the buffer; not cleared, so that a large one takes memory only when it is used */
 
 static void record_all(RTS_UI32 task, const IEC_CONTEXT *context);
 
@@ -301,7 +302,7 @@ static void set_phase(void)
 
 static RTS_UI8 *end_of(const PACKET *packet)
 {
-    return packet == NULL ? (RTS_UI8 *)trace.pool : (RTS_UI8 *)packet + packet->bytes;
+    return packet == NULL ? (RTS_UI8 *)pool : (RTS_UI8 *)packet + packet->bytes;
 }
 
 /* The largest gap, which is after *before (NULL: at the beginning). */
@@ -312,7 +313,7 @@ static RTS_UI32 find_gap(PACKET **before)
 
     for (;;) {
         const PACKET *next = packet == NULL ? trace.first : packet->next;
-        const RTS_UI8 *end = next == NULL ? (RTS_UI8 *)(trace.pool + POOL_UNITS) : (const RTS_UI8 *)next;
+        const RTS_UI8 *end = next == NULL ? (RTS_UI8 *)(pool + POOL_UNITS) : (const RTS_UI8 *)next;
         if ((RTS_UI32)(end - end_of(packet)) > largest) {
             largest = (RTS_UI32)(end - end_of(packet));
             *before = packet;

@@ -1,4 +1,4 @@
-"""`plctool dump` and `plctool inspect`: what a controller had in memory, in a file. Arguments, actions and texts."""
+"""`plctool dump` and `plctool inspect`: what a controller had in memory, in a file. Arguments, actions, output."""
 
 from __future__ import annotations
 
