@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,8 +22,9 @@ from plctool.image.targets import DEFAULT_TARGET
 if TYPE_CHECKING:
     from plctool.compiler.base.source import Source
     from plctool.compiler.codegen.lower_unit import Options
-    from plctool.compiler.front import CheckResult
+    from plctool.compiler.front import CheckResult, Trees
     from plctool.compiler.image.build import BuildResult
+    from plctool.compiler.semantics.participants import Guest
     from plctool.compiler.semantics.python_functions import PythonFunctions
     from plctool.compiler.sources.imports import ImportedLibrary
     from plctool.compiler.sources.request import BuildRequest
@@ -104,25 +106,35 @@ def check_with_tests(
     load: Callable[[], Description | None] = lambda: None,
     libraries: Sequence[ImportedLibrary] = (),
     dialect: str | None = None,
+    trees: Trees | None = None,
+    observers: Sequence[Guest] = (),
+    max_errors: int | None = None,
 ) -> CheckResult:
     """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all.
-    `load` gets the inputs and outputs for each of both. `dialect` as in `compile_sources`."""
+    `load` gets the inputs and outputs for each of both. `dialect` as in `compile_sources`, the others as in
+    `front.check_sources`; unit tests are checked without `observers`."""
     from plctool.compiler.base.internal import bugs_reported
     from plctool.compiler.front import Trees, check_sources
+    from plctool.compiler.syntax.diagnostics import MAX_ERRORS
     from plctool.compiler.syntax.warnings import ALL_WARNINGS
     from plctool.iec.dialect import find_dialect
 
-    wanted, system, trees = warnings or ALL_WARNINGS, find_dialect(dialect), Trees()
+    check = partial(
+        check_sources,
+        sources,
+        warnings=warnings or ALL_WARNINGS,
+        libraries=libraries,
+        dialect=find_dialect(dialect),
+        trees=trees or Trees(),
+        max_errors=max_errors or MAX_ERRORS,
+    )
     with bugs_reported():
-        result = check_sources(sources, warnings=wanted, io=load(), libraries=libraries, dialect=system, trees=trees)
+        result = check(io=load(), observers=observers)
         if not result.has_tests:
             return result
         from plctool.compiler.semantics.unit_tests import TestSuite
 
-        suite = TestSuite()
-        tests = check_sources(
-            sources, tests=suite, warnings=wanted, io=load(), libraries=libraries, dialect=system, trees=trees
-        )
+        tests = check(tests=TestSuite(), io=load())
     found = dict.fromkeys([*result.diagnostics, *tests.diagnostics])
     found_sorted = sorted(found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
     return replace(result, program=result.program if tests.ok else None, diagnostics=found_sorted)

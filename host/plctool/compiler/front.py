@@ -31,7 +31,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.attributes import check_attributes, check_pragmas
 from plctool.compiler.syntax.broken_units import is_independent, remaining
 from plctool.compiler.syntax.conditions import names_asked_for
-from plctool.compiler.syntax.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
+from plctool.compiler.syntax.diagnostics import MAX_ERRORS, Diagnostic, Diagnostics, TooManyErrors, render
 from plctool.compiler.syntax.library import Library, standard_library
 from plctool.compiler.syntax.parser import ParsedText, parse_all
 from plctool.compiler.syntax.warnings import ALL_WARNINGS, WarningOptions
@@ -74,6 +74,8 @@ def check_sources(
     python: PythonFunctions | None = None,
     dialect: Dialect = OWN,
     trees: Trees | None = None,
+    observers: Sequence[Guest] = (),
+    max_errors: int = MAX_ERRORS,
 ) -> CheckResult:
     """Checks the files of a program together.
 
@@ -82,25 +84,33 @@ def check_sources(
     `warnings`: which of them are wanted. `io`: the inputs and outputs; a description is for one check.
     `libraries`: what the program uses besides the standard library. `python`: functions that Python implements, in the
     simulator; raises UsageError for those that cannot be. `dialect`: the system whose rules it has. `trees`: keeps the
-    syntax trees for another check. Whatever the sources contain, the result is a program or diagnostics, never an
-    exception.
+    syntax trees for another check. `observers` take part last; what they raise ends the check. `max_errors`: after so
+    many the check ends. Whatever the sources contain, the result is a program or diagnostics, never another exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
-    diagnostics = diagnostics_of(chosen, warnings, dialect)
-    guests: list[Guest] = [*((python,) if python is not None else ()), tests or DeviceTasks()]
+    diagnostics = diagnostics_of(chosen, warnings, dialect, max_errors)
+    guests: list[Guest] = [*((python,) if python is not None else ()), tests or DeviceTasks(), *observers]
     parsed: Parsed | None = None
     placed: Placed | None = None
     with reporting(diagnostics, sources):
         parsed = parse(sources, chosen, libraries, diagnostics, trees or Trees())
-        placed = _placed(parsed, io, guests)
+        if parsed.broken:
+            _check_whole_units(parsed, [DeviceTasks(), *observers])
+        else:
+            placed = _placed(parsed, io, guests)
         diagnostics.settle(parsed.knows)
     program = None if placed is None or diagnostics.errors else placed.program
     return CheckResult(program, diagnostics.sorted(), parsed is not None and parsed.has_tests)
 
 
-def diagnostics_of(library: Library, warnings: WarningOptions = ALL_WARNINGS, dialect: Dialect = OWN) -> Diagnostics:
+def diagnostics_of(
+    library: Library,
+    warnings: WarningOptions = ALL_WARNINGS,
+    dialect: Dialect = OWN,
+    max_errors: int = MAX_ERRORS,
+) -> Diagnostics:
     """Returns what collects the diagnostics of one check; there are no warnings about the library."""
-    return Diagnostics((s.path for s in library.sources), options=warnings, dialect=dialect)
+    return Diagnostics((s.path for s in library.sources), options=warnings, dialect=dialect, limit=max_errors)
 
 
 @contextmanager
@@ -121,9 +131,6 @@ def reporting(diagnostics: Diagnostics, sources: Sequence[Source]) -> Iterator[N
 
 def _placed(parsed: Parsed, io: Description | None, guests: Sequence[Guest]) -> Placed | None:
     """The stages after the first one, and the lints of each; None if the program cannot be declared."""
-    if parsed.broken:
-        _check_whole_units(parsed)
-        return None
     declared = declare(parsed, io, guests)
     if declared is None:
         return None
@@ -197,7 +204,7 @@ def declared_names_asked_for(
     return names_asked_for([source.text for source in sources], lambda: names)
 
 
-def _check_whole_units(parsed: Parsed) -> None:
+def _check_whole_units(parsed: Parsed, guests: Sequence[Guest]) -> None:
     """Errors of the units without syntax errors: a mistake in one hides no others, nor a library that they need.
     What may follow from the broken units waits."""
     found = parsed.diagnostics
@@ -212,7 +219,7 @@ def _check_whole_units(parsed: Parsed) -> None:
         hidden |= rest.hidden
         whole.append((source, replace(text, declarations=rest.declarations)))
     others = Diagnostics((s.path for s in parsed.library.sources), dialect=found.dialect, limit=sys.maxsize)
-    declared = declare(Parsed(whole, parsed.library, parsed.libraries, others))
+    declared = declare(Parsed(whole, parsed.library, parsed.libraries, others), None, guests)
     if declared is not None:
         place(check(declared))
     for d in others.sorted():

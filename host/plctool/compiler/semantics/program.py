@@ -72,6 +72,7 @@ class Program:
     def declare_all(self) -> None:
         """Declares what the program itself has, used or not, so that all of it is checked."""
         for symbol in self.world.names.units():
+            self.world.pause()
             if isinstance(symbol, TypeSymbol):
                 self.types.type_of_symbol(symbol)
             elif symbol.keyword is ast.Unit.FUNCTION_BLOCK:
@@ -126,6 +127,7 @@ class Program:
     def _check_body(self, scope: Scope, decl: ast.PouDecl) -> None:
         world = self.world
         before = world.diagnostics.errors
+        world.pause()
         try:
             write_body(Checker(world, scope), statements_of(world, decl, scope))
         except Exception as error:

@@ -163,6 +163,7 @@ class World:
     ) -> None:
         """`declared_by` makes what declares, for this world; it is called when the world has all else."""
         self.diagnostics = diagnostics
+        self.pause: Callable[[], None] = lambda: None  # called between two units; what it raises ends the check
         self.dialect = diagnostics.dialect
         self.names = Names(library, diagnostics, lambda planned: self.declared.instance(planned))
         self.coerce = Coercion(self.diagnostics, self._text_of)

@@ -107,7 +107,11 @@ def _content(path: Path) -> bytes:
 
 def _read_all(files: Iterable[Path], content: Callable[[Path], bytes]) -> list[Source]:
     with no_collection():
-        read = {file: _read(file, content(file)) for file in files}
+        return combined({file: read_content(file, content(file)) for file in files})
+
+
+def combined(read: dict[Path, list[Source]]) -> list[Source]:
+    """The sources of files that belong together: members in files of their own go to their unit. Changes `read`."""
     automation_studio.with_bodies(read)
     for owner, members in _members(read).items():
         read[owner] = object_text.with_members(read[owner][0], [read.pop(member)[0] for member in members])
@@ -133,8 +137,8 @@ def _owner(file: Path) -> Path | None:
     return file.parent.with_suffix(file.suffix) if file.parent.name else None
 
 
-def _read(path: Path, data: bytes) -> list[Source]:
-    """What a file holds."""
+def read_content(path: Path, data: bytes) -> list[Source]:
+    """What a file with these bytes contains."""
     refused = unreadable.refusal(path, data)
     if refused:
         return [Source(str(path), "", findings=(Finding(1, 1, "file", refused),))]

@@ -92,6 +92,10 @@ class Library:
         """`SIN` is defined as SIN__REAL and SIN__LREAL: their names."""
         return self._overloads.get(key, [])
 
+    def entry(self, key: str) -> Entry | None:
+        """Where a case-folded name is defined; of overloads the first one."""
+        return self._entries.get(self._overloads[key][0].casefold() if key in self._overloads else key)
+
     def names(self, *keywords: str) -> list[str]:
         """Everything there is, or what is declared by one of these keywords."""
         found = [e for e in self._entries.values() if not keywords or e.keyword in keywords]

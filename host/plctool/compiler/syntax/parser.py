@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from threading import get_ident
 from typing import Any
 
 from plctool.compiler.base.source import Source
@@ -82,8 +83,8 @@ def _gather(children: Sequence[Any], parts: tuple[tuple[int, bool], ...]) -> lis
 
 
 @cache
-def _machine() -> tuple[Builder, Callable[[], Parser]]:
-    """The builder, and what makes a parser for it."""
+def _machine(thread: int) -> tuple[Builder, Callable[[], Parser]]:
+    """The builder of a thread, which has a state, and what makes a parser for it."""
     tables, builder = load_tables(), Builder()
     reducers = [_reducer(rule, builder) for rule in tables.rules]
     gotos = shortened(tables, reducers)
@@ -167,7 +168,7 @@ def parse_all(
 ) -> ParsedText:
     """All that a text holds. `declared`: what {IF defined(pou: NAME)} finds; `tokens` takes those that have a place in
     the grammar, with the types that they have there."""
-    builder, new_parser = _machine()
+    builder, new_parser = _machine(get_ident())
     parser, taken = new_parser(), [] if tokens is None else tokens
     recovery = Recovery(parser, taken, source, report)
     lexer = Lexer(source.text, recovery.report_token, start, end, declared)

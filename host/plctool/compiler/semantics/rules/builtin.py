@@ -304,6 +304,11 @@ def is_built_in(name: str) -> bool:
     return any(name.upper() in known for known in (_FUNCTIONS, _OF_VARIABLES, _PLACES, QUERIES))
 
 
+def built_in_names() -> list[str]:
+    """Returns the functions that the compiler knows itself, but for conversions and what begins with _."""
+    return sorted(name for known in (_FUNCTIONS, _OF_VARIABLES) for name in known if not name.startswith("_"))
+
+
 def _place(c: Checker, name: str, node: ast.Call) -> Expr:
     """`__POUNAME()`: the name of the unit around; `__POSITION()`: line and column, as a text."""
     if node.args:
