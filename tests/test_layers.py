@@ -28,7 +28,7 @@ FLOORS = (
     ("device", "sim"),
     ("", "controller_documents", "dump_file", "sim_plant"),
     ("port_check", "st_tests", "templates", "testing", "trace_file", "trace_plot", "ui"),
-    ("dap",),
+    ("dap", "lsp"),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )

@@ -42,6 +42,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
     ),
     "programs and images": (
         Row("fmt", "fmt", "format Structured Text: one style, the program stays the same"),
+        Row("lsp", "lsp", "serve an editor: diagnostics, completion, hover and more (Language Server Protocol)"),
         Row("symbols", "images", "list the variables of an image with their types"),
         Row("info", "images", "describe an image, or the programs in a .bin or .hex of 'plctool image'"),
         Row("image", "images", "write what a production programmer burns: a flash with its program"),

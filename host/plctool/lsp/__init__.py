@@ -1,0 +1,1 @@
+"""The language server: what `plctool lsp` answers to an editor (Language Server Protocol 3.17)."""
