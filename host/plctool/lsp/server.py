@@ -8,18 +8,16 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, TypeVar
 
 from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 
-from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.lsp import completion, formatting, hierarchy, hover, navigation, symbols
-from plctool.lsp.checks import Checks, job
+from plctool.lsp.checks import Checks, Result
 from plctool.lsp.positions import path_of
-from plctool.lsp.project import Project, Snapshot
+from plctool.lsp.project import Project
 from plctool.lsp.published import Published
 from plctool.lsp.session import Place, Refused, Session
 from plctool.lsp.tree import Tree
@@ -82,7 +80,7 @@ class Server(LanguageServer):
     def load(self) -> None:
         """Loads the programs of the folders and has them checked."""
         if self.checks is None:
-            self.checks = Checks(self._in_loop)
+            self.checks = Checks(self._in_loop, self._checked, self._failed)
         self.session.workspace.load_folders()
         for project in self.session.workspace.projects:
             self.check(project, 0)
@@ -126,16 +124,22 @@ class Server(LanguageServer):
         if self.checks is None:
             return
         wait = self.settings.delay if delay is None else delay
-        done = partial(self._checked, project)
-        self.checks.ask(job(project, project.snapshot, done, self._failed, wait))
+        self.checks.ask(project, wait)
 
-    def _checked(self, project: Project, snapshot: Snapshot, found: Sequence[Diagnostic]) -> None:
+    def _checked(self, project: Project, result: Result) -> None:
         assert self.loop is not None
-        self.loop.call_soon_threadsafe(self._publish, project, snapshot, found)
+        self.loop.call_soon_threadsafe(self._publish, project, result)
 
-    def _publish(self, project: Project, snapshot: Snapshot, found: Sequence[Diagnostic]) -> None:
-        if project in self.session.workspace.projects and list(snapshot.sources) == project.sources:
-            self.published.update(project, found, snapshot.sources)
+    def _publish(self, project: Project, result: Result) -> None:
+        sources = result.snapshot.sources
+        if project not in self.session.workspace.projects or list(sources) != project.sources:
+            return
+        if result.files is None:
+            self.published.update(project, result.found, sources)
+            return
+        for source in (source for source in sources if source.path in result.files):
+            found = [d for d in result.found if d.file == source.path]
+            self.published.update_file(project, source.path, found, source)
 
     def _failed(self, message: str) -> None:
         assert self.loop is not None

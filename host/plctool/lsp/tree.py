@@ -32,8 +32,9 @@ class Tree:
         errors: list[int] = []
         tokens: list[Token] = []
         parsed = parse_all(source, lambda offset, code, message: errors.append(offset), tokens=tokens)
+        self.errors = errors
         self.has_errors = bool(errors)
-        self.pragmas = parsed.pragmas
+        self.declarations = parsed.declarations
         self.tokens = tokens if not errors else self._all_tokens(tokens)
         self.items = ItemsOf(source, parsed.declarations, library)
         if errors and before is not None:
@@ -75,7 +76,7 @@ class Tree:
     @cached_property
     def interface(self) -> int:
         """A hash of all that other texts can see of this one: not of bodies, comments and blanks."""
-        bodies = self._bodies
+        bodies = self.bodies
         parts: list[str] = []
         at = 0
         for first, last in bodies:
@@ -85,7 +86,7 @@ class Tree:
         return hash(tuple(parts))
 
     @cached_property
-    def _bodies(self) -> list[tuple[int, int]]:
+    def bodies(self) -> list[tuple[int, int]]:
         """The tokens of statements, from and to before."""
         found: list[tuple[int, int]] = []
         for block in (b for top in self.blocks for b in top.every() if b.kind in UNITS and b.kind != "TYPE"):

@@ -6,7 +6,8 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -115,6 +116,21 @@ class Diagnostics:
         """Heeds the pragmas of a text that turn warnings off."""
         for code, ranges in switched_off(source).items():
             self._muted.setdefault((source.path, code), []).extend(ranges)
+
+    @contextmanager
+    def apart(self, source: Source) -> Iterator[Callable[[], list[Diagnostic]]]:
+        """Collects apart what is found inside the context, about a new text of a file; gives a function that returns
+        it. Afterwards all is as before, but for the pragmas of the text."""
+        before = self._found, self.errors, self._counted, self._unknown, self.incomplete
+        self._found, self.errors, self._counted, self._unknown = {}, 0, 0, set()
+        self.incomplete = set(self.incomplete)
+        for path, code in [key for key in self._muted if key[0] == source.path]:
+            del self._muted[path, code]
+        self.mute(source)
+        try:
+            yield lambda: list(self._found)
+        finally:
+            self._found, self.errors, self._counted, self._unknown, self.incomplete = before
 
     def found_by_reader(self, source: Source) -> None:
         """Takes over what the reader of a file found. Diagrams do not count: all are named, and the rest is checked."""
