@@ -127,8 +127,12 @@ class Editor:
         with self._changed:
             while not condition():
                 left = end - time.monotonic()
-                assert left > 0, f"{what}; have {self.diagnostics} {self.messages}"
+                assert left > 0, f"{what}; have {self._said()[:2000]} {self.messages}"
                 self._changed.wait(left)
+
+    def _said(self) -> str:
+        found = {uri.rpartition("/")[2]: [d["message"] for d in said] for uri, said in self.diagnostics.items() if said}
+        return str(found)
 
     # ---- texts ----
 

@@ -25,7 +25,8 @@ from plctool.lsp.project import Project, Snapshot
 MAX_ERRORS = 10_000  # of a program; the command line stops earlier
 PAUSE = 0.5  # seconds without a key before the whole program is checked
 _STACK = 64 << 20  # bytes for the nesting of a program
-_GARBAGE = 4  # whole checks after which the memory of the old ones is freed
+_IDLE = 2.0  # seconds without a check before memory is freed, which stops all threads for a moment
+_GARBAGE, _MUCH_GARBAGE = 300_000, 3_000_000  # objects made: memory is freed when idle, or at once
 
 
 class Outdated(BaseException):
@@ -88,7 +89,6 @@ class Checks:
         self._outdated = False
         self._ends = False
         self._changed = threading.Condition()
-        self._count = 0
         self._states: WeakKeyDictionary[Project, _State] = WeakKeyDictionary()
         old = threading.stack_size(_STACK)
         try:
@@ -153,7 +153,10 @@ class Checks:
                 if job is not None and job.due <= now:
                     self._running, self._outdated = job.project, False
                     return self._jobs.pop((job.project, job.whole))
-                self._changed.wait(None if job is None else job.due - now)
+                if job is not None:
+                    self._changed.wait(job.due - now)
+                elif not self._changed.wait(_IDLE if gc.get_count()[0] > _GARBAGE else None) and not self._ends:
+                    gc.collect()
         return None
 
     def _later(self, project: Project) -> None:
@@ -191,8 +194,7 @@ class Checks:
             more = [d for source in sources if state.kept for d in state.kept.while_broken(source)]
             return found + [d for d in more if d not in known]
         state.kept = Kept(observer, snapshot.sources, found)
-        self._count += 1
-        if self._count % _GARBAGE == 0:
+        if gc.get_count()[0] > _MUCH_GARBAGE:
             gc.collect()
         return found
 

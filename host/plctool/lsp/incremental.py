@@ -23,7 +23,7 @@ from plctool.compiler.semantics.sfc_statements import statements_of
 from plctool.compiler.semantics.symbols import VarSymbol
 from plctool.compiler.semantics.world import BodyQueue
 from plctool.compiler.syntax import ast
-from plctool.compiler.syntax.diagnostics import Diagnostic
+from plctool.compiler.syntax.diagnostics import MAX_MESSAGE, Diagnostic
 from plctool.lsp.outline import UNITS
 from plctool.lsp.tree import Tree
 
@@ -111,7 +111,9 @@ class Kept:
         if source.pieces or source.findings:
             return None
         before, after = self._tree(source.path), Tree(source)
-        if after.has_errors or before.interface != after.interface or not (_is_plain(before) and _is_plain(after)):
+        if after.has_errors:
+            return self._broken(before.source, after)
+        if before.interface != after.interface or not (_is_plain(before) and _is_plain(after)):
             return None
         old = self._bodies.get(source.path, [])
         decls = _keyed(after.declarations)
@@ -121,7 +123,17 @@ class Kept:
         moved = _Moved(before.source, source)
         found = moved.all(d for d in self._found.get(source.path, ()) if not self._is_of_body(d, before))
         found += self._checked([(scope, decl) for scope, decl in bodies if decl is not None], source, moved)
-        return sorted(dict.fromkeys(found), key=lambda d: (d.line, d.column, d.severity, d.message))
+        return _sorted(found)
+
+    def _broken(self, before: Source, after: Tree) -> list[Diagnostic]:
+        """Returns the syntax errors of a file, and what was found outside of the units that have them."""
+        broken = _broken_lines(after)
+        known = _Moved(before, after.source).all(self._found.get(before.path, ()))
+        found = [d for d in known if not any(first <= d.line <= last for first, last in broken)]
+        for offset, code, message in after.errors:
+            pos = after.source.pos(offset)
+            found.append(Diagnostic(pos.file, pos.line, pos.column, "error", code, message[:MAX_MESSAGE]))
+        return _sorted(found)
 
     def _is_of_body(self, diagnostic: Diagnostic, tree: Tree) -> bool:
         """True for what the check of the bodies of a file reports again."""
@@ -167,6 +179,10 @@ class Kept:
         return [d for d in moved.all(warnings) if not any(first <= d.line <= last for first, last in broken)]
 
 
+def _sorted(found: Iterable[Diagnostic]) -> list[Diagnostic]:
+    return sorted(dict.fromkeys(found), key=lambda d: (d.line, d.column, d.severity, d.message))
+
+
 def _is_plain(tree: Tree) -> bool:
     """True if a text has nothing but units whose bodies are statements."""
     return not any(
@@ -195,7 +211,7 @@ def _unit_at(tree: Tree, diagnostic: Diagnostic) -> object:
 def _broken_lines(tree: Tree) -> list[tuple[int, int]]:
     """The first and last lines of the outermost blocks with syntax errors."""
     found = []
-    for offset in tree.errors:
+    for offset, _, _ in tree.errors:
         token = max(0, bisect_right(tree.starts, offset) - 1)
         near = [b for b in tree.blocks if b.first - 1 <= token <= b.last + 1]
         first = min((tree.tokens[b.first].pos for b in near), default=offset)

@@ -43,6 +43,7 @@ class LibraryNames:
         self._standard: dict[str, Item | None] = {}
         self._imported: dict[str, list[Item]] = {}
         self._of_part: dict[int, ItemsOf] = {}
+        self.used: dict[str, Item] = {}  # by key
 
     def unit(self, key: str) -> Item | None:
         """Returns a unit or global of a library by its case-folded name."""
@@ -116,7 +117,7 @@ class Names:
         self.instances: dict[str, Item] = {}
         self.spaces: dict[str, Item] = {}
         self.others: list[Item] = []
-        self._by_key: dict[str, Item] = {}
+        self._of_libraries: dict[str, Item] = library.used
         self._implementing: dict[str, list[Item]] | None = None
         for tree in trees:
             self._add(tree)
@@ -175,17 +176,27 @@ class Names:
 
     def by_key(self, key: str) -> Item | None:
         """Returns the item that a use is of."""
-        if not self._by_key:
-            for item in self.every():
-                self._by_key.setdefault(item.key, item)
-        return self._by_key.get(key)
+        known = self._of_libraries.get(key)
+        if known is not None:
+            return known
+        parts = key.split(".")
+        for n in range(len(parts), 0, -1):
+            top = self._top.get(".".join(parts[:n]))
+            if top is not None:
+                return _inside(top, parts[n:])
+        return None
+
+    @cached_property
+    def _top(self) -> dict[str, Item]:
+        """The outermost items by their keys."""
+        found = [*self.units.values(), *self.globals.values(), *self.lists.values(), *self.others]
+        found += [item for space in self.spaces.values() for item in (space, *space.inner.values())]
+        return {item.key: item for item in reversed(found)}
 
     def remember(self, item: Item) -> None:
         """Makes an item of a library known by its key."""
         if item.library:
-            if not self._by_key:
-                self.by_key("")
-            self._by_key.setdefault(item.key, item)
+            self._of_libraries.setdefault(item.key, item)
 
     # ---- names ----
 
@@ -412,6 +423,14 @@ class Names:
     def built_in(self) -> Iterable[str]:
         """Returns the functions that the compiler knows itself."""
         return [name for name in built_in_names() if name not in KEYWORDS]
+
+
+def _inside(item: Item | None, names: Sequence[str]) -> Item | None:
+    for name in names:
+        if item is None:
+            return None
+        item = item.inner.get(name) or item.inner.get(f"program {name}")
+    return item
 
 
 def _home(item: Item) -> Item:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import sys
 from collections.abc import Callable, Sequence
@@ -462,6 +463,8 @@ def serve() -> None:
     """Serves an editor on the standard input and output until it says goodbye."""
     logging.basicConfig(level=logging.ERROR, stream=sys.stderr)
     sys.setswitchinterval(_SWITCH_INTERVAL)
+    gc.disable()  # `Checks` frees memory when nothing is to be done
+    gc.freeze()
     output = sys.stdout.buffer
     sys.stdout = sys.stderr  # nothing else may be written between the messages
     make_server().start_io(stdout=output)

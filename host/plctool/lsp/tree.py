@@ -29,9 +29,9 @@ class Tree:
 
     def __init__(self, source: Source, before: Tree | None = None, library: str = "") -> None:
         self.source = source
-        errors: list[int] = []
+        errors: list[tuple[int, str, str]] = []
         tokens: list[Token] = []
-        parsed = parse_all(source, lambda offset, code, message: errors.append(offset), tokens=tokens)
+        parsed = parse_all(source, lambda *error: errors.append(error), tokens=tokens)
         self.errors = errors
         self.has_errors = bool(errors)
         self.declarations = parsed.declarations
