@@ -14,6 +14,7 @@ from plctool.files import Pos, read_regular
 from plctool.lsp import positions
 from plctool.lsp.session import Session
 
+SOURCE = "plctool"  # of diagnostics
 MAX_SHOWN = 1000  # diagnostics of a file
 _WORD = re.compile(r"\w+|:=|=>|<=|>=|<>|\*\*|'[^'\n]*'|\S")
 _MAX_TEXT = 8 << 20
@@ -79,7 +80,7 @@ class Published:
             diagnostic.message,
             severities.Error if diagnostic.severity == "error" else severities.Warning,
             diagnostic.code,
-            source="plctool",
+            source=SOURCE,
             tags=[lsp.DiagnosticTag.Unnecessary] if unused else None,
         )
 

@@ -15,11 +15,11 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 
-from plctool.lsp import completion, formatting, hierarchy, hover, navigation, symbols
+from plctool.lsp import actions, completion, formatting, hierarchy, hover, navigation, symbols
 from plctool.lsp.checks import Checks, Result
 from plctool.lsp.positions import path_of
 from plctool.lsp.project import Project
-from plctool.lsp.published import Published
+from plctool.lsp.published import SOURCE, Published
 from plctool.lsp.session import Place, Refused, Session
 from plctool.lsp.tree import Tree
 from plctool.version import plctool_version
@@ -358,6 +358,15 @@ def _add_words(server: Server) -> None:
             return None if place is None else navigation.rename(session, place, params.new_name)
         except Refused as error:
             raise refuse(error) from None
+
+    @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions([lsp.CodeActionKind.QuickFix]))
+    def code_actions(params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
+        found = []
+        for diagnostic in params.context.diagnostics:
+            place = session.place(params.text_document.uri, diagnostic.range.start)
+            if diagnostic.source == SOURCE and place is not None:
+                found += actions.code_actions(session, place, diagnostic)
+        return found
 
     @server.feature(lsp.TEXT_DOCUMENT_SELECTION_RANGE)
     def selection(params: lsp.SelectionRangeParams) -> list[lsp.SelectionRange]:
