@@ -22,7 +22,7 @@ class RequestFailed(Exception):
 
 
 class Editor:
-    """A session with a server that works on a folder. Positions in texts are marked by | where a test has them."""
+    """A session with a server that works on a folder. A place in a file is given by what stands before and after it."""
 
     def __init__(self, folder: Path, *, settings: Json | None = None, capabilities: Json | None = None) -> None:
         self.folder = folder
@@ -134,7 +134,7 @@ class Editor:
         found = {uri.rpartition("/")[2]: [d["message"] for d in said] for uri, said in self.diagnostics.items() if said}
         return str(found)
 
-    # ---- texts ----
+    # ---- open files ----
 
     def uri(self, name: str) -> str:
         """Returns the URI of a file of the folder."""

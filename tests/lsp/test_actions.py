@@ -32,8 +32,8 @@ END_FUNCTION_BLOCK
 def program(body: str, declarations: str = "") -> str:
     """Returns a program with all kinds of variables."""
     return (
-        f"{HEAD}PROGRAM Main\nVAR\n    i : INT;\n    r : REAL;\n    b : BOOL;\n    c : Color;\n    l : Level;\n    s : STRING;"
-        f"\n    motor : Motor;\n    lt : LTIME;\n{declarations}END_VAR\n{body}\nEND_PROGRAM\n"
+        f"{HEAD}PROGRAM Main\nVAR\n    i : INT;\n    r : REAL;\n    b : BOOL;\n    c : Color;\n    l : Level;"
+        f"\n    s : STRING;\n    motor : Motor;\n    lt : LTIME;\n{declarations}END_VAR\n{body}\nEND_PROGRAM\n"
     )
 
 

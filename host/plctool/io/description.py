@@ -96,14 +96,20 @@ def _device_file(path: Path, made: Description) -> DeviceFile | None:
 
 def load_device(path: Path) -> tuple[DeviceFile | None, Mistakes, str]:
     """A device file with what is wrong with it, and its text. Raises UsageError if it cannot be read."""
-    mistakes, text = Mistakes(), read_utf8(path, "io")
+    text = read_utf8(path, "io")
+    return *device_in(str(path), text), text
+
+
+def device_in(path: str, text: str) -> tuple[DeviceFile | None, Mistakes]:
+    """Returns what a text says of a device, and what is wrong with it."""
+    mistakes = Mistakes()
     try:
-        device = read_device_file(TomlText(str(path), text), mistakes)
+        device = read_device_file(TomlText(path, text), mistakes)
     except BadToml as error:
         mistakes.error(error.pos, error.message)
-        return None, mistakes, text
+        return None, mistakes
     check_names(device, mistakes)
-    return device, mistakes, text
+    return device, mistakes
 
 
 def _check_taken(connectors: Sequence[Connector], mistakes: Mistakes) -> set[str]:

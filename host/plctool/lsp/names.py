@@ -1,4 +1,4 @@
-"""What names stand for in all texts of a project, its libraries and the standard library."""
+"""What names stand for in all sources of a project, its libraries and the standard library."""
 
 from __future__ import annotations
 

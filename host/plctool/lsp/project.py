@@ -57,7 +57,7 @@ class Snapshot:
 
 
 class Project:
-    """`named`: what `plctool check` would be given. `texts`: the files that the editor has open, by path."""
+    """`named`: what `plctool check` would be given. `texts`: what the editor has open, by path."""
 
     def __init__(self, named: Sequence[Path], texts: Mapping[str, str]) -> None:
         self.named = list(named)
@@ -176,7 +176,13 @@ class Project:
         """Returns all that a check needs."""
         texts = {path: text for path, text in self._texts.items() if path.endswith(".toml")}
         return Snapshot(
-            self.sources, self.files, self.libraries, self.warnings, self.dialect, texts, tuple(self.mistakes)
+            self.sources,
+            self.files,
+            self.libraries,
+            self.warnings,
+            self.dialect,
+            texts,
+            tuple(d for d in self.mistakes if d.file not in self._texts),  # of open files they are shown at once
         )
 
     # ---- trees ----
@@ -223,7 +229,7 @@ class Project:
         return walk
 
     def walks(self) -> Iterator[Walk]:
-        """Returns what the words of all texts stand for."""
+        """Returns what all words of the program stand for."""
         for tree in self.trees:
             yield self.walk(tree)
 

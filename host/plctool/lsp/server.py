@@ -15,7 +15,8 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 
-from plctool.lsp import actions, completion, formatting, hierarchy, hover, navigation, symbols
+from plctool.compiler.base.source import Source
+from plctool.lsp import actions, completion, formatting, hierarchy, hover, navigation, symbols, toml_files
 from plctool.lsp.checks import Checks, Result
 from plctool.lsp.positions import path_of
 from plctool.lsp.project import Project
@@ -146,7 +147,7 @@ class Server(LanguageServer):
         assert self.loop is not None
         self.loop.call_soon_threadsafe(self.show, message)
 
-    # ---- texts ----
+    # ---- open files ----
 
     def opened(self, uri: str, text: str) -> None:
         """Takes over a text from the editor."""
@@ -154,6 +155,7 @@ class Server(LanguageServer):
         workspace = self.session.workspace
         known = {id(p) for p in workspace.projects}
         workspace.texts[path] = text
+        self._look_at(path, text)
         project = workspace.project_of(path)
         self.tell()
         if project is not None:
@@ -165,16 +167,25 @@ class Server(LanguageServer):
         """Takes over a change."""
         path = path_of(uri)
         self.session.workspace.texts[path] = text
+        self._look_at(path, text)
         for project in self.session.workspace.projects_with(path):
             project.change(path)
             if self.settings.diagnostics == "typing":
                 self.check(project)
+
+    def _look_at(self, path: str, text: str) -> None:
+        """Shows at once what is wrong with a file of settings."""
+        if toml_files.is_toml(path):
+            found = toml_files.diagnostics(path, text)
+            self.published.update_file(path, path, found, Source(path, text))
 
     def closed(self, uri: str) -> None:
         """Goes back to what the file says."""
         path = path_of(uri)
         workspace = self.session.workspace
         workspace.texts.pop(path, None)
+        if toml_files.is_toml(path):
+            self.published.forget(path)
         for project in workspace.projects_with(path):
             project.change(path)
             self.check(project, 0)
@@ -301,8 +312,13 @@ def _add_words(server: Server) -> None:
         place = server.place(params)
         return None if place is None else hover.signature(session, place)
 
-    @server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions([".", "#"], resolve_provider=True))
+    @server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions([".", "#", "[", '"'], resolve_provider=True))
     def complete(params: lsp.CompletionParams) -> lsp.CompletionList | None:
+        path = path_of(params.text_document.uri)
+        if toml_files.is_toml(path):
+            projects = session.workspace.projects_with(path)
+            names = projects[0].names if projects else None
+            return toml_files.completion(path, server.text_of(params.text_document.uri), params.position, names)
         place = server.place(params)
         return None if place is None else completion.completion(session, place)
 

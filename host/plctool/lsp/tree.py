@@ -75,7 +75,7 @@ class Tree:
 
     @cached_property
     def interface(self) -> int:
-        """A hash of all that other texts can see of this one: not of bodies, comments and blanks."""
+        """A hash of all that other sources can see of this one: not of bodies, comments and blanks."""
         bodies = self.bodies
         parts: list[str] = []
         at = 0

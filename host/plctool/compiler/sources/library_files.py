@@ -110,6 +110,11 @@ def read_library(path: Path) -> LibraryFiles:
     else:
         check_inside(path / LIBRARY_FILE, path)
         text = read_utf8(path / LIBRARY_FILE, "bad-library")
+    return library_in(path, text)
+
+
+def library_in(path: Path, text: str) -> LibraryFiles:
+    """The same for the text of its library.toml. Raises CompileError."""
     return read_checked(str(path / LIBRARY_FILE), text, LIBRARY_FILE, lambda table: _read(path, text, table))
 
 

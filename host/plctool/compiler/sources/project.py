@@ -63,7 +63,12 @@ class Project:
 
 def read_project(file: Path) -> Project:
     """Reads a project file. Raises CompileError for mistakes in it, UsageError if it cannot be read."""
-    return read_checked(str(file), read_utf8(file, "bad-project"), PROJECT_FILE, lambda table: _project(file, table))
+    return project_in(file, read_utf8(file, "bad-project"))
+
+
+def project_in(file: Path, text: str) -> Project:
+    """The same for a text. Raises CompileError."""
+    return read_checked(str(file), text, PROJECT_FILE, lambda table: _project(file, table))
 
 
 def _project(file: Path, table: Table) -> Project:
