@@ -35,7 +35,7 @@ class Editor:
         self._versions: dict[str, int] = {}
         self.texts: dict[str, str] = {}
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "plctool", "lsp"],
+            [sys.executable, "-P", "-m", "plctool", "lsp"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             cwd=folder,

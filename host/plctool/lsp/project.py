@@ -57,12 +57,12 @@ class Snapshot:
 
 
 class Project:
-    """`named`: what `plctool check` would be given. `texts`: what the editor has open, by path."""
+    """`named`: what `plctool check` would be given. `open_files`: the text of each open file, by path."""
 
-    def __init__(self, named: Sequence[Path], texts: Mapping[str, str]) -> None:
+    def __init__(self, named: Sequence[Path], open_files: Mapping[str, str]) -> None:
         self.named = list(named)
         self.version = 0
-        self._texts = texts
+        self._open_files = open_files
         self._read: dict[Path, list[Source]] = {}
         self._changed: set[Path] = set()
         self._sources: list[Source] | None = None
@@ -149,7 +149,7 @@ class Project:
         self._walks.clear()
 
     def _content(self, path: Path) -> list[Source]:
-        text = self._texts.get(str(path))
+        text = self._open_files.get(str(path))
         try:
             if text is None:
                 data = read_regular(path, MAX_FILE)
@@ -174,7 +174,7 @@ class Project:
 
     def snapshot(self) -> Snapshot:
         """Returns all that a check needs."""
-        texts = {path: text for path, text in self._texts.items() if path.endswith(".toml")}
+        texts = {path: text for path, text in self._open_files.items() if path.endswith(".toml")}
         return Snapshot(
             self.sources,
             self.files,
@@ -182,7 +182,7 @@ class Project:
             self.warnings,
             self.dialect,
             texts,
-            tuple(d for d in self.mistakes if d.file not in self._texts),  # of open files they are shown at once
+            tuple(d for d in self.mistakes if d.file not in self._open_files),  # of open files they are shown at once
         )
 
     # ---- trees ----

@@ -154,7 +154,7 @@ class Server(LanguageServer):
         path = path_of(uri)
         workspace = self.session.workspace
         known = {id(p) for p in workspace.projects}
-        workspace.texts[path] = text
+        workspace.open_files[path] = text
         self._look_at(path, text)
         project = workspace.project_of(path)
         self.tell()
@@ -166,7 +166,7 @@ class Server(LanguageServer):
     def changed(self, uri: str, text: str) -> None:
         """Takes over a change."""
         path = path_of(uri)
-        self.session.workspace.texts[path] = text
+        self.session.workspace.open_files[path] = text
         self._look_at(path, text)
         for project in self.session.workspace.projects_with(path):
             project.change(path)
@@ -183,7 +183,7 @@ class Server(LanguageServer):
         """Goes back to what the file says."""
         path = path_of(uri)
         workspace = self.session.workspace
-        workspace.texts.pop(path, None)
+        workspace.open_files.pop(path, None)
         if toml_files.is_toml(path):
             self.published.forget(path)
         for project in workspace.projects_with(path):

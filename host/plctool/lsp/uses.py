@@ -23,6 +23,9 @@ _UNIT_ENDS = frozenset(
 )  # fmt: skip
 
 
+_OF_TESTS = ("TEST", "SETUP", "TEARDOWN")
+
+
 @dataclass(frozen=True, slots=True)
 class Use:
     """A word that stands for an item. `declares`: it is its declaration; `writes`: it gets a value; `calls`: it is
@@ -113,6 +116,10 @@ class Walk:
                 self._word(token, tokens[at + 1].type if at + 1 < len(tokens) else "")
             elif kind == "TYPED":
                 self._typed(token)
+            elif kind in ("STRING", *_OF_TESTS) and (test := self.tree.items.declared.get(token.pos)) is not None:
+                if kind in _OF_TESTS:
+                    self._begin_unit(kind)
+                self.units[:] = [test]
             elif kind in ("NUMBER", "STRING", "TRUE", "FALSE", "DIRECT", "NULL"):
                 self._argument(token)
                 if not (kind == "NUMBER" and self._after_dot):

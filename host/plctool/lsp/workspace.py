@@ -18,11 +18,11 @@ _LEFT_OUT = frozenset(("node_modules", "__pycache__", "venv"))
 
 
 class Workspace:
-    """`texts`: what the editor has open, by path."""
+    """`open_files`: the text of each open file, by path."""
 
     def __init__(self, folders: Iterable[str]) -> None:
         self.folders = [Path(folder).absolute() for folder in folders]
-        self.texts: dict[str, str] = {}
+        self.open_files: dict[str, str] = {}
         self.projects: list[Project] = []
         self.messages: list[str] = []
         self._scanned: dict[Path, list[Path] | None] = {}
@@ -32,7 +32,7 @@ class Workspace:
         """Works on other folders from now on."""
         self.folders = [Path(folder).absolute() for folder in folders]
         self._scanned.clear()
-        self.projects = [p for p in self.projects if any(path in p.paths for path in map(Path, self.texts))]
+        self.projects = [p for p in self.projects if any(path in p.paths for path in map(Path, self.open_files))]
 
     def load_folders(self) -> None:
         """Loads the program of each folder that is one as a whole."""
@@ -76,7 +76,7 @@ class Workspace:
         if known is not None:
             return known
         try:
-            project = Project(named, self.texts)
+            project = Project(named, self.open_files)
         except (PlcError, OSError) as error:
             self.messages.append(str(error))
             return None
@@ -128,7 +128,7 @@ class Workspace:
 
     def drop_lonely(self) -> list[Project]:
         """Forgets the programs of single files that are closed; returns them."""
-        open_paths = set(map(Path, self.texts))
+        open_paths = set(map(Path, self.open_files))
         lonely = [
             p
             for p in self.projects
@@ -142,7 +142,7 @@ class Workspace:
         self._scanned.clear()
         changed: list[Project] = []
         for path in paths:
-            if path in self.texts and is_source(path):
+            if path in self.open_files and is_source(path):
                 continue  # the editor's text counts
             for project in self.projects:
                 named = project.named[0]
