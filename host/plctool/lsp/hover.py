@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from lsprotocol import types as lsp
 
 from plctool.compiler.syntax import ast
@@ -13,12 +11,16 @@ from plctool.lsp.names import Names, written
 from plctool.lsp.session import Place, Session
 from plctool.lsp.uses import Site
 
-Value = Callable[[str], str]
-"""Returns the value of a variable of an attached controller, "" if there is none."""
+
+def variable_at(place: Place) -> str:
+    """Returns the name in the controller of the variable at a place; "" if the word is not one."""
+    use, item = place.use(), place.item()
+    is_variable = item is not None and item.kind in (Kind.VARIABLE, Kind.GLOBAL, Kind.FIELD)
+    return _path(place, use.offset) if use is not None and is_variable else ""
 
 
-def hover(session: Session, place: Place, value: Value = lambda name: "") -> lsp.Hover | None:
-    """Returns the declaration of the word, its comment, its type and address, and its value in the controller."""
+def hover(session: Session, place: Place, value: str = "") -> lsp.Hover | None:
+    """Returns the declaration of the word, its comment, its type and address. `value`: what is said of its value."""
     use = place.use()
     names = place.project.names
     item = None if use is None else names.by_key(use.key)
@@ -29,9 +31,8 @@ def hover(session: Session, place: Place, value: Value = lambda name: "") -> lsp
         parts.append(_plain(comment))
     if facts := _facts(item, names):
         parts.append(_plain("\n".join(facts)))
-    path = _path(place, use.offset) if item.kind in (Kind.VARIABLE, Kind.GLOBAL, Kind.FIELD) else ""
-    if path and (shown := value(path)):
-        parts.append(f"`{path} = {shown}`")
+    if value:
+        parts.append(value)
     text = "\n\n".join(parts)
     found = session.range(place.tree.source, use.offset, use.length)
     return lsp.Hover(lsp.MarkupContent(lsp.MarkupKind.Markdown, text), found)

@@ -18,6 +18,7 @@ from pygls.lsp.server import LanguageServer
 from plctool.compiler.base.source import Source
 from plctool.lsp import actions, completion, formatting, hierarchy, hover, navigation, symbols, toml_files
 from plctool.lsp.checks import Checks, Result
+from plctool.lsp.live import PATIENCE, Live
 from plctool.lsp.positions import path_of
 from plctool.lsp.project import Project
 from plctool.lsp.published import SOURCE, Published
@@ -32,10 +33,12 @@ _SECTION = "plctool"  # of the editor's settings
 
 @dataclass
 class Settings:
-    """What the editor may say. `diagnostics`: typing or save; `delay`: seconds from a key to the check."""
+    """What the editor may say. `diagnostics`: typing or save; `delay`: seconds from a key to the check; `link`: of the
+    controller whose values are shown."""
 
     diagnostics: str = "typing"
     delay: float = 0.15
+    link: str = ""
 
     def take(self, said: object) -> None:
         """Takes over what is valid."""
@@ -46,6 +49,8 @@ class Settings:
         delay = said.get("delay")
         if isinstance(delay, int | float) and 0 <= delay <= 10_000:
             self.delay = delay / 1000
+        if isinstance(link := said.get("link"), str):
+            self.link = link
 
 
 class Server(LanguageServer):
@@ -58,6 +63,7 @@ class Server(LanguageServer):
         self.published = Published(self.session, self.text_document_publish_diagnostics)
         self.loop: asyncio.AbstractEventLoop | None = None
         self.checks: Checks | None = None
+        self.live: Live | None = None
         self._told: set[str] = set()
         self.has_configuration = False
 
@@ -88,8 +94,27 @@ class Server(LanguageServer):
             self.check(project, 0)
         self.tell()
 
+    def attach(self) -> None:
+        """Reads values from the controller that the settings name, from now on."""
+        link = self.settings.link
+        if self.live is not None and self.live.link != link:
+            self.live.close()
+            self.live = None
+        if link and self.live is None:
+            self.live = Live(link)
+
+    async def value_of(self, name: str) -> str:
+        """Returns what is said of a variable's value; "" if the controller takes too long."""
+        if self.live is None:
+            return ""
+        asked = asyncio.wrap_future(self.live.ask(name))
+        done, _ = await asyncio.wait([asked], timeout=PATIENCE)
+        return asked.result() if done else ""
+
     def end(self) -> None:
-        """Ends the thread of checks."""
+        """Ends the threads."""
+        if self.live is not None:
+            self.live.close()
         if self.checks is not None:
             self.checks.stop()
 
@@ -245,6 +270,7 @@ def _add_life(server: Server) -> None:
     async def initialized(params: lsp.InitializedParams) -> None:
         if server.has_configuration:
             await configuration()
+        server.attach()
         server.load()
 
     async def configuration() -> None:
@@ -261,6 +287,7 @@ def _add_life(server: Server) -> None:
             await configuration()
         elif isinstance(params.settings, dict):
             server.settings.take(params.settings.get(_SECTION))
+        server.attach()
 
     @server.feature(lsp.SHUTDOWN)
     def shutdown(*params: object) -> None:
@@ -303,9 +330,16 @@ def _add_words(server: Server) -> None:
     session = server.session
 
     @server.feature(lsp.TEXT_DOCUMENT_HOVER)
-    def hovered(params: lsp.HoverParams) -> lsp.Hover | None:
+    async def hovered(params: lsp.HoverParams) -> lsp.Hover | None:
         place = server.place(params)
-        return None if place is None else hover.hover(session, place)
+        if place is None:
+            return None
+        name = hover.variable_at(place) if server.live is not None else ""
+        shown = hover.hover(session, place)
+        if not name or shown is None:
+            return shown
+        value = await server.value_of(name)
+        return hover.hover(session, place, value)
 
     @server.feature(lsp.TEXT_DOCUMENT_SIGNATURE_HELP, lsp.SignatureHelpOptions(["(", ","]))
     def signature(params: lsp.SignatureHelpParams) -> lsp.SignatureHelp | None:
