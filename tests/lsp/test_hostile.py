@@ -1,4 +1,4 @@
-"""Workspaces that are meant to do harm, or that nobody cleaned up: an answer in bounded time, nothing executed."""
+"""Workspaces that are meant to do harm, or that were never cleaned up: an answer in bounded time, nothing executed."""
 
 from __future__ import annotations
 

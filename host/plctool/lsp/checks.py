@@ -26,7 +26,7 @@ MAX_ERRORS = 10_000  # of a program; the command line stops earlier
 PAUSE = 0.5  # seconds without a key before the whole program is checked
 _STACK = 64 << 20  # bytes for the nesting of a program
 _IDLE = 2.0  # seconds without a check before memory is freed, which stops all threads for a moment
-_GARBAGE, _MUCH_GARBAGE = 300_000, 3_000_000  # objects made: memory is freed when idle, or at once
+_GARBAGE, _MUCH_GARBAGE = 200_000, 600_000  # objects made: memory is freed when idle, or at once
 
 
 class Outdated(BaseException):
@@ -144,6 +144,8 @@ class Checks:
                 with self._changed:
                     self._running = None
             self._done(job.project, result)
+            if gc.get_count()[0] > _MUCH_GARBAGE:
+                gc.collect()
 
     def _next(self) -> _Job | None:
         with self._changed:
@@ -194,8 +196,6 @@ class Checks:
             more = [d for source in sources if state.kept for d in state.kept.while_broken(source)]
             return found + [d for d in more if d not in known]
         state.kept = Kept(observer, snapshot.sources, found)
-        if gc.get_count()[0] > _MUCH_GARBAGE:
-            gc.collect()
         return found
 
 

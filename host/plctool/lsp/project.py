@@ -205,6 +205,7 @@ class Project:
                     tree = Tree(source, by_path.get(source.path))
                 self._trees[id(source)] = tree
                 self._by_path.setdefault(source.path, tree)
+            self._walks = {key: known for key, known in self._walks.items() if key in self._trees}
             self._names = Names(list(self._trees.values()), self._library_names)
             self._interfaces = hash(tuple(tree.interface for tree in self._trees.values()))
         return self._names
@@ -223,9 +224,6 @@ class Project:
             return known[1]
         walk = uses_of(tree, names)
         self._walks[id(tree.source)] = (self._interfaces, walk)
-        if len(self._walks) > 2 * len(self._trees) + 10:
-            live = {id(t.source) for t in self._trees.values()}
-            self._walks = {key: value for key, value in self._walks.items() if key in live}
         return walk
 
     def walks(self) -> Iterator[Walk]:
