@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from plctool.cli import lsp
+from plctool.cli.commands import lsp
 from plctool.cli.main import main
 from plctool.errors import UsageError
 
