@@ -27,6 +27,7 @@ def test_hover_shows_the_value_in_the_controller(tmp_path: Path, monkeypatch: py
     folder.mkdir()
     (folder / "main.st").write_text(MAIN)
     built = compile_sources([folder / "main.st"])
+    cache_path(built.crc).parent.mkdir(parents=True, exist_ok=True)
     built.symbols.save(cache_path(built.crc))
     with Plcrt(tmp_path / "flash.bin", "--tcp", "0") as runtime:
         link = f"tcp:{runtime.tcp}"
