@@ -93,11 +93,12 @@ enum {
     CMPID_CmpFileTransfer = 0x002A,
     CMPID_SimModbus = 0x002B,
     CMPID_CmpForce = 0x002C,
-    CMPID_CmpOperationControl = 0x0034,
     CMPID_CmpTraceMgr = 0x0030,
     CMPID_CmpTraceSrv = 0x0031,
     CMPID_CmpAppBP = 0x0032,
     CMPID_CmpAppBPSrv = 0x0033,
+    CMPID_CmpOperationControl = 0x0034,
+    CMPID_SysMdns = 0x0038,
 };
 
 /* Name of a component, "" when unknown. */

@@ -72,6 +72,7 @@ def device_name(port: str) -> str:
         (["--flash", "f", "--udp=1740"], "192.168.1.5:1741 for one of the ports 1740 to 1743"),
         (["--flash", "f", "--tcp", "host:1"], "--tcp host:1 is not a valid"),
         (["--flash", "f", "--tcp=65536"], "192.168.1.5:11740"),
+        (["--flash", "f", "--mdns"], "give --tcp too"),
         (["--flash", "f", "--metrics", ""], "/run/plcrt/main.prom"),
         (["--flash", "f", "--metrics-every", "0"], "give 1 to 86400"),
         (["--flash", "f", "--metrics-every", "5x"], "--metrics-every 5x"),

@@ -295,13 +295,22 @@ bool PortUdpOpen(const char *text, PORT_REASON *reason)
            open_broadcast(own_address(sockets.source[SYSSOCK_UDP].file), text, reason);
 }
 
-bool PortSockName(SYSSOCK_PURPOSE purpose, char *name, size_t size)
+bool PortSockAddress(SYSSOCK_PURPOSE purpose, SOCKADDRESS *own)
 {
     make_ready();
     if (sockets.source[purpose].file < 0) {
         return false;
     }
-    SOCKADDRESS own = own_address(sockets.source[purpose].file);
+    *own = own_address(sockets.source[purpose].file);
+    return true;
+}
+
+bool PortSockName(SYSSOCK_PURPOSE purpose, char *name, size_t size)
+{
+    SOCKADDRESS own;
+    if (!PortSockAddress(purpose, &own)) {
+        return false;
+    }
     snprintf(name, size, "%u.%u.%u.%u:%u", own.ip >> 24, own.ip >> 16 & 0xFF, own.ip >> 8 & 0xFF, own.ip & 0xFF,
              own.port);
     return true;

@@ -81,7 +81,7 @@ void PortSystemdInit(void)
     notify.watchdog_ms = read_watchdog();
 }
 
-/* ---- what is told ---- */
+/* ---- what is reported ---- */
 
 void PortSystemdReady(void)
 {

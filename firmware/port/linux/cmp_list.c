@@ -33,5 +33,5 @@
 #define HAS_CmpBlkDrvTcp 1
 #define HAS_CmpBlkDrvUdp 1
 #define PORT_SYSTEM(X) X(SysTarget) X(SysLock) X(SysTimer)
-#define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysEvent) X(IoDrvSysfs) PORT_DRIVERS(X)
+#define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysEvent) X(SysMdns) X(IoDrvSysfs) PORT_DRIVERS(X)
 #include "CmpList.h"

@@ -54,6 +54,7 @@ typedef struct {
     MODBUS_TOOL_LINE tunnel;
     char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
     RTS_UI32 event_count;
+    bool mdns;
     const char *metrics;
     RTS_UI32 metrics_s;
     bool alone;
@@ -62,7 +63,7 @@ typedef struct {
 
 static const char usage[] =
     "usage: plcrt --flash FILE [--serial PATH|pty[:LINK]] [--baud N] [--tcp [ADDRESS:]PORT]\n"
-    "             [--udp ADDRESS[:PORT]] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
+    "             [--udp ADDRESS[:PORT]] [--mdns] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
     "             [--tunnel PATH] [--tunnel-unit N] [--tunnel-baud N] [--tunnel-parity even|odd|none] "
     "[--tunnel-drive]\n"
     "             [--board NAME] [--event NAME=PIPE]... [--metrics FILE] [--metrics-every SECONDS]\n"
@@ -78,6 +79,8 @@ static const char usage[] =
     "  --udp PLACE     serves UDP at ADDRESS[:PORT], 127.0.0.1 if no place is given, on port 1740 to 1743, the first "
     "one\n"
     "                  that is free if there is no PORT, and prints where as \"udp: ADDRESS:PORT\"\n"
+    "  --mdns          announces name and TCP port by multicast DNS: plctool scan finds it, --tcp NAME.local reaches "
+    "it\n"
     "  --can PLACE     serves CAN: an interface of the system (can0), an adapter (slcan:/dev/ttyACM0), or with "
     "slcan:pty a\n"
     "                  pseudo terminal, whose name it prints as \"can: /dev/pts/N\"\n"
@@ -176,6 +179,7 @@ enum {
     OPTION_TUNNEL_DRIVE,
     OPTION_METRICS,
     OPTION_METRICS_EVERY,
+    OPTION_MDNS,
 };
 
 /* clang-format off */
@@ -201,6 +205,7 @@ static const struct option long_options[] = {
     {"tunnel-baud", required_argument, NULL, OPTION_TUNNEL_BAUD},
     {"tunnel-parity", required_argument, NULL, OPTION_TUNNEL_PARITY},
     {"tunnel-drive", no_argument, NULL, OPTION_TUNNEL_DRIVE},
+    {"mdns", no_argument, NULL, OPTION_MDNS},
     {"metrics", required_argument, NULL, OPTION_METRICS},
     {"metrics-every", required_argument, NULL, OPTION_METRICS_EVERY},
     {NULL, 0, NULL, 0},
@@ -368,6 +373,9 @@ static void take_option(OPTIONS *options, int option)
     case OPTION_EVENT:
         take_event(options, optarg);
         break;
+    case OPTION_MDNS:
+        options->mdns = true;
+        break;
     case OPTION_METRICS:
         options->metrics = parse_metrics(optarg);
         break;
@@ -439,6 +447,9 @@ static OPTIONS parse_options(int argc, char **argv)
     }
     if (optind < argc) {
         refuse("%s is not an option: see plcrt --help", argv[optind]);
+    }
+    if (options.mdns && options.tcp == NULL) {
+        refuse("--mdns announces where TCP is served: give --tcp too");
     }
     if (options.flash == NULL) {
         refuse("--flash FILE is missing: name the file that stands for the flash memory");
@@ -617,7 +628,7 @@ static bool open_lines(const OPTIONS *options, PORT_REASON *reason)
 {
     return (options->serial == NULL || PortComOpen(options->serial, options->baud, reason)) &&
            (options->tcp == NULL || PortTcpOpen(options->tcp, reason)) &&
-           (options->udp == NULL || PortUdpOpen(options->udp, reason)) &&
+           (options->udp == NULL || PortUdpOpen(options->udp, reason)) && (!options->mdns || PortMdnsOpen(reason)) &&
            (options->can == NULL || PortCanOpen(options->can, &options->can_options, reason)) &&
            (options->tunnel.name == NULL || PortComCheck(options->tunnel.name, &options->tunnel.settings, reason));
 }
@@ -625,6 +636,7 @@ static bool open_lines(const OPTIONS *options, PORT_REASON *reason)
 static void close_all(void)
 {
     PortCanClose();
+    PortMdnsClose();
     PortSockClose();
     PortComClose();
     PortFlashClose();

@@ -148,7 +148,15 @@ bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *numbered);
 bool PortTcpOpen(const char *text, PORT_REASON *reason);
 bool PortUdpOpen(const char *text, PORT_REASON *reason);
 void PortSockClose(void);
+/* The address at which a socket listens, 0 for all of the machine; false if it is not open. */
+bool PortSockAddress(SYSSOCK_PURPOSE purpose, SOCKADDRESS *own);
 /* Where a socket listens, as "127.0.0.1:11740"; false if it is not open. */
 bool PortSockName(SYSSOCK_PURPOSE purpose, char *name, size_t size);
+
+/* ---- SysMdns ---- */
+
+/* Opens the socket on which this device announces its TCP port by multicast DNS. Before CMInit. */
+bool PortMdnsOpen(PORT_REASON *reason);
+void PortMdnsClose(void);
 
 #endif
