@@ -1,13 +1,14 @@
-"""For all groups: controllers, which are processes of a machine that may be busy, get three times as long to reply; and
-how hypothesis works. What it measures by the clock is no failure, so that load cannot decide. A property is tried with
-the same inputs at each run, so that a failure comes from the change that is tested; `make properties` tries new ones
-(--hypothesis-profile=new)."""
+"""For all groups: names are asked for on loopback only; controllers, which are processes of a machine that may be busy,
+get three times as long to reply; and how hypothesis works. What it measures by the clock is no failure, so that load
+cannot decide. A property is tried with the same inputs at each run, so that a failure comes from the change that is
+tested; `make properties` tries new ones (--hypothesis-profile=new)."""
 
 import os
 
 from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("PLCTOOL_PATIENCE", "3")
+os.environ["PLCTOOL_MDNS"] = "127.0.0.1"  # no test asks a network
 settings.register_profile(
     "new",
     deadline=None,

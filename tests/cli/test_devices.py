@@ -13,9 +13,12 @@ from serial.tools.list_ports_common import ListPortInfo
 from small_app import make_application
 
 from plctool.cli import connections
+from plctool.cli.command_line import parser
 from plctool.cli.commands.scan import devices_text
+from plctool.cli.links import all_links, can_interfaces
 from plctool.core import lib
 from plctool.errors import LinkError
+from plctool.link.mdns import Announced
 from plctool.link.transport import BlockTransport
 from plctool.link.transports import Link
 
@@ -575,6 +578,8 @@ def ports(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The serial ports of the machine."""
     names: list[str] = []
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [ListPortInfo(name) for name in names])
+    monkeypatch.setattr("plctool.cli.links.can_interfaces", lambda: [])
+    monkeypatch.setenv("PLCTOOL_MDNS", "off")
     return names
 
 
@@ -602,6 +607,28 @@ def test_scan_without_a_link_on_a_machine_without_serial_ports_exits_3(tool: Any
     done = tool("scan")
     assert (done.status, done.err.count("\n")) == (3, 1)
     assert "no serial ports" in done.err
+
+
+def test_scan_without_a_link_looks_at_can_interfaces_and_what_announces_itself(
+    ports: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ports.append("/dev/ttyS0")
+    monkeypatch.setattr("plctool.cli.links.can_interfaces", lambda: ["can0"])
+    announced = [Announced("press", "press.local", "192.168.1.5:11740")]
+    monkeypatch.setattr("plctool.link.mdns.find_devices", lambda: announced)
+    links = all_links(parser().parse_args(["scan", "--baud", "9600"]))
+    assert [f"{link.scheme}:{link.place}" for link in links] == [
+        "serial:/dev/ttyS0", "can:socketcan:can0", "tcp:192.168.1.5:11740",
+    ]  # fmt: skip
+    assert links[0].options["baud"] == 9600
+
+
+def test_can_interfaces_that_are_up_are_found(tmp_path: Path) -> None:
+    for name, kind, flags in (("can1", "280", "0x40081"), ("can0", "280", "0x40080"), ("eth0", "1", "0x1003")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "type").write_text(f"{kind}\n")
+        (tmp_path / name / "flags").write_text(f"{flags}\n")
+    assert can_interfaces(tmp_path) == ["can1"]
 
 
 # ---- bugs ------------------------------------------------------------------------------------------------------------

@@ -13,10 +13,12 @@ from plctool.cli import output
 from plctool.errors import LinkError, UsageError
 from plctool.files import read_utf8
 from plctool.io.positions import BadToml, TomlText
+from plctool.link import mdns
 from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link, url_of
 from plctool.project import PROJECT_FILE, find_project
 
 VARIABLE = "PLC_LINK"
+_ARPHRD_CAN, _IFF_UP = "280", 1  # linux/if_arp.h, linux/if.h
 
 
 def link_of(args: argparse.Namespace) -> Link:
@@ -46,14 +48,44 @@ def find_link(args: argparse.Namespace) -> Link | None:
     return None if link is None else make_link(link.scheme, link.place, **{**link.options, **_options(args)})
 
 
-def all_serial_ports(args: argparse.Namespace) -> list[Link]:
-    """The serial ports of this machine. Raises LinkError if it has none."""
+def all_links(args: argparse.Namespace) -> list[Link]:
+    """The serial ports and CAN interfaces of this machine, and the controllers that announce themselves on its
+    networks. Raises LinkError if there are none."""
     from serial.tools.list_ports import comports
 
-    links = [make_link("serial", port.device, **_options(args)) for port in sorted(comports())]
+    links = [
+        *(make_link("serial", port.device, **_options_for("serial", args)) for port in sorted(comports())),
+        *(make_link("can", f"socketcan:{name}", **_options_for("can", args)) for name in can_interfaces()),
+        *(make_link("tcp", device.place) for device in mdns.find_devices()),
+    ]
     if not links:
-        raise LinkError("This machine has no serial ports; say where to look, for example --udp 192.168.1.255.", "open")
+        raise LinkError(
+            "This machine has no serial ports and no CAN interface that is up, and no controller announces itself on "
+            f"its networks; say where to look, for example --udp 192.168.1.255.{_hint(mdns.is_available())}",
+            "open",
+        )
     return links
+
+
+def can_interfaces(folder: Path = Path("/sys/class/net")) -> list[str]:
+    """The CAN interfaces of the system that are up."""
+    return sorted(path.parent.name for path in folder.glob("*/type") if _is_can(path.parent))
+
+
+def _is_can(interface: Path) -> bool:
+    try:
+        flags = int((interface / "flags").read_text(), 16)
+        return (interface / "type").read_text().strip() == _ARPHRD_CAN and bool(flags & _IFF_UP)
+    except (OSError, ValueError):
+        return False
+
+
+def _hint(available: bool) -> str:
+    return "" if available else f" To find controllers on the network: {mdns.INSTALL}."
+
+
+def _options_for(scheme: str, args: argparse.Namespace) -> dict[str, Value]:
+    return {name: value for name, value in _options(args).items() if name in TRANSPORTS[scheme].options}
 
 
 def _given(args: argparse.Namespace) -> list[str]:

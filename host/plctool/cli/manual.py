@@ -7,12 +7,14 @@ from collections.abc import Iterable, Iterator
 
 from plctool.cli.commands import GROUPS
 from plctool.cli.links import VARIABLE
+from plctool.link import mdns
 from plctool.project import PROJECT_FILE
 from plctool.version import plctool_version
 
 _ENVIRONMENT = {
     VARIABLE: "the link of commands that name none, such as serial:/dev/ttyS0?baud=9600 or tcp:192.168.1.5",
     "PLCTOOL_GATEWAY": "off: no gateway shares a serial line among tools",
+    mdns.VARIABLE: "the address of this machine on whose network scan looks for controllers; off: on none",
     "PLCTOOL_DEBUG": "1: an internal error shows its traceback",
     "NO_COLOR": "if set, diagnostics have no colours on a terminal either",
 }

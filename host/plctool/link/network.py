@@ -7,6 +7,7 @@ import re
 import socket
 
 from plctool.errors import LinkError, UsageError
+from plctool.link import mdns
 
 _PORTS = 65536
 
@@ -23,10 +24,13 @@ def split_place(text: str) -> tuple[str, int | None]:
 
 
 def find_host(host: str) -> str:
-    """The IPv4 address of a host. Raises LinkError."""
+    """The IPv4 address of a host; that of NAME.local is asked for on the network if the system does not know it. Raises
+    LinkError."""
     try:
         return socket.gethostbyname(host)
     except (OSError, UnicodeError):
+        if address := mdns.find_address(host):
+            return address
         advice = f"write --port {host}" if host.startswith("/dev/") else "check its name, or write its address"
         raise LinkError(f"The host {host} is unknown; {advice}.", "open") from None
 

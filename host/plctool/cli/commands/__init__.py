@@ -26,7 +26,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("test", "unit_tests", "run the unit tests of a program in this process, on a virtual clock"),
         Row("run", "simulation", "run a program in this process, on a virtual clock"),
         Row("flash", "flash", "send an image to a device and start it"),
-        Row("scan", "scan", "list the devices that answer; without a link, on all serial ports"),
+        Row("scan", "scan", "list the devices that answer; without a link, on serial ports, CAN and networks"),
         Row("status", "device", "show the state of the program"),
         Row("start", "device", "start the program"),
         Row("stop", "device", "stop the program"),

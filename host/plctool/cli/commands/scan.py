@@ -11,7 +11,7 @@ from plctool.cli import output
 from plctool.cli.arguments import add_link
 from plctool.cli.connections import gateway_wanted, me
 from plctool.cli.documents import Document
-from plctool.cli.links import all_serial_ports, find_link
+from plctool.cli.links import all_links, find_link
 from plctool.cli.output import table
 from plctool.cli.parser import Parser
 from plctool.errors import LinkError, PlcError
@@ -30,7 +30,7 @@ def scan_arguments(command: Parser) -> None:
 def _scan(args: argparse.Namespace) -> int:
     link = find_link(args)
     if link is None:
-        document = scan_all(all_serial_ports(args), gateway_wanted(args), me(args), args.long)
+        document = scan_all(all_links(args), gateway_wanted(args), me(args), args.long)
     else:
         document = scan(link, gateway_wanted(args), me(args), args.long)
     return output.show(args, document, devices_text)
@@ -60,7 +60,7 @@ def scan_all(links: Sequence[Link], gateway: bool | None, tool: str, long: bool 
     devices = [device for answer in answers if not isinstance(answer, LinkError) for device in answer]
     if not devices:
         reasons = " ".join(answer.message for answer in answers if isinstance(answer, LinkError))
-        raise LinkError(f"No device answers on the serial ports of this machine. {reasons}", "no-answer")
+        raise LinkError(f"No device answers on the links of this machine. {reasons}", "no-answer")
     return {"devices": devices}
 
 
