@@ -8,6 +8,7 @@
 # make linux-arm  plcrt for Linux on 64-bit and 32-bit Arm: build-aarch64-linux, build-armv7-linux
 # make test-linux-arm  the C tests and tests/e2e with these, in QEMU's user mode (ARGS="-k force"); some are in `make test`
 # make test-arm-system  plcrt on Debian's kernel for arm64 in a virtual machine, and a power cut
+# make deb    dist/*.deb for this architecture (ARCHS="amd64 arm64"); make deb-test tries them in a small Debian
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
@@ -33,7 +34,7 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release attack soak fuzz properties habits tree-sitter vsix test-editors all clean
+.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak fuzz properties habits tree-sitter vsix test-editors all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm run-test-arm-system
 VSCODE := editors/vscode
 NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
@@ -121,6 +122,16 @@ wheel: $(VENV)/dev
 run-release: build/build.ninja $(patsubst %,%/build.ninja,$(BOARD_BUILDS)) wheel
 	ninja --quiet -C build
 	$(BIN)/python tests/release.py $(MESON) $(BOARD_BUILDS)
+
+# Packages of this machine's Debian; lintian looks at them.
+deb: build/build.ninja
+	./bootstrap.sh --packages
+	$(MESON) compile -C build plcrt
+	$(BIN)/python packages/make_deb.py --meson $(MESON) --plcrt build/firmware/port/linux/plcrt $(ARCHS:%=--arch %)
+
+# Installed, upgraded and purged in a Debian that debootstrap makes; skipped with the reason where that cannot be.
+deb-test: deb
+	$(BIN)/python tests/deb/run.py build-deb/debian dist/*_$(shell dpkg --print-architecture).deb || [ $$? -eq 77 ]
 
 ATTACKED := build$(if $(findstring --sanitized,$(ARGS)),-sanitized)
 

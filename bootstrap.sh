@@ -6,6 +6,7 @@
 # bootstrap.sh --node   installs Node.js and npm, for `make vsix`
 # bootstrap.sh --editors  the same, Neovim and Emacs, for `make test-editors`
 # bootstrap.sh --fuzz   installs clang, with which libFuzzer runs the fuzz targets
+# bootstrap.sh --packages  installs what makes and tries Debian packages
 #
 # Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the others what
 # will be left out.
@@ -56,6 +57,15 @@ fi
 if [ "$1" = --fuzz ]; then
     install clang libclang-rt-dev llvm ||
         echo "libFuzzer is left out; for it: sudo apt-get install clang libclang-rt-dev llvm" >&2
+    exit 0
+fi
+
+if [ "$1" = --packages ]; then
+    set --
+    command -v dh >/dev/null || set -- "$@" debhelper dpkg-dev fakeroot
+    command -v lintian >/dev/null || set -- "$@" lintian
+    command -v debootstrap >/dev/null || set -- "$@" debootstrap
+    [ $# = 0 ] || install "$@" || echo "Packages need: sudo apt-get install $*" >&2
     exit 0
 fi
 

@@ -18,7 +18,7 @@ enum {
     MDNS_LABEL_SIZE = 64, /* a label of a name, with NUL */
     MDNS_TEXT_SIZE = 128, /* a property "key=value", with NUL */
     MDNS_TEXTS = 4,
-    MDNS_REPLY_SIZE = 1300, /* the longest reply: five records with their names and the texts, and a question */
+    MDNS_REPLY_SIZE = 1300, /* the longest reply: five records with names and properties, and a question */
     MDNS_QUERY_SIZE = 1500, /* longer ones are ignored */
 };
 
