@@ -578,7 +578,7 @@ def ports(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The serial ports of the machine."""
     names: list[str] = []
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [ListPortInfo(name) for name in names])
-    monkeypatch.setattr("plctool.cli.links.can_interfaces", lambda: [])
+    monkeypatch.setattr("plctool.cli.links.can_interfaces", list)
     monkeypatch.setenv("PLCTOOL_MDNS", "off")
     return names
 
