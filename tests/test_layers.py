@@ -23,7 +23,7 @@ FLOORS = (
     ("link",),
     ("canopen", "gateway"),
     ("controller", "compiler", "sim_io"),
-    ("fmt",),
+    ("doc", "fmt"),
     ("sim_functions", "sim_worker"),
     ("device", "sim"),
     ("", "controller_documents", "dump_file", "sim_plant"),

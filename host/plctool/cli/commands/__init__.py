@@ -42,7 +42,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
     ),
     "programs and images": (
         Row("fmt", "fmt", "format Structured Text: one style, the program stays the same"),
-        Row("lsp", "lsp", "serve an editor: diagnostics, completion, hover and more (Language Server Protocol)"),
+        Row("doc", "doc", "write pages of a library or program from its comments, with diagrams"),
         Row("symbols", "images", "list the variables of an image with their types"),
         Row("info", "images", "describe an image, or the programs in a .bin or .hex of 'plctool image'"),
         Row("image", "images", "write what a production programmer burns: a flash with its program"),
@@ -73,7 +73,10 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("io", "io", "show and check what is connected to the inputs and outputs"),
         Row("canopen", "canopen", "find, set up and watch CANopen devices; check EDS files"),
     ),
-    "editors": (Row("dap", "debug", "be the debug adapter of an editor, at the standard input and output"),),
+    "editors": (
+        Row("lsp", "lsp", "serve an editor: diagnostics, completion, hover and more (Language Server Protocol)"),
+        Row("dap", "debug", "be the debug adapter of an editor, at the standard input and output"),
+    ),
     "plctool itself": (
         Row("demo", "about", "run a demonstration of all of it on this machine"),
         Row("completion", "about", "print the script that makes a shell complete this command"),
