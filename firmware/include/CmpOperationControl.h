@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Manual 3.3.9. A program sets the members of PlcOperationControlInstance, a variable of the library. They count while
- * the application runs: one that is stopped or has failed forbids nothing, so it locks nobody out. Starting and a
+ * the application runs: one that is stopped or has failed forbids nothing, so the device stays open. Starting and a
  * reset to the origin are never forbidden; nor is what a component of the device does itself.
  */
 #ifndef CMPOPERATIONCONTROL_H

@@ -42,7 +42,7 @@ typedef struct {
     RTS_UI64 area[APP_AREA_COUNT][FAKE_AREA_SIZE / 8];
     RTS_UI32 area_size[APP_AREA_COUNT];
     RTS_RESULT control_result;
-    RTS_UI32 forbidden; /* by the program: bits 1 << OPERATION_* */
+    RTS_UI32 forbidden;  /* by the program: bits 1 << OPERATION_* */
     RTS_UI32 control_ms; /* how long start, stop and reset take */
     RTS_UI32 starts;
     RTS_UI32 stops;

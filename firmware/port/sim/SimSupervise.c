@@ -50,8 +50,8 @@ static void look(RTS_UI32 index, SEEN *seen)
     RTS_UI32 runtime = SysAtomicLoad(&supervisor.runtimes);
     IEC_GUARD guard = {0};
 
-    if (!IecTaskReadGuard(index, &guard) || AppBpIsHalted() || runtime != seen->runtime || guard.serial != seen->serial ||
-        guard.start_ns != seen->start_ns) {
+    if (!IecTaskReadGuard(index, &guard) || AppBpIsHalted() || runtime != seen->runtime ||
+        guard.serial != seen->serial || guard.start_ns != seen->start_ns) {
         *seen = (SEEN){runtime, guard.serial, guard.start_ns, processor_ms()};
     } else if (processor_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms)) {
         SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);

@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpOperationControl.h"
 #include "CmpPackets.h"
 #include "CmpSrv.h"
 
@@ -114,7 +115,8 @@ static RTS_RESULT set(SRV_REQUEST *request, BTAG_WRITER *reply)
     read_record((const BP_RECORD *)record.data, &breakpoint);
     if (breakpoint.condition.place.pointers > PLACE_POINTERS)
         return reply_result(reply, ERR_PARAMETER);
-    return reply_result(reply, AppBpSet(&breakpoint));
+    result = OperationMay(OPERATION_BP);
+    return reply_result(reply, result == ERR_OK ? AppBpSet(&breakpoint) : result);
 }
 
 /* One, or without an offset all. */
@@ -194,9 +196,11 @@ static RTS_RESULT go_on(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 static RTS_RESULT pause_tasks(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
+    RTS_RESULT result = OperationMay(OPERATION_BP);
+
     RTS_UNUSED(request);
     AppBpAlive();
-    return reply_result(reply, AppBpPause());
+    return reply_result(reply, result == ERR_OK ? AppBpPause() : result);
 }
 
 /* ---- the stack ---- */
