@@ -5,7 +5,7 @@
  *
  * Shared by the linux and the sim port. 64-bit processors need none.
  */
-#if defined(__arm__)
+#if defined(__arm__) && defined(__linux__)
 #include "../baremetal/common/CmpCompilerCalls.h"
 
 #define COMPILER_CALLS(X) X(CmpIntCalls) X(CmpRealCalls) X(CmpLrealCalls)

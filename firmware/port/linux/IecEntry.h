@@ -8,7 +8,7 @@
 #ifndef IECENTRY_H
 #define IECENTRY_H
 
-#if defined(__arm__)
+#if defined(__arm__) && defined(__linux__)
 #include "../baremetal/common/IecCall.h"
 
 #define APP_ENTRY_MODE_BIT 1

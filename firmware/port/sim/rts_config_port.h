@@ -34,7 +34,9 @@
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */
 #define TRACE_BUFFER (1024 * 1024)
 #endif
+#ifndef BP_MAX /* none in the C tests in QEMU, which run IEC code as C */
 #define BP_MAX 128
+#endif
 #define BP_HOLDS_TASKS 0
 #define BP_ALIVE_MS 0 /* its time does not go on by itself */
 #define IEC_LATENESS 1
