@@ -104,20 +104,7 @@ RTS_RESULT AppBpPause(void);
 RTS_UI8 *AppBpGetStack(RTS_UI32 distance, RTS_UI32 size);
 
 #ifndef RTS_CFFI
-#if BP_MAX > 0
-/* ---- from CmpIecTask ---- */
-
-/* The tasks are to be stopped: what is halted goes on. */
-void AppBpTasksStop(void);
-/* They will be started. */
-void AppBpTasksStart(void);
-#else
-#define AppBpTasksStop() ((void)0)
-#define AppBpTasksStart() ((void)0)
-#endif
-
 RTS_RESULT CmpAppBP_Hook(CMP_HOOK hook);
-RTS_RESULT CmpAppBPSrv_Hook(CMP_HOOK hook);
 #endif
 
 #endif

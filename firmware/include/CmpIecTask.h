@@ -33,6 +33,15 @@ void IecTaskRunOnce(void);
 RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
 
 #ifndef RTS_CFFI
+/* With BP_MAX: is told before tasks are started, and when they are to be stopped, before their cycles are waited for. */
+typedef struct {
+    void (*will_start)(void);
+    void (*stop)(void);
+} IEC_TASK_WATCHER;
+
+/* There is one. From main, before tasks are started. */
+void IecTaskSetWatcher(const IEC_TASK_WATCHER *watcher);
+
 RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook);
 #endif
 

@@ -87,7 +87,6 @@ RTS_RESULT TraceRead(RTS_UI32 id, RTS_UI32 from, RTS_UI8 *data, RTS_UI32 *size, 
 
 #ifndef RTS_CFFI
 RTS_RESULT CmpTraceMgr_Hook(CMP_HOOK hook);
-RTS_RESULT CmpTraceSrv_Hook(CMP_HOOK hook);
 #endif
 
 #endif

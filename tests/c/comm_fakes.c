@@ -10,7 +10,9 @@
 #include <string.h>
 
 #include "../../firmware/src/app/AppLife.h"
+#include "CmpAppBPSrv.h"
 #include "CmpAppSrv.h"
+#include "CmpTraceSrv.h"
 #include "CmpBytes.h"
 #include "CmpBlkDrvCan.h"
 #include "CmpBlkDrvSimpleCom.h"
@@ -188,6 +190,7 @@ const APP_IMAGE *AppGetImage(void)
     static APP_IMAGE image;
 
     memcpy(image.area_size, fakes.area_size, sizeof(image.area_size));
+    image.crc = fakes.status.image_crc;
     return &image;
 }
 

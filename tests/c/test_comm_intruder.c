@@ -418,21 +418,22 @@ static void those_who_are_silent_are_sent_something_when_another_one_finds_no_ch
     CHECK_EQUAL(packages_in(CHANNEL_PROBE_MS), 0);
 }
 
-/* Reads memory, files and traces in other runtimes: groups 0x0F, 8 and their neighbours. */
+/* Reads memory and files in other runtimes: groups 8 and its neighbours. */
 static void there_are_no_services_but_those_of_the_documentation(void)
 {
     start();
     for (RTS_UI16 group = 0; group < L7_REPLY; group++) {
         bool known = group == SG_DEVICE || group == SG_APPLICATION || group == SG_LOG || group == SG_PLCSHELL ||
-                     group == SG_MONITORING2 || (COMM_PASSWORD && group == SG_USERMGR) ||
+                     group == SG_MONITORING2 || (BP_MAX > 0 && group == SG_APPLICATION_BP) ||
+                     (TRACE_BUFFER > 0 && group == SG_TRACE) || (COMM_PASSWORD && group == SG_USERMGR) ||
                      (SRV_OTHER_CLIENTS && group == SG_SETTINGS);
         CHECK(client_request(&client, group, 0xFE, NULL, 0, &answer));
         CHECK_EQUAL(reply_error(&answer), known ? ERR_L7_UNKNOWNCMD : ERR_L7_UNKNOWNCMDGROUP);
     }
 }
 
-static const RTS_UI16 groups[] = {SG_DEVICE,   SG_APPLICATION, SG_LOG,        SG_SETTINGS,
-                                  SG_PLCSHELL, SG_USERMGR,     SG_MONITORING2};
+static const RTS_UI16 groups[] = {SG_DEVICE,      SG_APPLICATION,    SG_LOG,  SG_SETTINGS, SG_PLCSHELL, SG_USERMGR,
+                                  SG_MONITORING2, SG_APPLICATION_BP, SG_TRACE};
 
 static void log_in(void)
 {

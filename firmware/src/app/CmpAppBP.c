@@ -14,6 +14,7 @@
 
 #include "AppLife.h"
 #include "CmpEventMgr.h"
+#include "CmpIecTask.h"
 #include "CmpLog.h"
 #include "IecCycle.h"
 #include "SysAtomic.h"
@@ -595,7 +596,7 @@ RTS_UI8 *AppBpGetStack(RTS_UI32 distance, RTS_UI32 size)
 
 /* ---- tasks stop and start ---- */
 
-void AppBpTasksStop(void)
+static void tasks_stop(void)
 {
     RTS_UI32 lock = SysLockEnter();
 
@@ -606,7 +607,7 @@ void AppBpTasksStop(void)
     SysDebugWake(&bp.owner);
 }
 
-void AppBpTasksStart(void)
+static void tasks_will_start(void)
 {
     RTS_UI32 lock;
 
@@ -635,8 +636,12 @@ static void reset(void)
 
 RTS_RESULT CmpAppBP_Hook(CMP_HOOK hook)
 {
-    if (hook == CH_INIT)
+    static const IEC_TASK_WATCHER watcher = {tasks_will_start, tasks_stop};
+
+    if (hook == CH_INIT) {
         reset();
+        IecTaskSetWatcher(&watcher);
+    }
     if (hook == CH_COMM_CYCLE)
         check_alive();
     if (hook == CH_EXIT_TASKS || hook == CH_EXIT)

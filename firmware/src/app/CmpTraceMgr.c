@@ -14,8 +14,8 @@
 #include <string.h>
 
 #include "../cycle/AppImage.h"
+#include "AppLife.h"
 #include "AppState.h"
-#include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
 #include "CmpEventMgr.h"
 #include "CyclePhases.h"
@@ -357,7 +357,6 @@ static PACKET **link_of(RTS_UI32 id)
 static RTS_RESULT check_config(const TRACE_CONFIG *config, RTS_UI32 size)
 {
     RTS_UI32 samples, before;
-    APP_STATUS status;
 
     if (size < sizeof *config || size != sizeof *config + config->records * sizeof(TRACE_PLACE))
         return ERR_SIZE_MISMATCH;
@@ -366,8 +365,7 @@ static RTS_RESULT check_config(const TRACE_CONFIG *config, RTS_UI32 size)
     if (config->records == 0 || config->records > TRACE_MAX_RECORDS || config->name[sizeof config->name - 1] != '\0' ||
         BytesGet32(config->every) == 0 || (samples != 0 && before >= samples))
         return ERR_PARAMETER;
-    AppGetStatus(&status);
-    if (status.state == AS_NONE || status.image_crc != BytesGet32(config->image_crc))
+    if (AppGetState() == AS_NONE || AppGetImage()->crc != BytesGet32(config->image_crc))
         return ERR_APP_INVALID_DATAID;
     return config->task < IecTaskGetCount() ? ERR_OK : ERR_INVALIDID;
 }

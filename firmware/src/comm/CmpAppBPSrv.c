@@ -5,6 +5,8 @@
  *
  * Each request of a debugger says that it is still there.
  */
+#include "CmpAppBPSrv.h"
+
 #include "CmpAppBP.h"
 
 #if BP_MAX > 0

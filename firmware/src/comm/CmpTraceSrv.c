@@ -5,6 +5,8 @@
  *
  * Requests and replies: docs/protocol.md.
  */
+#include "CmpTraceSrv.h"
+
 #include "CmpTraceMgr.h"
 
 #if TRACE_BUFFER > 0

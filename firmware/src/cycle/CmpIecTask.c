@@ -5,8 +5,8 @@
  */
 #include "CmpIecTask.h"
 
-#include "CmpAppBP.h"
 #include "CmpScheduleTimer.h"
+#include "IecCycle.h"
 #include "SysExcept.h"
 #include "SysTime.h"
 #include "TaskTrigger.h"
@@ -36,9 +36,21 @@ RTS_RESULT IecTaskCreateAll(const CDL_TASK *records, RTS_UI32 count, const IEC_C
     return SchedCreateTasks(records, count, count > 0 ? prototype->area : NULL);
 }
 
+#if BP_MAX > 0
+static const IEC_TASK_WATCHER *watcher;
+
+void IecTaskSetWatcher(const IEC_TASK_WATCHER *of)
+{
+    watcher = of;
+}
+#endif
+
 RTS_RESULT IecTaskStartAll(void)
 {
-    AppBpTasksStart();
+#if BP_MAX > 0
+    if (watcher != NULL)
+        watcher->will_start();
+#endif
     IecCycleStart();
     return SchedStart();
 }
@@ -47,7 +59,10 @@ RTS_RESULT IecTaskStartAll(void)
 RTS_NOINLINE void IecTaskStopAll(void)
 {
     IecCycleStop();
-    AppBpTasksStop();
+#if BP_MAX > 0
+    if (watcher != NULL)
+        watcher->stop();
+#endif
     SchedStop();
     IecCycleCallOff();
 }
