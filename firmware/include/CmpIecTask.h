@@ -33,7 +33,7 @@ void IecTaskRunOnce(void);
 RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
 
 #ifndef RTS_CFFI
-/* With BP_MAX: is told before tasks are started, and when they are to be stopped, before their cycles are waited for. */
+/* With BP_MAX: called before tasks are started, and when they are to be stopped, before their cycles are waited for. */
 typedef struct {
     void (*will_start)(void);
     void (*stop)(void);
