@@ -6,6 +6,8 @@
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H
 
+#define TRACE_BUFFER 0 /* the full configuration has no room for traces in 64 KiB of RAM */
+
 /* A second connection has no room in its 64 KiB. */
 #define COMM_MAX_CLIENTS 1
 
@@ -14,7 +16,7 @@
 /* Nor have all entries of the log, beside files. */
 #ifdef FILE_STORE_FILES
 #undef LOG_MAX_ENTRIES
-#define LOG_MAX_ENTRIES 12
+#define LOG_MAX_ENTRIES 11
 #endif
 
 #include "rts_config_cortexm.h"
