@@ -39,7 +39,10 @@ _LINUX_SOURCES = [
     *(FIRMWARE / "src").glob("comm/*.c"),
     *(s for s in (FIRMWARE / "src/io").glob("*.c") if "Modbus" not in s.name),
     *(s for s in (FIRMWARE / "port/sim").glob("*.c") if s.name not in _OF_PLCTOOL),
-    *(FIRMWARE / "port/linux" / name for name in ("IecStack.c", "IecStackSwitch.S", "SysExcept.c", "SysMem.c")),
+    *(
+        FIRMWARE / "port/linux" / name
+        for name in ("IecStack.c", "IecStackSwitch.S", "SysDebug.c", "SysExcept.c", "SysMem.c")
+    ),
 ]
 _ARM_SOURCES = [FIRMWARE / "port/baremetal/common/CmpCompilerCalls.c", FIRMWARE / "port/baremetal/cortexm/IecCall.c"]
 # Picolibc keeps the clock to itself unless a flag says that there is one.
