@@ -179,12 +179,14 @@ static void changing_services_need_a_login(void)
         {SG_TRACE, SRV_TRACE_DELETE},
         {SG_TRACE, SRV_TRACE_LIST},
         {SG_TRACE, SRV_TRACE_READ},
+#if BP_MAX > 0
         {SG_APPLICATION_BP, SRV_BP_ATTACH},
         {SG_APPLICATION_BP, SRV_BP_SET},
         {SG_APPLICATION_BP, SRV_BP_GO},
         {SG_APPLICATION_BP, SRV_BP_WRITE_STACK},
         {SG_APPLICATION_BP, SRV_BP_READ_STACK},
         {SG_APPLICATION_BP, SRV_BP_TEMPORARY},
+#endif
     };
     static const RTS_UI32 sessions[] = {0, 1, L7_SESSION_INITIAL, 0x80000000, 0xFFFFFFFF};
 
