@@ -6,6 +6,7 @@ import asyncio
 import json
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -14,6 +15,7 @@ from plctool.controller import Controller
 from plctool.errors import PlcError, UsageError
 from plctool.ui.live import Live, Wanted
 from plctool.ui.messages import Request, id_of, parse
+from plctool.ui.operating import ONLY_SHOWS, OperatorPage
 from plctool.ui.variables import Tree
 
 MAX_BROWSERS = 16
@@ -22,11 +24,13 @@ _TOO_MANY = f"{MAX_BROWSERS} pages are open already; close one."
 
 
 class Hub:
-    """All browsers of a page. `publish` gets what the controller's thread has read."""
+    """All browsers of a page. `publish` gets what the controller's thread has read. `page`: that of operators, which
+    limits what browsers may ask for."""
 
-    def __init__(self) -> None:
+    def __init__(self, page: OperatorPage | None = None) -> None:
         self.live: Live  # set before the first browser comes
-        self.topics: dict[str, Any] = {}
+        self.page = page
+        self.topics: dict[str, Any] = {} if page is None else {"page": page.document()}
         self.values: dict[str, Any] = {}
         self.tree: Tree | None = None
         self._browsers: set[Browser] = set()
@@ -72,6 +76,7 @@ class Hub:
             await browser.receive()
         finally:
             self._browsers.discard(browser)
+            browser.release()
             self.changed()
             sending.cancel()
             with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
@@ -90,6 +95,7 @@ class Browser:
         self.news.set()
         self._sent: dict[str, Any] = {}
         self._sent_values: dict[str, Any] = {}
+        self._pressed: set[int] = set()  # buttons of an operators' page
         self._sending = asyncio.Lock()  # replies and news come from two tasks
 
     async def _send(self, message: dict[str, Any]) -> None:
@@ -133,15 +139,43 @@ class Browser:
 
     async def _answer(self, request: Request) -> Any:
         fields = request.fields
+        if self._hub.page is not None:
+            return await self._operators_answer(self._hub.page, request)
         if request.verb == "show":
             return self._show(set(fields["names"]), set(fields["views"]))
         if request.verb == "children":
             return await asyncio.to_thread(self._tree().children, fields["path"], fields["start"])
         if request.verb == "search":
             return await asyncio.to_thread(self._tree().search, fields["text"])
-        result = await asyncio.wrap_future(self._hub.live.do(lambda plc: _OPERATIONS[request.verb](plc, **fields)))
+        if request.verb not in _OPERATIONS:
+            raise UsageError("Only an operators' page has elements; start 'plctool ui' with --page.", "bad-message")
+        return await self._do(lambda plc: _OPERATIONS[request.verb](plc, **fields))
+
+    async def _do(self, job: Callable[[Controller], None]) -> None:
+        await asyncio.wrap_future(self._hub.live.do(job))
         self._hub.changed()  # and what it has changed is read at once
-        return result
+
+    async def _operators_answer(self, page: OperatorPage, request: Request) -> Any:
+        """Refuses everything but showing the variables of the page and operating its elements."""
+        fields = request.fields
+        if request.verb == "operate":
+            return await self._operate(page, fields["element"], fields["text"])
+        if request.verb != "show" or fields["views"] or not page.names.issuperset(fields["names"]):
+            raise UsageError(ONLY_SHOWS, "not-operated")
+        return self._show(set(fields["names"]), set())
+
+    async def _operate(self, page: OperatorPage, element: int, text: str) -> None:
+        if page.holds(element, text):
+            self._pressed.add(element)  # before it is written: the browser may leave in between
+        await self._do(lambda plc: page.operate(plc, element, text))
+        if page.holds(element, text) is False:
+            self._pressed.discard(element)
+
+    def release(self) -> None:
+        """Releases the buttons that are pressed when the browser leaves."""
+        if self._hub.page is not None:
+            for number in self._pressed:
+                self._hub.live.do(partial(self._hub.page.release, number=number))
 
     def _show(self, names: set[str], views: set[str]) -> None:
         self._sent_values = {name: value for name, value in self._sent_values.items() if name in names}

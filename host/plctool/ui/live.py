@@ -221,7 +221,7 @@ class Live:
         if name not in self._known:
             if len(self._known) > 4 * len(self._wanted.names) + 1000:
                 self._known = {}
-            self._known[name] = _resolved(table, name)
+            self._known[name] = shown_symbol(table, name)
         return self._known[name]
 
     # ---- state, tasks, log and devices ----
@@ -291,7 +291,8 @@ class Live:
                     future.set_exception(LinkError("The link to the device is lost; try again when it is back."))
 
 
-def _resolved(table: SymbolTable, name: str) -> Symbol | str:
+def shown_symbol(table: SymbolTable, name: str) -> Symbol | str:
+    """Returns a variable that a page can show, or why it cannot."""
     try:
         symbol = table.resolve(name)
     except UsageError as error:

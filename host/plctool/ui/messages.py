@@ -28,6 +28,7 @@ _FIELDS: dict[str, tuple[str, ...]] = {
     "start": (),
     "stop": (),
     "reset": (),
+    "operate": ("element", "text"),
 }
 
 
@@ -96,4 +97,12 @@ def _views(message: Any, name: str) -> list[str]:
     return values
 
 
-_CHECKS = {"names": _texts, "views": _views, "path": _text, "start": _start, "text": _text, "name": _text}
+_CHECKS = {
+    "names": _texts,
+    "views": _views,
+    "path": _text,
+    "start": _start,
+    "text": _text,
+    "name": _text,
+    "element": _start,
+}

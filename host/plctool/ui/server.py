@@ -12,7 +12,9 @@ from typing import Any, cast
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.routing import Mount, WebSocketRoute
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
@@ -22,6 +24,7 @@ from plctool.ui.access import ADDRESS, App, Guard, new_token
 from plctool.ui.browsers import MAX_BROWSERS, Hub
 from plctool.ui.live import Live, Target
 from plctool.ui.messages import MAX_MESSAGE
+from plctool.ui.operating import OperatorPage
 
 STATIC = Path(__file__).parent / "static"
 MAX_CONNECTIONS = 64 + MAX_BROWSERS
@@ -30,10 +33,15 @@ _START_TIMEOUT = 30.0  # [s]
 
 
 def serve(
-    target: Target, plc: Controller, port: int = 0, announce: Callable[[str], None] = lambda address: None
+    target: Target,
+    plc: Controller,
+    port: int = 0,
+    announce: Callable[[str], None] = lambda address: None,
+    page: OperatorPage | None = None,
 ) -> None:
     """Serves the page of a controller, which `target` has opened, until an exception such as KeyboardInterrupt.
-    `announce` gets its address. Port 0 is one that is free. Raises UsageError if the port is in use."""
+    `announce` gets its address. Port 0 is one that is free. `page`: that of operators, in place of the one with all
+    variables. Raises UsageError if the port is in use."""
     try:
         listening = _listen(port)
     except BaseException:
@@ -41,11 +49,11 @@ def serve(
         raise
     with closing(listening):
         token, port = new_token(), listening.getsockname()[1]
-        page = _Page(target, Guard(_application(hub := Hub()), token, port), hub, listening)
-        with closing(page):
-            page.start()
+        shown = _Page(target, Guard(_application(hub := Hub(page)), token, port), hub, listening)
+        with closing(shown):
+            shown.start()
             announce(f"http://{ADDRESS}:{port}/{token}/")
-            page.live.run(plc)
+            shown.live.run(plc)
 
 
 def _listen(port: int) -> socket.socket:
@@ -63,7 +71,21 @@ def _listen(port: int) -> socket.socket:
 
 def _application(hub: Hub) -> App:
     files = StaticFiles(directory=STATIC, html=True)
-    return cast("App", Starlette(routes=[WebSocketRoute("/live", hub.serve), Mount("/", files)]))
+    own = [] if hub.page is None else _operators_routes(hub.page)
+    return cast("App", Starlette(routes=[WebSocketRoute("/live", hub.serve), *own, Mount("/", files)]))
+
+
+def _operators_routes(page: OperatorPage) -> list[BaseRoute]:
+    async def start(request: Request) -> Response:
+        return FileResponse(STATIC / "page.html")
+
+    async def picture(request: Request) -> Response:
+        found = page.picture(request.path_params["number"])
+        if found is None:
+            return Response(status_code=404)
+        return Response(found.data, media_type=found.media_type)
+
+    return [Route("/", start), Route("/picture/{number:int}", picture)]
 
 
 class _Page:

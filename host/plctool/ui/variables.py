@@ -129,8 +129,8 @@ def row(symbol: Symbol, name: str, label: str) -> Row:
         value=not whole,
         write=writable,
         force=writable and not isinstance(t, StringType),
-        plot=symbol.bit is not None or _is_number(t),
-        choices=_choices(symbol),
+        plot=symbol.bit is not None or is_number(t),
+        choices=choices_of(symbol),
     )
 
 
@@ -142,12 +142,14 @@ def _is_writable(symbol: Symbol) -> bool:
     return True
 
 
-def _is_number(t: Type) -> bool:
+def is_number(t: Type) -> bool:
+    """True for a type whose values a plot can show."""
     base = base_of(t)
     is_enum = isinstance(t, EnumType)
     return not is_enum and isinstance(base, Elementary) and base.kind in (Kind.BOOL, Kind.BIT, Kind.INT, Kind.REAL)
 
 
-def _choices(symbol: Symbol) -> tuple[str, ...]:
+def choices_of(symbol: Symbol) -> tuple[str, ...]:
+    """Returns the names of the values of an enumeration."""
     t = symbol.type
     return tuple(t.values) if isinstance(t, EnumType) and symbol.bit is None else ()

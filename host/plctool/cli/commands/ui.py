@@ -23,7 +23,9 @@ from plctool.project import find_project
 if TYPE_CHECKING:
     from plctool.controller import Controller
     from plctool.device import Plc
+    from plctool.ui.layout import Layout
     from plctool.ui.live import Target
+    from plctool.ui.operating import OperatorPage
 
 
 def ui_arguments(command: Parser) -> None:
@@ -34,6 +36,10 @@ def ui_arguments(command: Parser) -> None:
     command.add_argument(
         "--plant", type=usable_path, metavar="FILE", help="of --sim: what the inputs and outputs are connected to"
     )
+    command.add_argument(
+        "--page", type=usable_path, metavar="FILE",
+        help="show operators the elements that a page.toml lays out, instead of all variables",
+    )  # fmt: skip
     command.add_argument(
         "--port-number",
         type=port_number,
@@ -50,8 +56,10 @@ def _ui(args: argparse.Namespace) -> int:
     check_installed()
     if args.plant is not None and args.image is None:
         raise UsageError("--plant is for --sim; a device has a plant of its own.", "usage")
+    from plctool.ui.layout import read_layout
     from plctool.ui.server import serve
 
+    layout = None if args.page is None else read_layout(args.page)
     if args.image is not None:
         target = simulated_page(program_to_run(args), args.plant)
     else:
@@ -65,8 +73,20 @@ def _ui(args: argparse.Namespace) -> int:
             webbrowser.open(address)
 
     with suppress(KeyboardInterrupt):
-        serve(target, target.open(), args.port_number, announce)
+        plc = target.open()
+        serve(target, plc, args.port_number, announce, None if layout is None else _page_of(plc, layout))
     return EXIT_OK
+
+
+def _page_of(plc: Controller, layout: Layout) -> OperatorPage:
+    """Returns a page for the program of a controller, which is closed if the page does not fit it."""
+    from plctool.ui.operating import operator_page
+
+    try:
+        return operator_page(layout, plc.symbols())
+    except BaseException:
+        plc.close()
+        raise
 
 
 def check_installed() -> None:

@@ -31,16 +31,17 @@ def read_checked(path: str, text: str, what: str, read: Callable[[Table], T]) ->
     except BadToml as error:
         mistakes.error(error.pos, error.message)
     if mistakes.found or made is None:
-        raise _refusal(mistakes.found, path, text)
+        raise errors_at(mistakes.found, path, text)
     return made
 
 
 def error_at(pos: Pos, message: str, text: str) -> UsageError:
     """The same for one mistake, in a file with this text, that is seen from outside."""
-    return _refusal([Mistake(pos, message)], pos.file, text)
+    return errors_at([Mistake(pos, message)], pos.file, text)
 
 
-def _refusal(mistakes: Sequence[Mistake], path: str, text: str) -> UsageError:
+def errors_at(mistakes: Sequence[Mistake], path: str, text: str) -> UsageError:
+    """The same for all mistakes of a file that are found after it was read."""
     found = sorted(mistakes, key=lambda m: (m.pos.line, m.pos.column))
     diagnostics = [Diagnostic(m.pos.file, m.pos.line, m.pos.column, m.severity, "toml", m.message) for m in found]
     return CompileError(diagnostics, [Source(path, text)])

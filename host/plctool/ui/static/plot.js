@@ -1,4 +1,4 @@
-// A trend of the last minute: each variable in a strip of its own, since their units differ.
+// A trend of the last minute, or more: each variable in a strip of its own, since their units differ.
 
 import { element } from "./dom.js";
 
@@ -9,10 +9,10 @@ const COLOURS = ["--plot-1", "--plot-2", "--plot-3", "--plot-4", "--plot-5", "--
 export const MAX_PLOTTED = COLOURS.length;
 
 export class Plot {
-  // `onRemove(name)`: the user does not want to see it any more.
-  constructor(canvas, legend, onRemove) {
-    Object.assign(this, { canvas, legend, onRemove });
-    this.series = new Map(); // name: {points: [[seconds, number]], colour, text}
+  // `onRemove(name)`: the user does not want to see it any more; without it variables stay. `seconds`: that are seen.
+  constructor(canvas, legend, onRemove, seconds = SECONDS) {
+    Object.assign(this, { canvas, legend, onRemove, seconds });
+    this.series = new Map(); // name: {points: [[seconds, number]], colour, text, label, readable}
     this.frame = 0;
   }
 
@@ -20,9 +20,11 @@ export class Plot {
     return new Set(this.series.keys());
   }
 
-  toggle(name) {
+  // Adds or removes a variable. `readable(value)` returns the text of a value in the legend.
+  toggle(name, label = "", readable = ([text]) => text) {
+    const made = { points: [], colour: this.freeColour(), text: "", label: label || name, readable };
     if (this.series.has(name)) this.series.delete(name);
-    else if (this.series.size < MAX_PLOTTED) this.series.set(name, { points: [], colour: this.freeColour(), text: "" });
+    else if (this.series.size < MAX_PLOTTED) this.series.set(name, made);
     this.showLegend();
     this.draw();
   }
@@ -34,12 +36,12 @@ export class Plot {
 
   update(values) {
     const now = performance.now() / 1000;
-    for (const [name, [text, , number]] of Object.entries(values)) {
+    for (const [name, value] of Object.entries(values)) {
       const one = this.series.get(name);
       if (!one) continue;
-      one.text = text;
-      one.value.textContent = text;
-      if (number !== null) one.points.push([now, number]);
+      one.text = value[3] || one.readable(value);
+      one.value.textContent = one.text;
+      if (value[2] !== null) one.points.push([now, value[2]]);
     }
   }
 
@@ -49,12 +51,18 @@ export class Plot {
       const swatch = element("i", "swatch");
       swatch.style.background = `var(${one.colour})`;
       one.value = element("span", "value", one.text);
-      const remove = element("button", "quiet", "×");
-      remove.setAttribute("aria-label", `Remove ${name} from the trend`);
-      remove.onclick = () => this.onRemove(name);
-      this.legend.append(element("li", "", swatch, element("span", "label", name), one.value, remove));
+      const row = element("li", "", swatch, element("span", "label", one.label), one.value);
+      if (this.onRemove) row.append(this.removeButton(name));
+      this.legend.append(row);
     }
     if (!this.series.size) this.legend.append(element("li", "hint", "Choose numbers in the list to see their trend."));
+  }
+
+  removeButton(name) {
+    const remove = element("button", "quiet", "×");
+    remove.setAttribute("aria-label", `Remove ${name} from the trend`);
+    remove.onclick = () => this.onRemove(name);
+    return remove;
   }
 
   // Draws, and again with each frame while there is something to see.
@@ -84,25 +92,26 @@ export class Plot {
     pen.strokeStyle = colours.getPropertyValue("--line");
     pen.fillStyle = colours.getPropertyValue("--dim");
     pen.font = "11px system-ui, sans-serif";
-    for (let seconds = 0; seconds <= SECONDS; seconds += 15) {
-      const x = Math.round(width * (1 - seconds / SECONDS)) + (seconds === SECONDS ? 0.5 : -0.5);
+    for (let quarter = 0; quarter <= 4; quarter++) {
+      const seconds = (this.seconds * quarter) / 4;
+      const x = Math.round(width * (1 - quarter / 4)) + (quarter === 4 ? 0.5 : -0.5);
       pen.beginPath();
       pen.moveTo(x, 0);
       pen.lineTo(x, height - 16);
       pen.stroke();
-      pen.textAlign = seconds === 0 ? "right" : seconds === SECONDS ? "left" : "center";
+      pen.textAlign = quarter === 0 ? "right" : quarter === 4 ? "left" : "center";
       pen.fillText(seconds ? `−${seconds} s` : "now", x, height - 3);
     }
   }
 
   strip(pen, one, now, width, top, colours) {
-    const begin = now - SECONDS;
+    const begin = now - this.seconds;
     while (one.points.length > 1 && one.points[1][0] < begin) one.points.shift();
     const numbers = one.points.map((point) => point[1]);
     if (!numbers.length) return;
     const [low, high] = scale(Math.min(...numbers), Math.max(...numbers));
     const y = (number) => top + 4 + (STRIP - 8) * (1 - (number - low) / (high - low));
-    const x = (seconds) => Math.max(0, (width * (seconds - begin)) / SECONDS);
+    const x = (seconds) => Math.max(0, (width * (seconds - begin)) / this.seconds);
     pen.strokeStyle = colours.getPropertyValue(one.colour);
     pen.lineWidth = 1.75;
     pen.lineJoin = "round";
