@@ -170,6 +170,11 @@ def test_all_mistakes_are_reported_at_once(folder: Path, table: SymbolTable) -> 
     assert ":7:12:" in found
 
 
+@pytest.mark.parametrize("text", ['operate = "yes"\n' + VALUE, "element = 3\n", "\n"])
+def test_a_mistake_is_reported_once(folder: Path, text: str) -> None:
+    assert mistakes(folder, text).count("error:") == 1
+
+
 def test_a_file_that_is_missing_is_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"no\.toml cannot be read: No such file"):
         read_layout(tmp_path / "no.toml")

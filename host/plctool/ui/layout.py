@@ -124,15 +124,15 @@ class _Reader:
     def __init__(self, path: Path, root: Table) -> None:
         self._path = path
         self._root = root
-        self._operates = root.flag("operate") if "operate" in root else None
+        own = root.flag("operate")
+        self._operates = own if "operate" in root else None
         self._columns = _COLUMNS
 
     def layout(self, source: str) -> Layout:
-        self._root.flag("operate")
         title = _words_of(self._root, "title") or ""
         self._columns = self._root.number("columns", 1, MAX_COLUMNS, _COLUMNS) or _COLUMNS
         tables = self._root.tables("element")
-        if not tables:
+        if not self._root.raw("element"):
             self._root.error('a page needs elements: write for example [[element]], kind = "value"')
         if len(tables) > MAX_ELEMENTS:
             self._root.error(f"there are {len(tables)} elements; a page has at most {MAX_ELEMENTS}", "element")
