@@ -132,5 +132,9 @@ def report(line: Callable[..., None]) -> None:
         editor.close()
 
 
-if __name__ == "__main__":
+def main() -> None:
     report(lambda what, figure, beside="": print(f"  {what:<52}{figure:>14}  {beside}", flush=True))
+
+
+if __name__ == "__main__":
+    main()
