@@ -8,6 +8,7 @@
 
 #include "CmpBytes.h"
 #include "CmpChannelServerEmbedded.h"
+#include "CmpOperationControl.h"
 #include "CmpSrv.h"
 #include "comm_client.h"
 #include "comm_fakes.h"
@@ -113,6 +114,22 @@ static void commands_that_change_something_need_the_right_to(void)
     CHECK(strcmp(ask("applist"), "Application\r\n") == 0);
     CHECK_EQUAL(refused, 0);
     CHECK_EQUAL(fakes.starts, 0);
+}
+
+static void what_the_program_forbids_is_not_done(void)
+{
+    setup();
+    fakes.forbidden = 1 << OPERATION_STOP | 1 << OPERATION_RESET;
+    ask("stopprg");
+    CHECK_EQUAL(refused, ERR_OPERATION_DENIED);
+    ask("resetprg");
+    CHECK_EQUAL(refused, ERR_OPERATION_DENIED);
+    ask("resetprgcold");
+    CHECK_EQUAL(refused, ERR_OPERATION_DENIED);
+    ask("reload");
+    CHECK_EQUAL(refused, ERR_OPERATION_DENIED);
+    CHECK_EQUAL(fakes.stops + fakes.resets + fakes.reloads, 0);
+    CHECK(strcmp(ask("startprg"), "startprg: done\r\n") == 0);
 }
 
 static void commands_that_change_something_do_it_once(void)
@@ -226,6 +243,7 @@ int main(void)
     RUN(without_application_it_says_so);
     RUN(the_state_has_its_exception);
     RUN(commands_that_change_something_need_the_right_to);
+    RUN(what_the_program_forbids_is_not_done);
     RUN(commands_that_change_something_do_it_once);
     RUN(an_error_is_said);
     RUN(it_needs_a_login);

@@ -132,15 +132,7 @@ def test_gq_formats_the_file(project: Path, parsers: Path) -> None:
     assert run(project, parsers, script) == ["PROGRAM Main", "VAR", "    x : INT;", "END_VAR", "x := 1;", "END_PROGRAM"]
 
 
-def _has_language_server() -> bool:
-    said = subprocess.run([sys.executable, "-m", "plctool", "--help"], capture_output=True, text=True).stdout
-    return "\n    lsp " in said
-
-
 def test_the_language_server_attaches_and_reports_the_error(project: Path, parsers: Path) -> None:
-    if not _has_language_server():
-        pytest.skip("this plctool has no language server")
-    pytest.importorskip("pygls")
     script = """
     wait(function() return #vim.diagnostic.get(0) > 0 end)
     report(vim.tbl_map(function(one) return { one.lnum, one.col, one.severity } end, vim.diagnostic.get(0)))

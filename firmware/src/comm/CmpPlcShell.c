@@ -16,6 +16,7 @@
 #include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
 #include "CmpIecTask.h"
+#include "CmpOperationControl.h"
 #include "CmpSrv.h"
 #include "NodeName.h"
 #include "SysExcept.h"
@@ -33,7 +34,8 @@ typedef struct {
 typedef struct {
     const char *name;
     const char *help;
-    RTS_UI32 right; /* RIGHT_* */
+    RTS_UI16 right;     /* RIGHT_* */
+    RTS_UI16 operation; /* OPERATION_* that a program may forbid; OPERATION_COUNT: none */
     RTS_RESULT (*change)(void);
     void (*print)(SHELL_OUTPUT *out);
 } SHELL_COMMAND;
@@ -197,18 +199,18 @@ static RTS_RESULT reset_cold(void)
 static void print_help(SHELL_OUTPUT *out);
 
 static const SHELL_COMMAND commands[] = {
-    {"?", "this list", RIGHT_VIEW, NULL, print_help},
-    {"rtsinfo", "device and runtime", RIGHT_VIEW, NULL, print_device},
-    {"applist", "applications", RIGHT_VIEW, NULL, print_applications},
-    {"getprgstat", "state of the application", RIGHT_VIEW, NULL, print_state},
-    {"startprg", "start the application", RIGHT_CONTROL, AppStartApplication, NULL},
-    {"stopprg", "stop the application", RIGHT_CONTROL, AppStopApplication, NULL},
-    {"resetprg", "warm reset of the application", RIGHT_CONTROL, reset_warm, NULL},
-    {"resetprgcold", "cold reset of the application", RIGHT_CONTROL, reset_cold, NULL},
-    {"reload", "load and start the boot project again", RIGHT_CONTROL, AppReload, NULL},
-    {"tasklist", "tasks and their times", RIGHT_VIEW, NULL, print_tasks},
-    {"channelinfo", "channels and lines, and what went wrong there", RIGHT_VIEW, NULL, print_channels},
-    {"plcload", "share of the time that tasks took since their start", RIGHT_VIEW, NULL, print_load},
+    {"?", "this list", RIGHT_VIEW, OPERATION_COUNT, NULL, print_help},
+    {"rtsinfo", "device and runtime", RIGHT_VIEW, OPERATION_COUNT, NULL, print_device},
+    {"applist", "applications", RIGHT_VIEW, OPERATION_COUNT, NULL, print_applications},
+    {"getprgstat", "state of the application", RIGHT_VIEW, OPERATION_COUNT, NULL, print_state},
+    {"startprg", "start the application", RIGHT_CONTROL, OPERATION_COUNT, AppStartApplication, NULL},
+    {"stopprg", "stop the application", RIGHT_CONTROL, OPERATION_STOP, AppStopApplication, NULL},
+    {"resetprg", "warm reset of the application", RIGHT_CONTROL, OPERATION_RESET, reset_warm, NULL},
+    {"resetprgcold", "cold reset of the application", RIGHT_CONTROL, OPERATION_RESET, reset_cold, NULL},
+    {"reload", "load and start the boot project again", RIGHT_CONTROL, OPERATION_STOP, AppReload, NULL},
+    {"tasklist", "tasks and their times", RIGHT_VIEW, OPERATION_COUNT, NULL, print_tasks},
+    {"channelinfo", "channels and lines, and what went wrong there", RIGHT_VIEW, OPERATION_COUNT, NULL, print_channels},
+    {"plcload", "share of the time that tasks took since their start", RIGHT_VIEW, OPERATION_COUNT, NULL, print_load},
 };
 
 static void print_help(SHELL_OUTPUT *out)
@@ -244,7 +246,9 @@ static RTS_RESULT run(const SHELL_COMMAND *command, const COMM_CLIENT *client, b
     } else if (command->print != NULL) {
         command->print(out);
     } else if (first) {
-        result = command->change();
+        result = OperationMay(command->operation);
+        if (result == ERR_OK)
+            result = command->change();
         if (result == ERR_OK)
             print(out, "%s: done", command->name);
         else
