@@ -26,6 +26,7 @@ SHARED = [
     "SysStart.h",
     "CmpAppEmbedded.h",
     "CmpForce.h",
+    "AppReason.h",
     "CmpOperationControl.h",
     "CmpTraceMgr.h",
     "CmpAppBP.h",

@@ -42,6 +42,8 @@ typedef struct {
     APP_EXCEPTION exception;
 } APP_STATUS;
 
+/* All of these also return the answer of a component that denies (EVT_DenyStart, EVT_DenyStop), whose words
+ * AppTakeReason has, and ERR_CALL_AGAIN within a callback of an event. */
 /* ERR_APP_NOT_LOADED without application, ERR_INVALID_STATE after an exception (reset first), ERR_OK otherwise. */
 RTS_RESULT AppStartApplication(void);
 /* Returns when no task is in its cycle any more; outputs are set to zero, retain variables saved. */
@@ -53,7 +55,8 @@ RTS_RESULT AppSingleCycle(void);
 /* Loads and starts the boot project, as after a start-up: what is in RAM is lost, retain variables are kept. Nothing
  * runs when that fails. ERR_APP_NOT_LOADED without one. */
 RTS_RESULT AppReload(void);
-/* Warm keeps retain variables, cold initialises them too, origin deletes the application and its boot project. After
+/* Warm keeps retain variables, cold initialises them too, origin deletes the application and its boot project, and is
+ * never denied. After
  * warm and cold the application is in AS_STOP. */
 RTS_RESULT AppReset(RTS_UI32 option);
 

@@ -12,14 +12,20 @@
 #include "CmpItf.h"
 #include "CmpStd.h"
 
+enum { EVTPARAMID_NONE = 0, EVENT_PARAM_VERSION = 1 };
+
 typedef struct {
-    RTS_UI32 event;    /* EVT_* of the provider */
-    RTS_UI32 provider; /* CMPID_* */
-    void *parameter;   /* of the event, see there */
-    void *user;        /* as registered */
+    RTS_UI32 event;        /* EVT_* of the provider */
+    RTS_UI32 provider;     /* CMPID_* */
+    RTS_UI16 parameter_id; /* EVTPARAMID_*: the type of the parameter */
+    RTS_UI16 version;      /* EVENT_PARAM_VERSION; parameters get new members at their end */
+    void *parameter;       /* of the event, see there */
+    void *user;            /* as registered */
+    RTS_RESULT answer;     /* ERR_OK; a callback of an EVT_Deny* sets an error to deny */
+    const char *reason;    /* NULL; a callback that denies may say why: a constant text without full stop */
 } EVENT_PARAM;
 
-typedef void (*PF_EVENT_CALLBACK)(const EVENT_PARAM *event);
+typedef void (*PF_EVENT_CALLBACK)(EVENT_PARAM *event);
 
 /* Callbacks run in the order of registration. ERR_NOMEMORY when EVENT_MAX_CALLBACKS are registered. */
 RTS_RESULT EventRegisterCallback(RTS_UI32 provider, RTS_UI32 event, PF_EVENT_CALLBACK callback, void *user);
@@ -27,8 +33,14 @@ RTS_RESULT EventRegisterCallback(RTS_UI32 provider, RTS_UI32 event, PF_EVENT_CAL
 /* ERR_NO_OBJECT when it is not registered. A callback may unregister itself. */
 RTS_RESULT EventUnregisterCallback(RTS_UI32 provider, RTS_UI32 event, PF_EVENT_CALLBACK callback, void *user);
 
-/* Calls all callbacks of the event. */
-void EventPost(RTS_UI32 provider, RTS_UI32 event, void *parameter);
+/* Calls all callbacks of the event, also after one that denied. Returns the first answer that is not ERR_OK. */
+RTS_RESULT EventPost(RTS_UI32 provider, RTS_UI32 event, RTS_UI16 parameter_id, void *parameter);
+
+/* The reason that came with the answer of the last EventPost; NULL: none. */
+const char *EventGetReason(void);
+
+/* True within a callback, which can neither start, stop, reset nor load the application. */
+bool EventIsPosting(void);
 
 RTS_RESULT CmpEventMgrEmbedded_Hook(CMP_HOOK hook);
 

@@ -414,6 +414,14 @@ RTS_RESULT OperationMay(RTS_UI32 operation)
 }
 #endif
 
+const char *AppTakeReason(void)
+{
+    const char *reason = fakes.reason;
+
+    fakes.reason = NULL;
+    return reason != NULL ? reason : "";
+}
+
 RTS_RESULT AppStartApplication(void)
 {
     fakes.starts++;

@@ -214,7 +214,7 @@ static void of_two_exceptions_the_first_counts(void)
 
 static RTS_UI32 exceptions_seen;
 
-static void count_exception(const EVENT_PARAM *param)
+static void count_exception(EVENT_PARAM *param)
 {
     RTS_UNUSED(param);
     exceptions_seen++;

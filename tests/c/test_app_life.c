@@ -349,7 +349,7 @@ static void pointers_are_found_in_their_area_to_the_byte(void)
 static RTS_UI32 seen_events[16];
 static RTS_UI32 seen_count;
 
-static void note_event(const EVENT_PARAM *param)
+static void note_event(EVENT_PARAM *param)
 {
     if (seen_count < RTS_COUNT(seen_events))
         seen_events[seen_count++] = param->event;

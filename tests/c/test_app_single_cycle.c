@@ -109,7 +109,7 @@ static void an_exception_in_it_ends_it_and_needs_a_reset(void)
 static RTS_UI32 posted[4];
 static RTS_UI32 posted_count;
 
-static void note_event(const EVENT_PARAM *param)
+static void note_event(EVENT_PARAM *param)
 {
     if (posted_count < RTS_COUNT(posted))
         posted[posted_count++] = param->event;

@@ -454,7 +454,7 @@ static void add_zeros(RTS_UI32 device, RTS_UI8 table, RTS_UI32 address, RTS_UI32
         (void)set_value(device, table, address + i, 0);
 }
 
-static void forget(const EVENT_PARAM *event)
+static void forget(EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
     if (has_values)
@@ -463,7 +463,7 @@ static void forget(const EVENT_PARAM *event)
     memset(faults, 0, sizeof(faults));
 }
 
-static void make_devices(const EVENT_PARAM *event)
+static void make_devices(EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
     for (RTS_UI32 i = 0; i < setup()->device_count; i++) {
@@ -478,7 +478,7 @@ static void make_devices(const EVENT_PARAM *event)
 }
 
 /* Elsewhere a pass comes before the next request of a tool; here virtual time may stand still. */
-static void cancel(const EVENT_PARAM *event)
+static void cancel(EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
     if (setup()->client_count != 0)

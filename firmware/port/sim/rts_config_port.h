@@ -47,7 +47,7 @@
 #define CM_LEAVES_OUT 0 /* a test that lacks a component shall fail */
 #endif
 #define CHECKSUM_TABLE_ENTRIES 256
-#define EVENT_MAX_CALLBACKS 16
+#define EVENT_MAX_CALLBACKS 40
 #define SCHED_MAX_EXTERNAL_EVENTS 16
 #define SCHED_EVENTS_IN_TIMERS 1
 #define SCHED_FREEWHEELING_IN_TIMERS 1

@@ -11,6 +11,7 @@
 #include "AppBoot.h"
 
 #include "AppCommit.h"
+#include "AppEvents.h"
 #include "AppException.h"
 #include "AppLife.h"
 #include "../load/AppLoader.h"
@@ -96,7 +97,7 @@ static bool load_stand_in(RTS_UI32 active)
 }
 
 /* Loads what shall run. */
-static RTS_RESULT load_boot_project(bool may_go_back)
+static RTS_RESULT load_one(bool may_go_back)
 {
     RTS_UI32 active = AppCommitGet()->active;
     RTS_RESULT result;
@@ -108,6 +109,17 @@ static RTS_RESULT load_boot_project(bool may_go_back)
         return ERR_OK;
     if (FLASH_READS_FAIL && result == ERR_DEVICE && may_go_back && load_stand_in(active))
         return ERR_OK;
+    return result;
+}
+
+static RTS_RESULT load_boot_project(bool may_go_back)
+{
+    RTS_RESULT result;
+
+    AppEventTellBoot(EVT_PrepareLoadBootproject);
+    result = load_one(may_go_back);
+    if (result == ERR_OK)
+        AppPostEvent(EVT_LoadBootprojectDone);
     return result;
 }
 
@@ -131,17 +143,32 @@ static void take_death(void)
         AppCommitSetDead(start->text);
 }
 
-/* A boot project starts automatically, unless it failed. */
+static void start_boot_project(void)
+{
+    if (AppAskStart(EVT_DenyStartBootproject) != ERR_OK)
+        return;
+    AppPostEvent(EVT_PrepareStartBootproject);
+    if (AppStart() == ERR_OK)
+        AppPostEvent(EVT_StartBootprojectDone);
+}
+
+/* A boot project starts automatically, unless it failed. One that stays stopped is loaded, whatever components say. */
 static void run_boot_project(void)
 {
+    RTS_RESULT result;
+
     take_death();
-    if (load_boot_project(!stays_stopped()) != ERR_OK)
+    result = stays_stopped() ? (RTS_RESULT)ERR_OK : AppEventAskBoot(EVT_DenyLoadBootproject);
+    if (result == ERR_OK)
+        result = load_boot_project(!stays_stopped());
+    AppPostEvent(EVT_AllBootprojectsLoaded);
+    if (result != ERR_OK)
         return;
     if (stays_stopped() || AppCommitIsDead())
         LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "Boot project not started%s",
                AppCommitIsDead() ? ": it failed before" : "");
     else
-        (void)AppStart();
+        start_boot_project();
 }
 
 void AppBoot(void)
@@ -151,10 +178,12 @@ void AppBoot(void)
         LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "No program is run");
     else if (AppCommitResult() != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, AppCommitResult(), "Commit record cannot be read");
-    if (AppCommitGet()->active == SLOT_NONE)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "No boot project");
-    else
+    if (AppCommitGet()->active != SLOT_NONE) {
         run_boot_project();
+        return;
+    }
+    LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "No boot project");
+    AppPostEvent(EVT_AllBootprojectsLoaded);
 }
 
 RTS_RESULT AppBootAgain(void)
@@ -163,7 +192,7 @@ RTS_RESULT AppBootAgain(void)
 
     AppUnload();
     result = load_boot_project(true);
-    return result == ERR_OK ? AppStart() : result;
+    return result == ERR_OK ? AppStartIfAllowed() : result;
 }
 
 RTS_RESULT AppBootByHand(void)
@@ -172,5 +201,5 @@ RTS_RESULT AppBootByHand(void)
 
     if (APP_MAY_STAY_STOPPED && active != SLOT_NONE && AppCommitGet()->state[active] == SLOT_FAILED)
         return AppBootAgain();
-    return AppStart();
+    return AppStartIfAllowed();
 }

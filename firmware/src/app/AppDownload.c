@@ -10,8 +10,10 @@
 
 #include "AppBoot.h"
 #include "AppCommit.h"
+#include "AppEvents.h"
 #include "AppLife.h"
 #include "../load/AppLoader.h"
+#include "AppReason.h"
 #include "AppState.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
@@ -45,6 +47,8 @@ RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
 {
     RTS_UI32 slot;
 
+    if (AppEventIsPosting())
+        return ERR_CALL_AGAIN;
     AppDownloadAbort();
     if (CMHasLeftOut())
         return ERR_NOTINITIALIZED;
@@ -134,7 +138,7 @@ static void put_back(RTS_UI32 failed_slot, bool ran)
 }
 
 /* The checked image takes the place of the old application. */
-static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
+static RTS_RESULT replace(const APP_IMAGE *image, APP_REFUSAL *refusal)
 {
     const RTS_UI8 *code = AppMapCode(image);
     RTS_UI32 retain_after = RetainGetSequence() + 2; /* the old application is saved when it stops and when it ends */
@@ -149,7 +153,6 @@ static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
         SysFlashReleaseCode(image->file);
         return APP_REFUSE(refusal, result, "The flash cannot be written.");
     }
-    AppPostEvent(EVT_PrepareDownload);
     ran = AppStopTasks();
     AppUnload();
     result = AppLoad(image, code, retain_after, refusal);
@@ -160,6 +163,20 @@ static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
     }
     if (result != ERR_OK)
         put_back(image->file, ran);
+    else
+        AppPostEvent(EVT_CreateBootprojectDone);
+    return result;
+}
+
+/* A denied image stays in its slot without a seal, as after an aborted download. */
+static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
+{
+    RTS_RESULT result = AppAskStop();
+
+    if (result != ERR_OK)
+        return APP_REFUSE(refusal, result, "%s.", AppTakeReason());
+    result = AppEventAsk(EVT_PrepareDownload, image);
+    result = result == ERR_OK ? replace(image, refusal) : APP_REFUSE(refusal, result, "%s.", AppTakeReason());
     AppPostEvent(EVT_DownloadDone);
     return result;
 }
@@ -169,6 +186,8 @@ static RTS_RESULT finish_download(APP_REFUSAL *refusal)
     APP_IMAGE image;
     RTS_RESULT result;
 
+    if (AppEventIsPosting())
+        return APP_REFUSE(refusal, ERR_CALL_AGAIN, "An event of the application is being handled.");
     if (!download.open)
         return APP_REFUSE(refusal, ERR_INVALID_SEQUENCE, "No download has begun.");
     if (SysFileGetPos(download.slot) != download.size)

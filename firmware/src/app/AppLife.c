@@ -12,13 +12,13 @@
 
 #include "../cycle/AppAreas.h"
 #include "AppCommit.h"
+#include "AppEvents.h"
 #include "AppException.h"
 #include "../load/AppFunctions.h"
 #include "AppIo.h"
 #include "AppRetain.h"
 #include "AppState.h"
 #include "../load/AppTasks.h"
-#include "CmpEventMgr.h"
 #include "CmpIecTask.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
@@ -44,11 +44,12 @@ static struct {
     RTS_UI32 run_since_ms;
 } app;
 
+#if EVENT_MAX_CALLBACKS > 0
 void AppPostEvent(RTS_UI32 event)
 {
-    if (EVENT_MAX_CALLBACKS > 0)
-        EventPost(CMPID_CmpAppEmbedded, event, NULL);
+    AppEventTell(event, &app.image);
 }
+#endif
 
 static bool is_loaded(void)
 {
@@ -347,6 +348,28 @@ RTS_RESULT AppStart(void)
     AppPostEvent(EVT_StartDone);
     return ERR_OK;
 }
+
+#if EVENT_MAX_CALLBACKS > 0
+RTS_RESULT AppAskStart(RTS_UI32 event)
+{
+    RTS_RESULT result = get_ready();
+
+    return result == ERR_OK ? AppEventAsk(event, &app.image) : result;
+}
+
+RTS_RESULT AppStartIfAllowed(void)
+{
+    RTS_RESULT result = AppAskStart(EVT_DenyStart);
+
+    return result == ERR_OK ? AppStart() : result;
+}
+
+RTS_RESULT AppAskStop(void)
+{
+    AppHandlePendingException();
+    return app.state == AS_RUN ? AppEventAsk(EVT_DenyStop, &app.image) : (RTS_RESULT)ERR_OK;
+}
+#endif
 
 #if SRV_OTHER_CLIENTS
 /* Nothing is noted in flash: it may be done often, and a program that ends the runtime here does so again when it is

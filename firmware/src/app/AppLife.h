@@ -48,7 +48,7 @@ RTS_RESULT AppReinitialise(bool cold);
 /* Starts the loaded application, initialised before if it was not yet. ERR_EXCEPTION: that failed. */
 RTS_RESULT AppStart(void);
 
-/* The same for one cycle of each task (IecTaskRunOnce), after which it is stopped. ERR_EXCEPTION: or that failed. */
+/* As AppStart for one cycle of each task (IecTaskRunOnce), after which it is stopped. ERR_EXCEPTION: or that failed. */
 RTS_RESULT AppRunOnce(void);
 
 /* Stops the tasks; true when they ran. */
@@ -57,7 +57,25 @@ bool AppStopTasks(void);
 /* Completes what AppHandleException has begun. */
 void AppHandlePendingException(void);
 
+#if EVENT_MAX_CALLBACKS > 0
+/* Posts an event about the loaded application. */
 void AppPostEvent(RTS_UI32 event);
+
+/* Asks EVT_DenyStop while the application runs. Returns the answer. */
+RTS_RESULT AppAskStop(void);
+
+/* Gives the loaded application its initial values if it waits for them, and asks whether it may start: EVT_DenyStart or
+ * EVT_DenyStartBootproject. ERR_EXCEPTION: the initial values failed. */
+RTS_RESULT AppAskStart(RTS_UI32 event);
+
+/* AppStart, unless EVT_DenyStart is denied. */
+RTS_RESULT AppStartIfAllowed(void);
+#else
+#define AppPostEvent(event) ((void)0)
+#define AppAskStop() ((RTS_RESULT)ERR_OK)
+#define AppAskStart(event) ((RTS_RESULT)ERR_OK)
+#define AppStartIfAllowed() AppStart()
+#endif
 
 /* An application that has run for APP_PROVE_US, and is in no long cycle, has proven itself. In each pass of main. */
 void AppCheckProof(void);

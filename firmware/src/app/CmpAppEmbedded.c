@@ -10,6 +10,7 @@
 #include "../cycle/AppAreas.h"
 #include "AppBoot.h"
 #include "AppCommit.h"
+#include "AppEvents.h"
 #include "../load/AppFunctions.h"
 #include "AppLife.h"
 #include "CmpAppBP.h"
@@ -28,16 +29,18 @@ static bool is_loaded(void)
 RTS_RESULT AppStartApplication(void)
 {
     AppHandlePendingException();
+    if (AppEventIsPosting())
+        return ERR_CALL_AGAIN;
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
     if (!AppIsInitialised())
         return AppBootByHand();
     if (AppHasException())
         return ERR_INVALID_STATE;
-    return AppGetState() == AS_RUN ? ERR_OK : AppStart();
+    return AppGetState() == AS_RUN ? ERR_OK : AppStartIfAllowed();
 }
 
-RTS_RESULT AppStopApplication(void)
+static RTS_RESULT stop_unasked(void)
 {
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
@@ -48,27 +51,48 @@ RTS_RESULT AppStopApplication(void)
     return ERR_OK;
 }
 
+RTS_RESULT AppStopApplication(void)
+{
+    RTS_RESULT result = AppEventIsPosting() ? (RTS_RESULT)ERR_CALL_AGAIN : AppAskStop();
+
+    return result == ERR_OK ? stop_unasked() : result;
+}
+
 #if SRV_OTHER_CLIENTS
 RTS_RESULT AppSingleCycle(void)
 {
+    RTS_RESULT result;
+
     AppHandlePendingException();
+    if (AppEventIsPosting())
+        return ERR_CALL_AGAIN;
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
     if (AppGetState() == AS_RUN)
         return ERR_CALL_AGAIN;
     if (AppIsInitialised() && AppHasException())
         return ERR_INVALID_STATE;
-    return AppRunOnce();
+    result = AppAskStart(EVT_DenyStart);
+    return result == ERR_OK ? AppRunOnce() : result;
 }
 #endif
 
 RTS_RESULT AppReload(void)
 {
+    RTS_RESULT result;
+
+    if (AppEventIsPosting())
+        return ERR_CALL_AGAIN;
     if (CMHasLeftOut())
         return ERR_NOTINITIALIZED;
     if (AppCommitGet()->active == SLOT_NONE)
         return ERR_APP_NOT_LOADED;
-    (void)AppStopApplication();
+    result = AppAskStop();
+    if (result == ERR_OK)
+        result = AppEventAskBoot(EVT_DenyLoadBootproject);
+    if (result != ERR_OK)
+        return result;
+    (void)stop_unasked();
     return AppBootAgain();
 }
 
@@ -94,12 +118,17 @@ RTS_RESULT AppReset(RTS_UI32 option)
 
     if (option > RESET_OPTION_ORIGIN)
         return ERR_PARAMETER;
+    if (AppEventIsPosting())
+        return ERR_CALL_AGAIN;
     AppHandlePendingException();
     if (!is_loaded() && option != RESET_OPTION_ORIGIN)
         return ERR_APP_NOT_LOADED;
+    result = option != RESET_OPTION_ORIGIN ? AppAskStop() : (RTS_RESULT)ERR_OK;
+    if (result != ERR_OK)
+        return result;
     AppPostEvent(EVT_PrepareReset);
     if (is_loaded())
-        (void)AppStopApplication();
+        (void)stop_unasked();
     result = option == RESET_OPTION_ORIGIN ? reset_origin() : AppReinitialise(option == RESET_OPTION_COLD);
     LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, result, "Reset %s",
            option == RESET_OPTION_WARM   ? "warm"
@@ -177,7 +206,7 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
         AppCheckProof();
         break;
     case CH_EXIT_TASKS:
-        (void)AppStopApplication();
+        (void)stop_unasked();
         AppUnload();
         break;
     default:

@@ -307,7 +307,7 @@ RTS_UI32 ForceGetSerial(void)
 
 /* ---- the component ---- */
 
-static void end_with_variables(const EVENT_PARAM *event)
+static void end_with_variables(EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
     ForceEndAll();

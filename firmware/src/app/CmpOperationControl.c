@@ -55,7 +55,7 @@ RTS_RESULT OperationMay(RTS_UI32 operation)
     return (OperationForbidden() >> operation & 1) != 0 ? ERR_OPERATION_DENIED : ERR_OK;
 }
 
-static void end_with_variables(const EVENT_PARAM *event)
+static void end_with_variables(EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
     variable.is_set = false;

@@ -659,7 +659,7 @@ static void begin_file(const FILE_ENTRY *file)
         (void)TraceCreate(config, file->size, &id, &bad, &error);
 }
 
-static void begin_kept(const EVENT_PARAM *event)
+static void begin_kept(EVENT_PARAM *event)
 {
     RTS_UI32 i;
 
@@ -674,7 +674,7 @@ static void begin_kept(const EVENT_PARAM *event)
 
 /* ---- the component ---- */
 
-static void end_with_variables(const EVENT_PARAM *event)
+static void end_with_variables(EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
     TraceDeleteAll();

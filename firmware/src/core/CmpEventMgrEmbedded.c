@@ -23,6 +23,8 @@ enum { LISTENERS = EVENT_MAX_CALLBACKS > 0 ? EVENT_MAX_CALLBACKS : 1 };
 
 static struct {
     LISTENER *first;
+    bool posting;
+    const char *reason; /* of the last answer */
     MEM_POOL pool;
     RTS_I64 memory[LISTENERS * LISTENER_WORDS];
 } events;
@@ -60,18 +62,40 @@ RTS_RESULT EventUnregisterCallback(RTS_UI32 provider, RTS_UI32 event, PF_EVENT_C
     return ERR_NO_OBJECT;
 }
 
-void EventPost(RTS_UI32 provider, RTS_UI32 event, void *parameter)
+RTS_RESULT EventPost(RTS_UI32 provider, RTS_UI32 event, RTS_UI16 parameter_id, void *parameter)
 {
+    RTS_RESULT answer = ERR_OK;
     LISTENER *listener;
     LISTENER *next;
+    bool outer = events.posting;
+
+    events.posting = true;
+    events.reason = NULL;
 
     for (listener = events.first; listener != NULL; listener = next) {
         next = listener->next; /* the callback may unregister itself */
         if (listener->provider == provider && listener->event == event) {
-            EVENT_PARAM param = {event, provider, parameter, listener->user};
+            EVENT_PARAM param = {event,     provider,       parameter_id, EVENT_PARAM_VERSION,
+                                 parameter, listener->user, ERR_OK,       NULL};
             listener->callback(&param);
+            if (answer == ERR_OK && param.answer != ERR_OK) {
+                answer = param.answer;
+                events.reason = param.reason;
+            }
         }
     }
+    events.posting = outer;
+    return answer;
+}
+
+const char *EventGetReason(void)
+{
+    return events.reason;
+}
+
+bool EventIsPosting(void)
+{
+    return events.posting;
 }
 
 RTS_RESULT CmpEventMgrEmbedded_Hook(CMP_HOOK hook)
@@ -79,5 +103,7 @@ RTS_RESULT CmpEventMgrEmbedded_Hook(CMP_HOOK hook)
     if (hook != CH_INIT_SYSTEM)
         return ERR_OK;
     events.first = NULL;
+    events.posting = false;
+    events.reason = NULL;
     return MemPoolCreateStatic(&events.pool, events.memory, sizeof events.memory, LISTENER_WORDS * MEMPOOL_ALIGN);
 }

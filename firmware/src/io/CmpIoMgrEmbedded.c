@@ -30,7 +30,7 @@ static struct {
 static void post(RTS_UI32 event)
 {
     if (EVENT_MAX_CALLBACKS > 0)
-        EventPost(CMPID_CmpIoMgrEmbedded, event, NULL);
+        (void)EventPost(CMPID_CmpIoMgrEmbedded, event, EVTPARAMID_NONE, NULL);
 }
 
 /* ---- drivers ---- */

@@ -27,7 +27,7 @@ static void show(void)
     }
 }
 
-static void note(const EVENT_PARAM *event)
+static void note(EVENT_PARAM *event)
 {
     runs = event->event == EVT_StartDone;
     show();
