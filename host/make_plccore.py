@@ -26,7 +26,6 @@ SHARED = [
     "SysStart.h",
     "CmpAppEmbedded.h",
     "CmpForce.h",
-    "AppReason.h",
     "CmpOperationControl.h",
     "CmpTraceMgr.h",
     "CmpAppBP.h",

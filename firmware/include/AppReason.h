@@ -1,5 +1,5 @@
 /*
- * AppReason.h - why a component denied what a service asked for (shared with the host).
+ * AppReason.h - why a component denied what a service asked for.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -10,7 +10,7 @@
 
 /* Returns the words of the last denial (EVT_Deny*, AppState.h), without full stop, and forgets them; "" without one.
  * A service takes them before it acts, and again when that was refused. From main. */
-#if !defined(RTS_CFFI) && EVENT_MAX_CALLBACKS == 0
+#if EVENT_MAX_CALLBACKS == 0
 #define AppTakeReason() ""
 #else
 const char *AppTakeReason(void);

@@ -226,6 +226,7 @@ enum {
     TAG_APP_IMAGE = 0x41,          /* own */
     TAG_APP_CALLS = 0x42,          /* own */
     TAG_APP_FORBIDDEN = 0x43,      /* own; OperationForbidden() (CmpOperationControl.h), left out when it is 0 */
+    TAG_APP_REASON = 0x48,         /* own; beside TAG_SERVICE_RESULT: why a component denied it */
     TAG_APP_LIST = 0x81,
     TAG_APP_LIST_RANGE = 0x01,
     TAG_APP_LIST_START = 0x02,

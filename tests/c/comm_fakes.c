@@ -399,6 +399,7 @@ const char *AppGetInfo(RTS_UI32 index)
 static RTS_RESULT control(void)
 {
     fakes.now_ms += fakes.control_ms;
+    fakes.reason = fakes.denial;
     return fakes.control_result;
 }
 

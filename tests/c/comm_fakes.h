@@ -43,6 +43,7 @@ typedef struct {
     RTS_UI32 area_size[APP_AREA_COUNT];
     RTS_RESULT control_result;
     RTS_UI32 forbidden;  /* by the program: bits 1 << OPERATION_* */
+    const char *denial;  /* what reason becomes by start, stop and reset */
     const char *reason;  /* of a component that denied start, stop or reset */
     RTS_UI32 control_ms; /* how long start, stop and reset take */
     RTS_UI32 starts;

@@ -186,6 +186,27 @@ static void what_the_program_forbids_is_refused_but_not_start_and_origin(void)
     CHECK_EQUAL(fakes.starts + fakes.resets, 2);
 }
 
+static void a_component_that_denies_says_why(void)
+{
+    RTS_UI32 cold = RESET_OPTION_COLD;
+    BTAG reason;
+
+    setup();
+    fakes.reason = "words of an earlier denial";
+    fakes.control_result = ERR_INVALID_STATE;
+    CHECK_EQUAL(control(SRV_APP_START, NULL), ERR_INVALID_STATE);
+    CHECK(BTagFind(&reply.tags, TAG_APP_REASON, 1, 200, &reason) == ERR_L7_TAG_MISSING);
+    fakes.denial = "the door is open";
+    CHECK_EQUAL(control(SRV_APP_STOP, NULL), ERR_INVALID_STATE);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_APP_REASON, 1, 200, &reason), ERR_OK);
+    CHECK(strcmp((const char *)reason.data, "the door is open") == 0);
+    CHECK_EQUAL(control(SRV_APP_RESET, &cold), ERR_INVALID_STATE);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_APP_REASON, 1, 200, &reason), ERR_OK);
+    fakes.control_result = ERR_OK;
+    CHECK_EQUAL(control(SRV_APP_STOP, NULL), ERR_OK);
+    CHECK(BTagFind(&reply.tags, TAG_APP_REASON, 1, 200, &reason) == ERR_L7_TAG_MISSING);
+}
+
 static void refusal_of_the_application_is_the_result(void)
 {
     setup();
@@ -477,6 +498,7 @@ int main(void)
     RUN(logout_ends_the_application_session_only);
     RUN(start_and_stop_reach_the_application);
     RUN(what_the_program_forbids_is_refused_but_not_start_and_origin);
+    RUN(a_component_that_denies_says_why);
     RUN(refusal_of_the_application_is_the_result);
     RUN(wrong_application_session_changes_nothing);
     RUN(session_0_is_that_of_no_application);

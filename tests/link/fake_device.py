@@ -332,6 +332,7 @@ class FakePlc:
         self.state, self.operating = lib.AS_NONE, 0
         self.application_session = 0x80004321
         self.image = b""
+        self.denial = ""  # words of a component that denies start, stop and reset
         self.exception = (lib.RTSEXCPT_NOEXCEPTION, 0xFFFFFFFF, -1)
         self.memory = {area: bytearray(70000) for area in range(5)}
         self.disturbed = 0  # how many readings from now on a task runs in
@@ -465,10 +466,20 @@ class FakePlc:
             return [bintag.u16(lib.TAG_SERVICE_RESULT, lib.ERR_APP_INVALID_SESSIONID)]
         if self.operating & lib.OS_EXCEPTION and state == lib.AS_RUN:
             return [bintag.u16(lib.TAG_SERVICE_RESULT, lib.ERR_INVALID_STATE)]
+        if self.denial:
+            return self._deny()
         self.state = state
         return [bintag.u16(lib.TAG_SERVICE_RESULT, 0)]
 
+    def _deny(self) -> list[bintag.Tag]:
+        return [
+            bintag.u16(lib.TAG_SERVICE_RESULT, lib.ERR_OPERATION_DENIED),
+            bintag.text(lib.TAG_APP_REASON, self.denial),
+        ]
+
     def _reset(self, tags: bintag.Tags) -> list[bintag.Tag]:
+        if self.denial:
+            return self._deny()
         option = tags.container(lib.TAG_APP_DESCRIPTOR).u32(lib.TAG_APP_OPTION)
         self.operating, self.state = 0, lib.AS_STOP
         self.exception = (lib.RTSEXCPT_NOEXCEPTION, 0xFFFFFFFF, -1)

@@ -234,6 +234,30 @@ def test_a_refused_start_names_the_reason() -> None:
         services.start(bench.session)
 
 
+def test_a_component_that_denies_is_quoted() -> None:
+    bench = Bench()
+    bench.plc.denial = "the door is open"
+    for action, operate in {
+        "stop": lambda: services.stop(bench.session),
+        "start": lambda: services.start(bench.session),
+        "reset": lambda: services.reset(bench.session, lib.RESET_OPTION_WARM),
+    }.items():
+        with pytest.raises(DeviceError) as caught:
+            operate()
+        words = f"The device refused the {action}: the door is open (ERR_OPERATION_DENIED)."
+        assert (str(caught.value), caught.value.result) == (words, lib.ERR_OPERATION_DENIED)
+
+
+def test_a_component_that_denies_a_shell_command_is_quoted() -> None:
+    bench = Bench()
+    bench.plc.shell_refusals["stopprg"] = ("stopprg: the door is open", lib.ERR_OPERATION_DENIED)
+    with pytest.raises(DeviceError, match=r"refused the stopprg: the door is open \(ERR_OPERATION_DENIED\)"):
+        services.run_shell(bench.session, "stopprg")
+    bench.plc.shell_refusals["stopprg"] = ("stopprg: error 0x1", lib.ERR_FAILED)
+    with pytest.raises(DeviceError, match=r"refused the stopprg: ERR_FAILED\."):
+        services.run_shell(bench.session, "stopprg")
+
+
 def lose_starts(bench: Bench, count: int, monkeypatch: pytest.MonkeyPatch, died: bool) -> list[int]:
     """The first starts end with the channel; `died`: because the program took the controller down. The list gets the
     starts that arrived."""

@@ -6,6 +6,7 @@
 #include "CmpAppSrv.h"
 
 #include "AppAddress.h"
+#include "AppReason.h"
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
 #include "CmpForce.h"
@@ -88,14 +89,26 @@ static RTS_RESULT read_descriptor(const SRV_REQUEST *request, BTAG_READER *descr
     return result;
 }
 
+/* The result of a service, and the words of a component that denied it. */
+static void write_verdict(BTAG_WRITER *reply, RTS_RESULT verdict)
+{
+    enum { REASON_SIZE = 96 };
+    const char *reason = AppTakeReason();
+
+    BTagWrite16(reply, TAG_SERVICE_RESULT, verdict);
+    if (verdict != ERR_OK && reason[0] != '\0')
+        BTagWriteText(reply, TAG_APP_REASON, reason, REASON_SIZE);
+}
+
 static RTS_RESULT control(SRV_REQUEST *request, BTAG_WRITER *reply, RTS_RESULT (*action)(void))
 {
     BTAG_READER descriptor;
     RTS_RESULT verdict;
     RTS_RESULT result = read_descriptor(request, &descriptor, &verdict);
 
+    (void)AppTakeReason();
     if (result == ERR_OK)
-        BTagWrite16(reply, TAG_SERVICE_RESULT, verdict == ERR_OK ? action() : verdict);
+        write_verdict(reply, verdict == ERR_OK ? action() : verdict);
     return result;
 }
 
@@ -135,9 +148,10 @@ static RTS_RESULT reset(SRV_REQUEST *request, BTAG_WRITER *reply)
         result = BTagFindUnsigned(&descriptor, TAG_APP_OPTION, &option);
     if (result != ERR_OK)
         return result;
+    (void)AppTakeReason();
     if (verdict == ERR_OK)
         verdict = option <= RESET_OPTION_ORIGIN ? reset_if_allowed(option) : ERR_NOT_SUPPORTED;
-    BTagWrite16(reply, TAG_SERVICE_RESULT, verdict);
+    write_verdict(reply, verdict);
     return ERR_OK;
 }
 

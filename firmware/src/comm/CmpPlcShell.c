@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "CMUtils.h"
+#include "AppReason.h"
 #include "CmpAppEmbedded.h"
 #include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
@@ -246,11 +247,15 @@ static RTS_RESULT run(const SHELL_COMMAND *command, const COMM_CLIENT *client, b
     } else if (command->print != NULL) {
         command->print(out);
     } else if (first) {
+        (void)AppTakeReason();
         result = OperationMay(command->operation);
         if (result == ERR_OK)
             result = command->change();
+        const char *reason = AppTakeReason();
         if (result == ERR_OK)
             print(out, "%s: done", command->name);
+        else if (reason[0] != '\0')
+            print(out, "%s: %s", command->name, reason);
         else
             print(out, "%s: error 0x%X", command->name, (unsigned)result);
     }

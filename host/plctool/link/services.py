@@ -343,7 +343,7 @@ def _control_request(session: Session, service: int, *options: bintag.Tag) -> Re
 
 
 def _check_control(reply: bintag.Tags, action: str) -> None:
-    l7.check_result(reply.u16(lib.TAG_SERVICE_RESULT), action)
+    l7.check_result(reply.u16(lib.TAG_SERVICE_RESULT), action, reply.text(lib.TAG_APP_REASON))
 
 
 def read_application_info(session: Session) -> dict[str, str]:
@@ -591,7 +591,8 @@ def _check_shell(command: str, parts: Sequence[bintag.Tags], text: str) -> None:
             raise no_application()
         if result in (lib.ERR_NO_OBJECT, lib.ERR_NO_ACCESS_RIGHTS):  # the device says it in words
             raise DeviceError(text, l7.slug(error_name(result)), result)
-        l7.check_result(result, command)
+        words = text.removeprefix(f"{command}: ")
+        l7.check_result(result, command, "" if words.startswith("error ") else words)
 
 
 # ---- log -------------------------------------------------------------------------------------------------------------
