@@ -235,7 +235,7 @@ def test_link_that_is_none_is_reported_with_its_line(tool: Any, project: Path, c
 
 @pytest.mark.parametrize(("text", "message"), [
     ('name = "pump"', "name cannot be here: it goes into [information]"),
-    ('[project]\nname = "pump"', "name, version, author and description go into [information]"),
+    ('[project]\nname = "pump"', "author, company, description and profile go into [information]"),
     ("werror = true", "werror cannot be here: it goes into [options]"),
 ])  # fmt: skip
 def test_key_outside_its_table_is_refused_with_the_name_of_that(

@@ -27,7 +27,7 @@ def fingerprint(settings: Settings) -> str:
     folder = project.file.parent if project is not None else Path()
     digest = hashlib.sha256()
     options = (settings.target, settings.level, settings.checks, settings.debug, settings.board, settings.limits,
-               settings.dialect, settings.no_pass, settings.files.info)  # fmt: skip
+               settings.dialect, settings.no_pass, settings.files.info, settings.files.information)  # fmt: skip
     digest.update(repr((plctool_version(), options)).encode())
     for name, path in sorted((os.path.relpath(path, folder), path) for path in set(settings.every_file())):
         content = hashlib.sha256(_content(path)).hexdigest()

@@ -20,6 +20,7 @@ from plctool.errors import UsageError
 from plctool.image.targets import DEFAULT_TARGET
 
 if TYPE_CHECKING:
+    from plctool.compiler.base.information import Information
     from plctool.compiler.base.source import Source
     from plctool.compiler.codegen.lower_unit import Options
     from plctool.compiler.front import CheckResult, Trees
@@ -96,7 +97,9 @@ def library_sources(libraries: Sequence[ImportedLibrary]) -> list[Source]:
 def check_sources(paths: Sequence[Path | str]) -> CheckResult:
     """Every diagnostic of a program and its unit tests, without building it."""
     files = program_files(paths)
-    return check_with_tests(files.load_sources(), load=files.load_io, libraries=files.load_libraries())
+    return check_with_tests(
+        files.load_sources(), load=files.load_io, libraries=files.load_libraries(), information=files.information
+    )
 
 
 @no_collection()
@@ -109,10 +112,12 @@ def check_with_tests(
     trees: Trees | None = None,
     observers: Sequence[Guest] = (),
     max_errors: int | None = None,
+    information: Information | None = None,
 ) -> CheckResult:
     """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all.
     `load` gets the inputs and outputs for each of both. `dialect` as in `compile_sources`, the others as in
     `front.check_sources`; unit tests are checked without `observers`."""
+    from plctool.compiler.base.information import NO_INFORMATION
     from plctool.compiler.base.internal import bugs_reported
     from plctool.compiler.front import Trees, check_sources
     from plctool.compiler.syntax.diagnostics import MAX_ERRORS
@@ -127,6 +132,7 @@ def check_with_tests(
         dialect=find_dialect(dialect),
         trees=trees or Trees(),
         max_errors=max_errors or MAX_ERRORS,
+        information=information or NO_INFORMATION,
     )
     with bugs_reported():
         result = check(io=load(), observers=observers)
@@ -212,6 +218,7 @@ def build(request: BuildRequest, python: PythonFunctions | None = None) -> Build
             libraries=imported,
             python=python,
             dialect=system,
+            information=files.information,
         )
     if checked.program is None:
         raise CompileError(checked.diagnostics, shown)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from plctool.compiler.base.garbage import no_collection
+from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.compiler.base.missing_names import declared_names
 from plctool.compiler.base.nesting import NestingError, room_for_nesting
 from plctool.compiler.base.source import Source
@@ -76,6 +77,7 @@ def check_sources(
     trees: Trees | None = None,
     observers: Sequence[Guest] = (),
     max_errors: int = MAX_ERRORS,
+    information: Information = NO_INFORMATION,
 ) -> CheckResult:
     """Checks the files of a program together.
 
@@ -85,7 +87,8 @@ def check_sources(
     `libraries`: what the program uses besides the standard library. `python`: functions that Python implements, in the
     simulator; raises UsageError for those that cannot be. `dialect`: the system whose rules it has. `trees`: keeps the
     syntax trees for another check. `observers` take part last; what they raise ends the check. `max_errors`: after so
-    many the check ends. Whatever the sources contain, the result is a program or diagnostics, never another exception.
+    many the check ends. `information`: what plc.toml says about the program.
+    Whatever the sources contain, the result is a program or diagnostics, never another exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     diagnostics = diagnostics_of(chosen, warnings, dialect, max_errors)
@@ -94,6 +97,7 @@ def check_sources(
     placed: Placed | None = None
     with reporting(diagnostics, sources):
         parsed = parse(sources, chosen, libraries, diagnostics, trees or Trees())
+        parsed = replace(parsed, information=information)
         if parsed.broken:
             _check_whole_units(parsed, [DeviceTasks(), *observers])
         else:
@@ -219,7 +223,8 @@ def _check_whole_units(parsed: Parsed, guests: Sequence[Guest]) -> None:
         hidden |= rest.hidden
         whole.append((source, replace(text, declarations=rest.declarations)))
     others = Diagnostics((s.path for s in parsed.library.sources), dialect=found.dialect, limit=sys.maxsize)
-    declared = declare(Parsed(whole, parsed.library, parsed.libraries, others), None, guests)
+    rest_of = Parsed(whole, parsed.library, parsed.libraries, others, information=parsed.information)
+    declared = declare(rest_of, None, guests)
     if declared is not None:
         place(check(declared))
     for d in others.sorted():
@@ -238,7 +243,7 @@ def declare(
 ) -> Declared | None:
     """Declares all that a program has, used or not. `io`: its inputs and outputs; `guests` take part in the check, and
     one of them decides the tasks. None after an error from which many others would follow."""
-    program = Program(parsed.library, parsed.libraries, parsed.diagnostics, IoChannels(io))
+    program = Program(parsed.library, parsed.libraries, parsed.diagnostics, IoChannels(io), parsed.information)
     world = program.world
     files: Files = [(source, _looked_at(source, text, world.diagnostics)) for source, text in parsed.texts]
     participants = [guest.begin(program) for guest in guests]

@@ -212,5 +212,6 @@ def checked(snapshot: Snapshot, trees: Trees | None = None, observer: Observer |
         trees,
         () if observer is None else (observer,),
         MAX_ERRORS,
+        snapshot.files.information,
     )
     return [*snapshot.found, *result.diagnostics]

@@ -113,6 +113,7 @@ class TestProgram:
                 io=description,
                 libraries=imported,
                 dialect=system,
+                information=files.information,
             )
         self.sources += [*io_sources(description), *library_sources(imported)]
         if checked.program is None:

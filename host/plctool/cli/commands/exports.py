@@ -73,7 +73,12 @@ def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list
     sources, libraries = files.load_sources(), files.load_libraries()
     with bugs_reported():
         checked = check_sources(
-            sources, warnings=settings.warnings, io=files.load_io(), libraries=libraries, dialect=dialect
+            sources,
+            warnings=settings.warnings,
+            io=files.load_io(),
+            libraries=libraries,
+            dialect=dialect,
+            information=files.information,
         )
         if checked.program is None:
             raise CompileError(checked.diagnostics, sources)
@@ -110,7 +115,7 @@ def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
     io = None if files.project is None and files.io.description is None else files.load_io()
     sources, libraries = files.load_sources(), files.load_libraries()
     with bugs_reported():
-        checked = check_sources(sources, io=io, libraries=libraries, dialect=dialect)
+        checked = check_sources(sources, io=io, libraries=libraries, dialect=dialect, information=files.information)
     if checked.program is None:
         raise CompileError(checked.diagnostics, [*sources, *io_sources(io), *library_sources(libraries)])
     functions = checked.program.externals

@@ -141,7 +141,9 @@ def _checked(settings: Settings) -> tuple[list[Diagnostic], list[Source], list[S
 
     files = settings.files
     sources, libraries = files.load_sources(), files.load_libraries()
-    result = check_with_tests(sources, settings.warnings, files.load_io, libraries, settings.dialect)
+    result = check_with_tests(
+        sources, settings.warnings, files.load_io, libraries, settings.dialect, information=files.information
+    )
     return result.diagnostics, sources, [*sources, *io_sources(files.load_io()), *library_sources(libraries)]
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.compiler.base.internal import note_position
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.construction import construct
@@ -37,7 +38,12 @@ class Program:
     """All parts of the check."""
 
     def __init__(
-        self, library: Library, libraries: Sequence[ImportedLibrary], diagnostics: Diagnostics, io: IoChannels
+        self,
+        library: Library,
+        libraries: Sequence[ImportedLibrary],
+        diagnostics: Diagnostics,
+        io: IoChannels,
+        information: Information = NO_INFORMATION,
     ) -> None:
         self.libraries = libraries
         self.startup: Pou | None = None  # calls FB_Init
@@ -45,7 +51,7 @@ class Program:
         self.may_recurse = False
         self.trail: Variable | None = None
         self.checked: list[Scope] = []  # of bodies without errors
-        self.world = World(library, diagnostics, io, self._declared_by)
+        self.world = World(library, diagnostics, io, self._declared_by, information)
 
     def _declared_by(self, world: World) -> Declarers:
         self.types = TypeDeclarations(world)

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.configuration import Application
 from plctool.compiler.semantics.participants import Participant
@@ -38,6 +39,7 @@ class Parsed:
     libraries: Sequence[ImportedLibrary]
     diagnostics: Diagnostics
     syntax: Sequence[Diagnostic] = ()
+    information: Information = NO_INFORMATION
 
     @property
     def broken(self) -> bool:

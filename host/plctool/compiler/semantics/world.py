@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.allocation import Allocation, DirectVariables, module_address
 from plctool.compiler.semantics.call_graph import CallGraph
@@ -160,11 +161,13 @@ class World:
         diagnostics: Diagnostics,
         io: IoChannels,
         declared_by: Callable[[World], Declarers],
+        information: Information = NO_INFORMATION,
     ) -> None:
         """`declared_by` makes what declares, for this world; it is called when the world has all else."""
         self.diagnostics = diagnostics
         self.pause: Callable[[], None] = lambda: None  # called between two units; what it raises ends the check
         self.dialect = diagnostics.dialect
+        self.information = information
         self.names = Names(library, diagnostics, lambda planned: self.declared.instance(planned))
         self.coerce = Coercion(self.diagnostics, self._text_of)
         self.calls = CallGraph(self.diagnostics)

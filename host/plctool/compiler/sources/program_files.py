@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.errors import UsageError
 from plctool.image.file import ApplicationInfo
 from plctool.project import project_named
@@ -49,6 +50,11 @@ class ProgramFiles:
     def root(self) -> Path | None:
         """The folder of the project, which contains all that the project names; None if there is no project."""
         return None if self.project is None else self.project.file.parent
+
+    @property
+    def information(self) -> Information:
+        """What the program may ask about its project."""
+        return NO_INFORMATION if self.project is None else self.project.information
 
     @cached_property
     def source_files(self) -> Sequence[Path]:

@@ -10,8 +10,10 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path, PurePath
 
+from plctool.compiler.base.information import NO_INFORMATION, Information, Property, PropertyKind
 from plctool.compiler.base.level import Level
 from plctool.compiler.codegen.lower_unit import parse_checks
 from plctool.compiler.sources.library_files import is_stand_in, libraries_at, no_library
@@ -24,14 +26,17 @@ from plctool.iec.dialect import DIALECTS
 from plctool.image.board import known_boards
 from plctool.image.file import ApplicationInfo
 from plctool.image.targets import TARGETS
+from plctool.io.mistakes import Mistakes
 from plctool.io.tables import Entry, Table
 from plctool.project import DEFAULT_IMAGE, IMAGE_SUFFIX, PROJECT_FILE
 
 _LEVELS: dict[object, Level] = {0: 0, 1: 1, 2: 2, 3: 3, "s": "s"}
-_INFORMATION = ("name", "version", "author", "description")
+_INFORMATION = ("name", "title", "version", "author", "company", "description", "profile")
 _OPTIONS = ("optimisation", "checks", "debug", "dialect", "no-warn", "werror")
 LINE_LENGTHS = (60, 400)  # the least and the most that the formatter takes
 _MAX_TEXT = 255  # characters of what the image says about the project
+_VERSION = re.compile(r"\d{1,5}(\.\d{1,5}){0,3}", re.ASCII)
+_MAX_VERSION_PART = 0xFFFF
 _PATTERN = re.compile(r"[*?\[]")
 _OPTION_OF = {"libraries": "--library", "io": "--io", "device": "--device", "output": "-o"}
 """What names a path on the command line, by its key; sources stand there without an option."""
@@ -55,6 +60,7 @@ class Project:
     no_warn: list[str] = field(default_factory=list)
     werror: bool = False
     info: ApplicationInfo = field(default_factory=ApplicationInfo)
+    information: Information = NO_INFORMATION
     dialect: str | None = None
     link: str | None = None  # cli/links.py checks what it says
     link_line: int = 0
@@ -75,6 +81,7 @@ def _project(file: Path, table: Table) -> Project:
     folder = file.parent
     options = table.table("options") or table.empty("options")
     information = table.table("information") or table.empty("information")
+    texts = {key: _shown(information, key) for key in _INFORMATION}
     formatter = table.table("format") or table.empty("format")
     table.belongs("it goes into [information]", *_INFORMATION)
     table.belongs("it goes into [format]", "line-length")
@@ -94,7 +101,8 @@ def _project(file: Path, table: Table) -> Project:
         options.flag("debug"),
         _warnings(options),
         options.flag("werror"),
-        _information(folder, information),
+        _application_info(folder, texts),
+        Information({key: text for key, text in texts.items() if text}, _properties(information), PROJECT_FILE),
         options.choice("dialect", {name: name for name in DIALECTS}),
         table.text("link"),
         table.value_pos("link").line,
@@ -269,18 +277,74 @@ def _warnings(options: Table) -> list[str]:
     return names
 
 
-def _information(folder: Path, table: Table) -> ApplicationInfo:
-    name = _shown(table, "name") or folder.resolve().name
-    return ApplicationInfo(name, _shown(table, "author"), _shown(table, "version"), _shown(table, "description"))
+def _application_info(folder: Path, texts: dict[str, str]) -> ApplicationInfo:
+    """What the image says; title and company are for the program alone."""
+    name = texts["name"] or folder.resolve().name
+    return ApplicationInfo(name, texts["author"], texts["version"], texts["description"], texts["profile"])
+
+
+def _properties(information: Table) -> dict[str, Property]:
+    """The properties of [information.properties], by their keys."""
+    table = information.table("properties")
+    found: dict[str, Property] = {}
+    for entry in table.items() if table is not None else ():
+        value = _property(entry, information.mistakes)
+        if value is not None:
+            found[entry.key] = value
+    return found
+
+
+def _property(entry: Entry, mistakes: Mistakes) -> Property | None:
+    """One property; None after a mistake."""
+    key, value = entry.key, entry.value
+    if not key or not key.isascii() or not key.isprintable():
+        mistakes.error(entry.key_pos, "the key of a property has ASCII characters that can be seen, and is not empty")
+        return None
+    match value:
+        case bool():
+            return Property(PropertyKind.BOOL, value)
+        case int():
+            return Property(PropertyKind.NUMBER, value)
+        case float() if isfinite(value):
+            return Property(PropertyKind.NUMBER, value)
+        case str():
+            wrong = _wrong_with_text(key, value)
+            if not wrong:
+                return Property(PropertyKind.TEXT, value)
+            mistakes.error(entry.pos, wrong)
+        case Table():
+            return _version(key, value)
+        case _:
+            mistakes.error(entry.pos, f'{key} can be a text, a number, true or false, or {{ version = "1.2.0.0" }}')
+    return None
+
+
+def _version(key: str, table: Table) -> Property | None:
+    """`{ version = "1.2.0.4" }`: one to four numbers, which become four."""
+    text = table.text("version", required="1.2.0.0")
+    table.close()
+    if text is None:
+        return None
+    if not _VERSION.fullmatch(text) or any(int(part) > _MAX_VERSION_PART for part in text.split(".")):
+        hint = f"one to four numbers up to {_MAX_VERSION_PART}, such as 1.2.0.4"
+        table.error(f"{key} has the version '{text}'; a version is {hint}", "version")
+        return None
+    numbers = [str(int(part)) for part in text.split(".")]
+    return Property(PropertyKind.VERSION, ".".join([*numbers, "0", "0", "0"][:4]))
 
 
 def _shown(table: Table, key: str) -> str:
-    """A text that the image carries."""
+    """A text that the image carries, or that a program gets."""
     text = table.text(key) or ""
-    if text.isascii() and not text.isprintable():
-        table.error(f"{key} has a line break or another character that cannot be seen; write it in one line", key)
-    elif not text.isascii():
-        table.error(f"{key} goes into the image, which takes ASCII only; write other letters with those", key)
-    elif len(text) > _MAX_TEXT:
-        table.error(f"{key} has {len(text)} characters; it can have {_MAX_TEXT}", key)
+    if wrong := _wrong_with_text(key, text):
+        table.error(wrong, key)
     return text
+
+
+def _wrong_with_text(key: str, text: str) -> str:
+    """Why a text cannot be in an image; "" if it can."""
+    if text.isascii() and not text.isprintable():
+        return f"{key} has a line break or another character that cannot be seen; write it in one line"
+    if not text.isascii():
+        return f"{key} goes into the image, which takes ASCII only; write other letters with those"
+    return f"{key} has {len(text)} characters; it can have {_MAX_TEXT}" if len(text) > _MAX_TEXT else ""

@@ -14,6 +14,7 @@ from plctool.compiler.semantics.generics import bounds_of
 from plctool.compiler.semantics.rules import intrinsics
 from plctool.compiler.semantics.rules.arguments import packed, packed_and_pointed_to, size_of
 from plctool.compiler.semantics.rules.conversion_calls import conversion_hint, find_conversion
+from plctool.compiler.semantics.rules.information import INFORMATION_FUNCTIONS, information
 from plctool.compiler.semantics.rules.intrinsics import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.members import space_of
 from plctool.compiler.semantics.rules.places import changeable_place, named_place
@@ -284,6 +285,8 @@ def find_built_in(c: Checker, name: str) -> Callable[[ast.Call, Type | None], Ex
         return lambda node, expected: of_variable(c, name, node, expected)
     if name in _PLACES:
         return lambda node, expected: _place(c, name, node)
+    if name in INFORMATION_FUNCTIONS:
+        return lambda node, _: information(c, name, node)
     function = _FUNCTIONS.get(name)
     if function is None:
         return find_conversion(c, name)
@@ -301,12 +304,13 @@ def _applied(c: Checker, name: str, function: BuiltIn, node: ast.Call, expected:
 
 def is_built_in(name: str) -> bool:
     """True for a function that the compiler knows itself; conversions are not among them."""
-    return any(name.upper() in known for known in (_FUNCTIONS, _OF_VARIABLES, _PLACES, QUERIES))
+    return any(name.upper() in known for known in (_FUNCTIONS, _OF_VARIABLES, _PLACES, QUERIES, INFORMATION_FUNCTIONS))
 
 
 def built_in_names() -> list[str]:
     """Returns the functions that the compiler knows itself, but for conversions and what begins with _."""
-    return sorted(name for known in (_FUNCTIONS, _OF_VARIABLES) for name in known if not name.startswith("_"))
+    known_here = (_FUNCTIONS, _OF_VARIABLES, INFORMATION_FUNCTIONS)
+    return sorted(name for known in known_here for name in known if not name.startswith("_"))
 
 
 def _place(c: Checker, name: str, node: ast.Call) -> Expr:
@@ -327,7 +331,7 @@ def function_hint(c: Checker, name: str) -> str:
     return (
         conversion_hint(c, name.upper())
         or known_name_like(name, [*instances, *members, *c.world.names.program_names()])
-        or known_name_like(name, c.world.names.function_names())
+        or known_name_like(name, [*c.world.names.function_names(), *INFORMATION_FUNCTIONS.values()])
         or known_name_like(name, [*_FUNCTIONS, *_OF_VARIABLES])
     )
 
