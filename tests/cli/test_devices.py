@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_device import FakeDevice, FakeLine, FakePlc
+from fake_device import DEVICE_NAME, FakeDevice, FakeLine, FakePlc
 from serial.tools.list_ports_common import ListPortInfo
 from small_app import make_application
 
@@ -136,6 +136,32 @@ def test_status_of_a_firmware_without_application_information_leaves_the_program
     monkeypatch.setattr(running, "_handlers", lambda: handlers)
     assert tool("status", *PORT, "--json").json["program"] is None
     assert "program" not in tool("status", *PORT).out
+
+
+def test_info_of_a_device_shows_what_it_has_of_its_program(tool: Any, running: FakePlc) -> None:
+    document = tool("info", *PORT, "--json").json
+    program = {"size": len(running.image), "crc": f"{running.crc:08X}", "target": "cortex-m3"}
+    assert document == {"device": DEVICE_NAME, "state": "run", "info": {"project": "demo", "version": "1.2"}} | program
+    out = tool("info", *PORT).out
+    assert f"crc: {running.crc:08X}\ntarget: cortex-m3\nproject: demo\nversion: 1.2\n" in out
+
+
+def test_info_of_a_device_without_program_shows_its_target(tool: Any, plc: FakePlc) -> None:
+    assert tool("info", *PORT).out == f"device: {DEVICE_NAME}\nstate: none\ntarget: cortex-m3\n"
+
+
+def test_info_of_an_image_and_a_device_at_once_is_refused(tool: Any, running: FakePlc) -> None:
+    done = tool("info", "small.cdl", *PORT)
+    assert (done.status, done.err) == (
+        2, "plctool: Name small.cdl or a link, not both: each is described by its own command.\n",
+    )  # fmt: skip
+
+
+def test_info_without_a_link_describes_an_image_also_where_a_link_is_set(
+    tool: Any, image: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PLC_LINK", "serial:/dev/fake")
+    assert "device" not in tool("info", str(image), "--json").json
 
 
 def test_status_after_an_exception_names_task_pou_file_and_line(tool: Any, running: FakePlc) -> None:

@@ -88,6 +88,11 @@ def _options_for(scheme: str, args: argparse.Namespace) -> dict[str, Value]:
     return {name: value for name, value in _options(args).items() if name in TRANSPORTS[scheme].options}
 
 
+def names_link(args: argparse.Namespace) -> bool:
+    """True if the arguments name a link, or an option of one; not for that of the environment or of plc.toml."""
+    return bool(_given(args) or _options(args))
+
+
 def _given(args: argparse.Namespace) -> list[str]:
     """The kinds of link that the arguments name."""
     return [scheme for scheme, kind in TRANSPORTS.items() if kind.flag and _argument(args, kind.flag) is not None]

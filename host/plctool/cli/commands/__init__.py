@@ -44,7 +44,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("fmt", "fmt", "format Structured Text: one style, the program stays the same"),
         Row("doc", "doc", "write pages of a library or program from its comments, with diagrams"),
         Row("symbols", "images", "list the variables of an image with their types"),
-        Row("info", "images", "describe an image, or the programs in a .bin or .hex of 'plctool image'"),
+        Row("info", "images", "describe an image, a .bin or .hex of 'plctool image', or what a device has"),
         Row("image", "images", "write what a production programmer burns: a flash with its program"),
         Row("export", "exports", "write a program as PLCopen XML, for CODESYS, TwinCAT, OpenPLC Editor and Beremiz"),
         Row("export-itf", "exports", "write a C header, and a C file to fill in, for functions implemented in C"),

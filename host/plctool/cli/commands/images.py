@@ -6,22 +6,28 @@ import argparse
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from plctool.cli import io_documents, output
-from plctool.cli.arguments import add_board, add_firmware, add_image, utf8
+from plctool.cli.arguments import add_board, add_firmware, add_image, add_link, utf8
 from plctool.cli.builds import fresh_image, image_of, project_of
+from plctool.cli.connections import on_device
 from plctool.cli.documents import Document
+from plctool.cli.links import names_link
 from plctool.cli.output import table
 from plctool.cli.overwriting import check_not_read
 from plctool.cli.parser import Parser
-from plctool.errors import UsageError
+from plctool.errors import DeviceError, UsageError
 from plctool.files import file_path, read_image
 from plctool.project import IMAGE_SUFFIX
+
+if TYPE_CHECKING:
+    from plctool.device import Plc
 
 
 def info_arguments(command: Parser) -> None:
     add_image(command)
+    add_link(command)
     command.set_defaults(action=_info)
 
 
@@ -42,6 +48,10 @@ def symbols_arguments(command: Parser) -> None:
 def _info(args: argparse.Namespace) -> int:
     from plctool.image.production import is_production
 
+    if names_link(args):
+        if args.image is not None:
+            raise UsageError(f"Name {args.image} or a link, not both: each is described by its own command.", "no-link")
+        return on_device(args, device_info, info_text)
     image = image_of(args)
     if is_production(image):
         return output.show(args, production_info(image), production_info_text)
@@ -70,6 +80,22 @@ def info(path: Path) -> Document:
         {"name": name, "size": size, "file": units[name].file, "line": units[name].line}
         for name, size in code_sizes(table, document["code_size"]).items()
     ]
+    return document
+
+
+def device_info(plc: Plc) -> Document:
+    """What a device has of its program, under the names that `info` has. "info" is empty without program, and from a
+    firmware without application information."""
+    from plctool.image.file import target_name
+
+    identity, status = plc.identity(), plc.raw_status()
+    document: Document = {"device": identity.device_name, "state": str(status.state)}
+    if status.image_crc:
+        document |= {"size": status.image_size, "crc": f"{status.image_crc:08X}"}
+    document |= {"target": target_name(identity.target_id), "info": {}}
+    if status.image_crc:
+        with suppress(DeviceError):
+            document["info"] = plc.info()
     return document
 
 
