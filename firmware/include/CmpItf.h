@@ -99,6 +99,7 @@ enum {
     CMPID_CmpAppBPSrv = 0x0033,
     CMPID_CmpOperationControl = 0x0034,
     CMPID_SysMdns = 0x0038,
+    CMPID_IecLog = 0x0040,
 };
 
 /* Name of a component, "" when unknown. */

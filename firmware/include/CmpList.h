@@ -106,6 +106,9 @@ enum {
 #if HAS_CmpOperationControl
     CMP_ONE(CmpOperationControl)
 #endif
+#if HAS_IecLog
+    CMP_ONE(IecLog)
+#endif
 #if HAS_IoDrvModbus
     CMP_ONE(IoDrvModbus)
 #endif

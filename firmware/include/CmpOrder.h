@@ -48,6 +48,9 @@ X(CmpForce)
 #if HAS_CmpOperationControl
 X(CmpOperationControl)
 #endif
+#if HAS_IecLog
+X(IecLog)
+#endif
 #if HAS_CmpTraceMgr
 X(CmpTraceMgr)
 #endif

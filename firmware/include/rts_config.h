@@ -292,6 +292,15 @@
 #define OPERATION_CONTROL 0
 #endif
 
+/* Messages that a program may add to the log at once (IecLog.h), and how long it then waits for each further one [ms]. It
+ * needs HAS_IecLog in cmp_list.c. 0: no flash for it, and a program that does is refused. */
+#ifndef IEC_LOG_BURST
+#define IEC_LOG_BURST 0
+#endif
+#ifndef IEC_LOG_REFILL_MS
+#define IEC_LOG_REFILL_MS 1000
+#endif
+
 /* Bytes for what is traced (CmpTraceMgr.h): each packet takes some 150, 28 for each record, and its samples. 0: none, and
  * no flash for them. It needs HAS_CmpTraceMgr in cmp_list.c, and two of EVENT_MAX_CALLBACKS. */
 #ifndef TRACE_BUFFER

@@ -19,6 +19,7 @@
 #define HAS_IoDrvModbus 1
 #define HAS_CmpForce 1
 #define HAS_CmpOperationControl 1
+#define HAS_IecLog 1
 #define HAS_CmpTraceMgr 1
 #define HAS_CmpAppBP 1
 #define HAS_CmpIoMgrSrv 1

@@ -31,6 +31,7 @@
 #define SRV_OTHER_CLIENTS 1
 #define FORCE_MAX 128
 #define OPERATION_CONTROL 1
+#define IEC_LOG_BURST 16
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */
 #define TRACE_BUFFER (1024 * 1024)
 #endif

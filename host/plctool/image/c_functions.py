@@ -18,6 +18,8 @@ _FUNCTIONS = {
         ieckept(POINTER TO BYTE,UDINT):BOOL                 32    16""",
     "CmpOperationControl": """
         operation_control(POINTER TO BYTE):BOOL             64    80""",
+    "IecLog": """
+        log_add(UDINT,UDINT,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD):BOOL  352  480""",
     "CmpMath": """
         sin(LREAL):LREAL                                  1008  1856
         cos(LREAL):LREAL                                  1008  1856

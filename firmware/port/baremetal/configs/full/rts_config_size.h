@@ -27,6 +27,7 @@
 #define SRV_OTHER_CLIENTS 1
 #define FORCE_MAX 16
 #define OPERATION_CONTROL 1
+#define IEC_LOG_BURST 8
 #ifndef TRACE_BUFFER
 #define TRACE_BUFFER 4096
 #endif
