@@ -16,7 +16,7 @@
 /* Nor have all entries of the log, beside files. */
 #ifdef FILE_STORE_FILES
 #undef LOG_MAX_ENTRIES
-#define LOG_MAX_ENTRIES 11
+#define LOG_MAX_ENTRIES 10
 #endif
 
 #include "rts_config_cortexm.h"
