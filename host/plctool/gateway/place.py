@@ -6,15 +6,16 @@ import hashlib
 import os
 import socket
 import stat
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-if sys.platform != "win32":
+try:
     import fcntl
+except ImportError:  # Windows, where runtime_folder() says that there is no gateway
+    fcntl = None  # type: ignore[assignment]
 
 _ADDRESS_MAX = 100  # bytes of a socket's path that every system takes, its NUL included
 _NAME_MAX = 24  # of the line's own name, in the names of files
@@ -65,7 +66,7 @@ def find_place(port: str) -> Place:
 
 def runtime_folder() -> Path:
     """A folder that only this user can use, made if it is missing. Raises NoGateway."""
-    if not hasattr(socket, "AF_UNIX") or sys.platform == "win32":
+    if fcntl is None or not hasattr(socket, "AF_UNIX"):
         raise NoGateway("this system has no local sockets")
     failure = "no folder for it"
     for base, name in _bases():
