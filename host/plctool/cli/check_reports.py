@@ -13,7 +13,7 @@ from urllib.parse import quote
 from xml.etree import ElementTree
 
 from plctool.compiler.syntax.diagnostics import Diagnostic
-from plctool.compiler.syntax.warnings import WARNINGS
+from plctool.compiler.syntax.warnings import MEANINGS
 from plctool.version import plctool_version
 
 _SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -35,7 +35,7 @@ def sarif(diagnostics: Sequence[Diagnostic]) -> bytes:
 
 
 def _rule(code: str) -> dict[str, Any]:
-    return {"id": code, "shortDescription": {"text": WARNINGS.get(code, code)}}
+    return {"id": code, "shortDescription": {"text": MEANINGS.get(code, code)}}
 
 
 def _result(diagnostic: Diagnostic) -> dict[str, Any]:

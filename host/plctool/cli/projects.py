@@ -13,6 +13,7 @@ from plctool.compiler import IoFiles, ProgramFiles, program_files
 from plctool.compiler.sources.dialect_of_files import dialect_of_files
 from plctool.compiler.sources.project import Project
 from plctool.compiler.sources.request import BuildRequest, request_of
+from plctool.compiler.syntax.guidelines import PROPOSED
 from plctool.compiler.syntax.warnings import WarningOptions, warning_options
 from plctool.errors import UsageError
 from plctool.project import DEFAULT_IMAGE, PROJECT_FILE, find_project
@@ -63,7 +64,7 @@ def _request(args: argparse.Namespace, files: ProgramFiles) -> BuildRequest:
     return replace(
         replace(asked, target=None) if has_board else asked,
         **chosen,
-        warnings=_warnings(args, asked.warnings),
+        warnings=_warnings(args, files, asked.warnings),
         board=_board(args, files.project),
         firmware=getattr(args, "firmware", None),
         limits=not getattr(args, "no_limits", False),
@@ -103,10 +104,13 @@ def needed_project() -> Path:
     return file
 
 
-def _warnings(args: argparse.Namespace, asked: WarningOptions) -> WarningOptions:
+def _warnings(args: argparse.Namespace, files: ProgramFiles, asked: WarningOptions) -> WarningOptions:
     """Names that are not wanted add up."""
     werror = asked.as_errors if args.werror is None else args.werror
-    return warning_options([*args.no_warn, *asked.disabled], as_errors=werror)
+    guidelines = None
+    if getattr(args, "guidelines", False):
+        guidelines = PROPOSED if files.project is None else files.project.guidelines
+    return warning_options([*args.no_warn, *asked.disabled], as_errors=werror, guidelines=guidelines)
 
 
 def _board(args: argparse.Namespace, project: Project | None) -> str | None:

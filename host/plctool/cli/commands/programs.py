@@ -42,6 +42,11 @@ def check_arguments(command: Parser) -> None:
         "--sarif", type=file_path, metavar="FILE", help="write a report for code scanning (SARIF) as well"
     )
     command.add_argument("--junit", type=file_path, metavar="FILE", help="write a report in JUnit's format as well")
+    command.add_argument(
+        "--guidelines",
+        action="store_true",
+        help="hold the program to PLCopen's coding guidelines as well; plc.toml says to which forms and limits",
+    )
     add_warnings(command)
     add_io_files(command)
     command.set_defaults(action=_check)

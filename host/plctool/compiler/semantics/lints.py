@@ -14,10 +14,12 @@ from dataclasses import dataclass
 
 from plctool.compiler.semantics.allocation import report_overlaps
 from plctool.compiler.semantics.call_graph import report_shared_writes
+from plctool.compiler.semantics.guidelines import report_guidelines
 from plctool.compiler.semantics.pitfalls import report_endless
 from plctool.compiler.semantics.rules.control import report_unused
 from plctool.compiler.semantics.stages import Checked
 from plctool.compiler.semantics.uncalled_blocks import report_uncalled_blocks
+from plctool.compiler.syntax.guidelines import GROUP as GUIDELINES
 from plctool.compiler.syntax.warnings import GROUP_OF
 
 CHECKED, PLACED = "checked", "placed"
@@ -25,8 +27,8 @@ CHECKED, PLACED = "checked", "placed"
 
 @dataclass(frozen=True)
 class Lint:
-    """`name`: of the warning; `report` is called at the end of the stage. `of_device`: it is about the tasks of a
-    device, so unit tests leave it out. `despite_errors`: it holds whatever is wrong elsewhere."""
+    """`name`: of the warning, or of a group of them; `report` is called at the end of the stage. `of_device`: it is
+    about the tasks of a device, so unit tests leave it out. `despite_errors`: it holds whatever is wrong elsewhere."""
 
     name: str
     stage: str
@@ -37,7 +39,7 @@ class Lint:
     @property
     def group(self) -> str:
         """The group of warnings that it belongs to."""
-        return GROUP_OF[self.name]
+        return GROUP_OF.get(self.name, self.name)
 
 
 def _unused_variables(checked: Checked) -> None:
@@ -65,6 +67,7 @@ LINTS = (
     Lint("endless", CHECKED, lambda c: report_endless(c.program.world.loops, c.diagnostics)),
     Lint("task", CHECKED, lambda c: c.program.world.calls.report_shared(c.application.tasks), despite_errors=True),
     Lint("no-program", CHECKED, _no_program),
+    Lint(GUIDELINES, CHECKED, report_guidelines),
     Lint("shared", PLACED, lambda c: report_shared_writes(c.application.tasks, c.diagnostics), of_device=True),
     Lint(
         "written-input",

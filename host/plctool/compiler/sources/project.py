@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path, PurePath
 
@@ -19,7 +19,8 @@ from plctool.compiler.codegen.lower_unit import parse_checks
 from plctool.compiler.sources.library_files import is_stand_in, libraries_at, no_library
 from plctool.compiler.sources.source_files import READERS
 from plctool.compiler.sources.toml_files import read_checked
-from plctool.compiler.syntax.warnings import GROUPS, WARNINGS, meant_by
+from plctool.compiler.syntax.guidelines import NAME_KINDS, PROPOSED, STYLES, Guidelines, read_form
+from plctool.compiler.syntax.warnings import GROUPS, MEANINGS, WARNINGS, meant_by
 from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import is_inside, read_utf8
 from plctool.iec.dialect import DIALECTS
@@ -65,6 +66,7 @@ class Project:
     link: str | None = None  # cli/links.py checks what it says
     link_line: int = 0
     line_length: int | None = None  # of formatted sources
+    guidelines: Guidelines = PROPOSED  # which hold when they are asked for
 
 
 def read_project(file: Path) -> Project:
@@ -107,6 +109,7 @@ def _project(file: Path, table: Table) -> Project:
         table.text("link"),
         table.value_pos("link").line,
         formatter.number("line-length", *LINE_LENGTHS, unit="characters"),
+        _guidelines(table),
     )
     formatter.close()
     options.close()
@@ -271,10 +274,39 @@ def _warnings(options: Table) -> list[str]:
             names.append(entry.value)
         else:
             hint = (
-                did_you_mean(entry.value, (*WARNINGS, *GROUPS)) or f"; the names are {', '.join((*GROUPS, *WARNINGS))}"
+                did_you_mean(entry.value, (*MEANINGS, *GROUPS)) or f"; the names are {', '.join((*GROUPS, *WARNINGS))}"
             )
             options.mistakes.error(entry.pos, f"there is no warning '{entry.value}'{hint}")
     return names
+
+
+def _guidelines(table: Table) -> Guidelines:
+    """What [guidelines] sets; the rest as it is proposed."""
+    asked = table.table("guidelines") or table.empty("guidelines")
+    limits = {
+        "shortest_name": asked.number("shortest-name", 1, 1000, unit="characters"),
+        "longest_name": asked.number("longest-name", 1, 1000, unit="characters"),
+        "branches": asked.number("branches", 1, 10_000),
+        "globals": asked.number("globals", 0, 10_000),
+        "parameters": asked.number("parameters", 0, 10_000),
+    }
+    given = {name: value for name, value in limits.items() if value is not None}
+    avoided = frozenset(str(entry.value).casefold() for entry in asked.strings("avoid"))
+    guidelines = replace(PROPOSED, forms=_forms(asked), avoided=avoided, **given)
+    asked.close()
+    return guidelines
+
+
+def _forms(guidelines: Table) -> dict[str, str]:
+    """The forms of [guidelines.names] by kind."""
+    names = guidelines.table("names") or guidelines.empty("names")
+    found = {kind: form for kind in NAME_KINDS if (form := names.text(kind)) is not None}
+    for kind, form in found.items():
+        if read_form(form) is None:
+            styles = listed(list(STYLES), "or")
+            names.error(f"'{form}' is no form of a name; it has {styles} in it once, as FB_CamelCase", kind)
+    names.close()
+    return found
 
 
 def _application_info(folder: Path, texts: dict[str, str]) -> ApplicationInfo:

@@ -611,6 +611,7 @@ class If:
     pos: int
     branches: list[tuple[Expr, list[Stmt]]]
     otherwise: list[Stmt]
+    has_else: bool = False
 
 
 @dataclass(slots=True, eq=False)

@@ -483,7 +483,7 @@ class Builder:
 
     def if_stmt(self, keyword: Token, condition: ast.Expr, body: list[ast.Stmt], *rest: Any) -> ast.If:
         *elsifs, otherwise = rest
-        return ast.If(keyword.pos, [(condition, body), *elsifs], otherwise or [])
+        return ast.If(keyword.pos, [(condition, body), *elsifs], otherwise or [], otherwise is not None)
 
     def elsif(self, condition: ast.Expr, body: list[ast.Stmt]) -> tuple[ast.Expr, list[ast.Stmt]]:
         return condition, body

@@ -14,7 +14,7 @@ from typing import Literal
 from plctool.compiler.base.missing_names import Use, library_of, table
 from plctool.compiler.base.nesting import NestingError
 from plctool.compiler.base.source import Finding, Source
-from plctool.compiler.syntax.warnings import ALL_WARNINGS, WARNINGS, LineRanges, WarningOptions, switched_off
+from plctool.compiler.syntax.warnings import ALL_WARNINGS, MEANINGS, LineRanges, WarningOptions, switched_off
 from plctool.compiler.typed.nodes import Pos
 from plctool.errors import UsageError, counted
 from plctool.errors import did_you_mean as did_you_mean
@@ -87,7 +87,7 @@ class Diagnostics:
         self._add(pos, "error", "unknown", message, missing=name)
 
     def warning(self, pos: Pos, code: str, message: str) -> None:
-        """Records a warning, unless it is not wanted; `code` is one of WARNINGS. A dialect may make it an error, which
+        """Records a warning, unless it is not wanted; `code` is one of MEANINGS. A dialect may make it an error, which
         cannot be turned off."""
         if code in self.dialect.errors and not self.is_quiet(pos.file):
             self.error(pos, code, f"{message} (an error in the dialect {self.dialect.name})")
@@ -202,7 +202,7 @@ def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
     warning ends with its name: `[integer-division]`."""
     d = diagnostic
     is_warning = d.severity == "warning" or d.message.endswith(_BY_OPTION)
-    name = f" [{d.code}]" if is_warning and d.code in WARNINGS else ""
+    name = f" [{d.code}]" if is_warning and d.code in MEANINGS else ""
     head = f"{d.file}:{d.line}:{d.column}: {d.severity}: {d.message}{name}"
     source = next((s for s in sources if s.path == d.file), None)
     if source is None or not source.text:  # "" of a file that is no text

@@ -10,6 +10,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from plctool.compiler.base.source import Source
+from plctool.compiler.syntax import guidelines as plcopen
+from plctool.compiler.syntax.guidelines import Guidelines
 from plctool.compiler.syntax.lexer import Lexer
 from plctool.errors import UsageError
 
@@ -93,6 +95,8 @@ _TABLE = (
 WARNINGS = {name: meaning for name, _, meaning in _TABLE}
 GROUP_OF = {name: group for name, group, _ in _TABLE}
 GROUPS = tuple(dict.fromkeys(sorted(GROUP_OF.values())))
+MEANINGS = WARNINGS | plcopen.RULES
+"""Those that are checked when they are asked for as well."""
 
 _SWITCH = re.compile(r"\{\s*warning\s+(disable|restore)\s+([\w-]+)\s*\}", re.IGNORECASE)
 
@@ -101,28 +105,33 @@ LineRanges = list[tuple[int, int]]  # first line, and the first line that is not
 
 @dataclass(frozen=True)
 class WarningOptions:
-    """`disabled`: names of warnings that are not wanted; `as_errors`: whether the others are errors."""
+    """`disabled`: names of warnings that are not wanted; `as_errors`: whether the others are errors. `guidelines`: what
+    those of PLCopen are held to; None: they are not checked."""
 
     disabled: frozenset[str] = frozenset()
     as_errors: bool = False
+    guidelines: Guidelines | None = None
 
 
 ALL_WARNINGS = WarningOptions()
 
 
-def warning_options(no_warn: Iterable[str] = (), *, as_errors: bool = False) -> WarningOptions:
+def warning_options(
+    no_warn: Iterable[str] = (), *, as_errors: bool = False, guidelines: Guidelines | None = None
+) -> WarningOptions:
     """Options from names of warnings and groups, several in one text with commas between them. Raises UsageError for an
     unknown name."""
     names = [name.strip().lower() for text in no_warn for name in text.split(",")]
     for name in names:
         if not meant_by(name):
             raise UsageError(f"There is no warning '{name}'; the names are {', '.join(WARNINGS)}.", "unknown-warning")
-    return WarningOptions(frozenset(code for name in names for code in meant_by(name)), as_errors)
+    return WarningOptions(frozenset(code for name in names for code in meant_by(name)), as_errors, guidelines)
 
 
 def meant_by(name: str) -> list[str]:
     """Returns the warnings of a group, or the one of this name; none if there is neither."""
-    return [code for code, group in GROUP_OF.items() if name in (group, code)]
+    groups = GROUP_OF | dict.fromkeys(plcopen.RULES, plcopen.GROUP)
+    return [code for code, group in groups.items() if name in (group, code)]
 
 
 def switched_off(source: Source) -> dict[str, LineRanges]:
