@@ -160,7 +160,7 @@ RTS_RESULT CMCallHook(CMP_HOOK hook);
 
 typedef struct {
     const char *name;   /* lower case */
-    RTS_UI32 signature; /* CRC-32 of the interface text, as plctool export-itf writes it */
+    RTS_UI32 signature; /* CRC-32 of the interface text, as plctool export-itf writes it; 0: parameters of any kind */
     RTS_UI32 version;   /* library version, major << 16 | minor */
     RTS_PFN function;
 } CMP_EXT_FUNCTION;

@@ -317,6 +317,26 @@ static void every_missing_function_is_named(void)
                        "nosuch (missing), noneither (missing), simburn (other parameters), simburn (other version)");
 }
 
+static void anything(void)
+{
+}
+
+/* 10.5.4 of the manual: its author answers for the parameters. */
+static void a_function_with_signature_0_is_called_with_any_parameters(void)
+{
+    static const CMP_EXT_FUNCTION unsigned_functions[] = {{"unchecked", 0, 0x00010000, (RTS_PFN)anything}};
+
+    begin();
+    CHECK(CMRegisterExternal(unsigned_functions, RTS_COUNT(unsigned_functions)) == ERR_OK);
+    add_import(&spec, "unchecked", 0x12345678, 0x00010000);
+    build_image(&image, &spec);
+    check_accepted();
+    begin();
+    CHECK(CMRegisterExternal(unsigned_functions, RTS_COUNT(unsigned_functions)) == ERR_OK);
+    add_import(&spec, "unchecked", 0x12345678, 0x00020000);
+    check_spec_refused(ERR_APP_VERSION_MISMATCH, "unchecked (other version)");
+}
+
 static void the_first_problem_gives_the_result(void)
 {
     begin();
@@ -744,6 +764,7 @@ int main(void)
     RUN(a_function_outside_the_code);
     RUN(functions_that_position_independent_code_does_not_need);
     RUN(every_missing_function_is_named);
+    RUN(a_function_with_signature_0_is_called_with_any_parameters);
     RUN(the_first_problem_gives_the_result);
     RUN(versions_are_compatible_within_the_major);
     RUN(a_list_of_missing_functions_that_is_too_long_is_cut);

@@ -66,7 +66,7 @@ static RTS_RESULT find_import(const EXT_REF_INFO *ref, const char *name)
 
     if (found == NULL)
         return ERR_APP_UNRESOLVED_REFERENCE;
-    if (found->signature != ref->signature_id)
+    if (found->signature != 0 && found->signature != ref->signature_id)
         return ERR_APP_SIGNATURE_MISMATCH;
     if (found->version >> 16 != ref->version >> 16 || found->version < ref->version)
         return ERR_APP_VERSION_MISMATCH;
