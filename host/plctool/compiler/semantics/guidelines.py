@@ -351,7 +351,7 @@ def _report_written_by_several(pous: list[Pou], diagnostics: Diagnostics) -> Non
 
 
 def _root(place: Place) -> Variable | None:
-    """The variable that a place is in; None behind a pointer."""
+    """The variable that a place is in; None for what a pointer leads to."""
     while not isinstance(place, VarPlace):
         base = getattr(place, "base", None)
         if base is None:
