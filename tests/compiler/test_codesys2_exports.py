@@ -196,14 +196,21 @@ def test_a_diagram_is_refused_by_name_and_the_rest_is_checked(tmp_path: Path, la
 
 
 @pytest.mark.parametrize("first", ["LD\tn", "ldn n", "again:\nLD n", "(* LD *)\nCAL t(IN := x)"])
-def test_a_list_of_instructions_is_refused_by_name_and_the_rest_is_checked(tmp_path: Path, first: str) -> None:
-    text = PROGRAM.replace("n := n + 1;", f"{first}\nADD 1\nCAL t(PT := T#1s)\nST n") + OTHER.replace("m + 1", "m + k")
+def test_a_list_of_instructions_with_an_error_is_named_and_the_rest_is_checked(tmp_path: Path, first: str) -> None:
+    listed = PROGRAM.replace("n := n + 1;", f"{first}\nADD 1\nCAL t(PT := T#1s)\nST")
+    text = listed + OTHER.replace("m + 1", "m + k")
     errors = [d for d in found(tmp_path, text) if d.severity == "error"]
-    assert [d.message for d in errors] == [
-        "PLC_PRG is written in IL; only Structured Text can be compiled",
-        "unknown name k",
-    ]
-    assert text.splitlines()[errors[0].line - 1] == first.splitlines()[-1]
+    assert [d.message for d in errors] == ["ST needs an operand; write ST and a name", "unknown name k"]
+    assert text.splitlines()[errors[0].line - 1] == "ST"
+
+
+def test_lists_of_instructions_run_with_comments_that_do_not_nest(tmp_path: Path) -> None:
+    text = PROGRAM.replace("'Yes'", "'No'").replace("    n : INT;", "    n : INT;\n    s : STRING := 'a';")
+    text = text.replace("n := n + 1;", "LD s (* (* *)\nCONCAT '(* b'\nST s\nLD n\nADD 1\nST n")
+    (tmp_path / "plc.EXP").write_text(text.replace("n := n * 2;", "LD\tn\nMUL 2\nST\tn"))
+    with started(tmp_path) as plc:
+        plc.run_cycles(2)
+        assert (plc.read("PLC_PRG.n"), plc.read("PLC_PRG.s")) == (2, "a(* b(* b")
 
 
 @pytest.mark.parametrize("statement", ["LD := n;", "LD(n);", "LD; CAL := n;"])

@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_st_programs import PROGRAMS, built_without_optimisation, read_script, runs
 
-from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower_unit import Options, parse_checks
 from plctool.compiler.front import check_sources
 from plctool.compiler.image.build import build_program
+from plctool.compiler.sources.source_files import read_content
 from plctool.errors import PlcError, UsageError
 from plctool.fmt.formatter import formatted
 from plctool.fmt.scan import Item, scan
@@ -254,7 +254,7 @@ def test_every_program_is_formatted_once_and_keeps_its_tokens() -> None:
 @pytest.mark.parametrize("path", [p for p in PROGRAMS if runs(read_script(p))][::SHARE], ids=lambda p: p.stem)
 def test_the_image_is_the_same(path: Path) -> None:
     text = path.read_text("utf-8")
-    found = check_sources([Source(str(path), formatted(str(path), text))])
+    found = check_sources(read_content(path, formatted(str(path), text).encode()))
     assert found.program is not None
     assert build_program(found.program, OPTIONS).image == built_without_optimisation(path, "all").image
 

@@ -199,12 +199,12 @@ def test_a_block_may_extend_one_and_implement_an_interface(tmp_path: Path) -> No
 
 def test_a_diagram_that_is_not_read_is_named_and_the_rest_is_checked(tmp_path: Path) -> None:
     drawn = pou("Drawn", "<CFC><block/></CFC>", variables("outputVars", "q:BOOL"), "functionBlock")
-    listed = pou("Listed", "<IL><xhtml>LD a</xhtml></IL>", "", "functionBlock")
+    listed = pou("Listed", "<IL><xhtml>\nADD a</xhtml></IL>", "", "functionBlock")
     main = pou("Main", st("d();\nb := d.q;\nb := d.r;"), variables("localVars", "d:Drawn", "b:BOOL"))
     found = errors(tmp_path, project(drawn + listed + main))
     assert [message.partition(" cannot")[0] for _, message in found[:2]] == [
         "the diagram Drawn (CFC)",
-        "the diagram Listed (IL)",
+        "ADD needs a result, and nothing is loaded here; begin with LD",
     ]
     assert found[2][1].startswith("Drawn has no variable r")
 

@@ -10,6 +10,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from plctool.compiler.formats.il_files import has_lists
 from plctool.errors import InternalError, UsageError
 from plctool.fmt.layout import INDENT, indentation, reindented, written
 from plctool.fmt.lines import DECLARATION, Line, split
@@ -40,9 +41,12 @@ class _Row:
 
 
 def formatted(path: str, text: str, width: int = DEFAULT_WIDTH, ranges: Sequence[Range] = ()) -> str:
-    """Returns the formatted text; `ranges`: only what stands in these lines. `path` is for messages. Raises UsageError
-    if the text has a syntax error, InternalError instead of returning a text that is another program."""
+    """Returns the formatted text; `ranges`: only what stands in these lines. `path` is for messages. A text
+    with Instruction List stays as it is. Raises UsageError if the text has a syntax error, InternalError instead of
+    returning a text that is another program."""
     plain = text.replace("\r\n", "\n")
+    if has_lists(plain):
+        return text
     items = scan(path, plain)
     result = _Writer(plain, items, width).result(ranges)
     if result != plain:

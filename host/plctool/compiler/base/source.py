@@ -56,6 +56,7 @@ class Source:
     `name`: what the list of globals in it is called, unless by the file. `shared`: the file had more than globals, so
     this is no part of their full names. `original`: the file, when the text was made from it, in `pieces` that begin at
     offset 0. `absent`: names, case-folded, of units whose files are missing; what needs them cannot be checked.
+    `lists`: the instructions of bodies in Instruction List, and the offset where their statements begin.
     """
 
     path: str
@@ -66,6 +67,7 @@ class Source:
     pieces: tuple[Piece, ...] = field(default=(), repr=False, compare=False)
     findings: tuple[Finding, ...] = field(default=(), compare=False)
     absent: frozenset[str] = field(default=frozenset(), compare=False)
+    lists: tuple[tuple[int, str], ...] = field(default=(), repr=False, compare=False)
 
     @property
     def is_unreadable(self) -> bool:

@@ -12,7 +12,8 @@ import re
 from dataclasses import dataclass
 
 from plctool.compiler.base.source import Source
-from plctool.compiler.formats.text import Findings, Place, Text
+from plctool.compiler.formats import il_files
+from plctool.compiler.formats.text import Findings, Part, Place, Text
 
 _BLOCK_IN_ONE_WORD = "FUNCTIONBLOCK"  # in exports of some systems made from CODESYS 2.3
 _ENDS = {
@@ -29,7 +30,6 @@ _OUTSIDE = re.compile(r"\(\*|'(?:\$.|[^'$\n])*'|\"(?:\$.|[^\"$\n])*\"")
 _INSIDE = re.compile(r"\(\*|\*\)")
 _NESTED = re.compile(r"\(\*\s*@NESTEDCOMMENTS\s*:=\s*'(\w+)'\s*\*\)", re.IGNORECASE)
 _DIAGRAM = re.compile(r"^[ \t]*_(LD|FBD|CFC|SFC)_?\w*[ \t]*\r?$", re.MULTILINE)
-_INSTRUCTION = re.compile(r"\s*(?:\w+:\s*)?((?:LDN?|CALC?N?)[ \t]+[\w%'\"-])", re.IGNORECASE)
 _TASK = re.compile(r"\bTASK\s+(\w+)\s*\(([^()]*)\)", re.IGNORECASE)
 _PROPERTY = re.compile(r"(\w+)\s*:=\s*([^,()]+)")
 _INSTANCE = re.compile(r"\bPROGRAM\s+(\w+)(?:\s+WITH\s+\w+)?\s*:\s*(\w+)", re.IGNORECASE)
@@ -39,6 +39,9 @@ _TYPES = {"X": "BOOL", "": "BOOL", "B": "BYTE", "W": "WORD", "D": "DWORD", "L": 
 _ADDRESS = re.compile(r"%[IQM]([XBWDL]?)\d+(?:\.\d+)*", re.IGNORECASE)
 _NAME = re.compile(r"[A-Za-z_]\w*")
 _LIBRARY = re.compile(r"[\w.\- ]+\.lib\b", re.IGNORECASE)
+
+_Edit = tuple[int, int, str | list[Part]]
+"""From offset, to offset, what stands there instead."""
 
 
 @dataclass
@@ -60,9 +63,9 @@ class _Export:
     def __init__(self, path: str, text: str) -> None:
         self._path = path
         self._text = text
-        self._edits: list[tuple[int, int, str]] = []
+        self._edits: list[_Edit] = []
         self._findings = Findings()
-        self._masked = self._without_comments()
+        self._masked, self._plain = self._without_comments()
 
     def source(self) -> Source:
         left_out: list[str] = []
@@ -93,18 +96,22 @@ class _Export:
 
     # ---- comments ----
 
-    def _without_comments(self) -> str:
-        """The text with blanks for comments and strings. Where comments do not nest, a mark in one is left out."""
+    def _without_comments(self) -> tuple[str, str]:
+        """The text with blanks for comments and strings, and the one that keeps strings. Where comments do not nest, a
+        mark in one is left out."""
         parts: list[str] = []
+        plain: list[str] = []
         at, nests = 0, True
         while (match := _OUTSIDE.search(self._text, at)) is not None:
             end = match.end()
             if match.group() == "(*":
                 nests = self._nests(match.start(), nests)
                 end = self._comment_end(end, nests=nests)
-            parts += [self._text[at : match.start()], _blank(self._text[match.start() : end])]
+            found = self._text[match.start() : end]
+            parts += [self._text[at : match.start()], _blank(found)]
+            plain += [self._text[at : match.start()], _blank(found) if match.group() == "(*" else found]
             at = end
-        return "".join([*parts, self._text[at:]])
+        return "".join([*parts, self._text[at:]]), "".join([*plain, self._text[at:]])
 
     def _comment_end(self, at: int, *, nests: bool) -> int:
         depth = 1
@@ -171,16 +178,14 @@ class _Export:
         return [f"{span.kind} {span.name}".strip() if span.kind == "VISUALISATION" else span.kind]
 
     def _other_language(self, span: _Span) -> None:
-        """Refuses a body that is a diagram or a list of instructions."""
+        """Refuses a body that is a diagram, and translates one that is a list of instructions."""
         match = _DIAGRAM.search(self._masked, span.start, span.end)
         if match is not None:
             self._refuse(span, match.start(), match.start(1) - 1, match[1])
             return
-        declared = self._masked.upper().rfind("END_VAR", span.start, span.end)
-        body = self._line_end(span.start) if declared < 0 else declared + len("END_VAR")
-        instruction = _INSTRUCTION.match(self._masked, body, span.end)
-        if instruction is not None:
-            self._refuse(span, body, instruction.start(1), "IL")
+        for start, end in il_files.bodies(self._plain, span.start, span.end):
+            made = il_files.statements(self._text, self._plain, (start, end), self._place(start), self._findings)
+            self._edits.append((start, end, made))
 
     def _refuse(self, span: _Span, start: int, at: int, language: str) -> None:
         """Leaves out a body that begins at `start`."""
@@ -238,9 +243,9 @@ class _Export:
         return "\n".join(["VAR_GLOBAL", *dict.fromkeys(lines), "END_VAR\n"]) if lines else ""
 
 
-def _apart(edits: list[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
+def _apart(edits: list[_Edit]) -> list[_Edit]:
     """In order, without those within another one: marks in comments of a section that is left out."""
-    found: list[tuple[int, int, str]] = []
+    found: list[_Edit] = []
     for edit in sorted(edits, key=lambda e: (e[0], -e[1])):
         if not found or edit[0] >= found[-1][1]:
             found.append(edit)

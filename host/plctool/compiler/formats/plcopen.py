@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 
 from plctool.compiler.base.source import Source
+from plctool.compiler.formats import instruction_list
 from plctool.compiler.formats import plcopen_types as types
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
 from plctool.compiler.formats.plcopen_chart import Chart
@@ -23,7 +24,7 @@ from plctool.compiler.formats.xml_tree import Element, XmlError, read_xml
 
 _KEYWORDS = {"function": "FUNCTION", "functionblock": "FUNCTION_BLOCK", "program": "PROGRAM", "interface": "INTERFACE"}
 _MODIFIERS = ("Abstract", "Final", "Internal", "Private", "Protected", "Public")
-_DIAGRAMS = ("FBD", "LD", "SFC", "CFC", "IL")
+_DIAGRAMS = ("FBD", "LD", "SFC", "CFC")
 _NAMESPACE = re.compile(r"plcopen\.org/xml/tc6|iec61131-10", re.IGNORECASE)
 HEAD = 4096  # bytes in which the name space of a project stands
 
@@ -260,7 +261,7 @@ class _Project:
                 try:
                     _translate(written, unit, body)
                 except NotTranslatedError as error:
-                    message = _REFUSED.format(f"{name} ({written.tag})", error)
+                    message = str(error) if written.tag == "IL" else _REFUSED.format(f"{name} ({written.tag})", error)
                     self._findings.add(error.at, "language", message, error.needs)
                     return Body()
                 except RecursionError:
@@ -281,8 +282,10 @@ def _translate(written: Element, unit: Unit, body: Body) -> None:
         Network(written, unit, body).translate()
     elif written.tag == "SFC":
         Chart(written, unit, body).translate()
+    elif written.tag == "IL":
+        instruction_list.translate(written.every_chunk(), body)
     elif written.tag in _DIAGRAMS and (written.children or written.text):
-        raise NotTranslatedError(written.at, "only ST, SFC, LD and FBD are read; write or export it as one of them")
+        raise NotTranslatedError(written.at, "only ST, IL, SFC, LD and FBD are read; write or export it as one of them")
 
 
 def plain_text(element: Element) -> list[Chunk]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from plctool.compiler.formats.text import Chunk, Place, Text
+from plctool.compiler.formats.text import Part, Place, Text
 from plctool.compiler.formats.xml_tree import Element
 
 
@@ -24,7 +24,7 @@ class NotTranslatedError(Exception):
 class Body:
     """Statements, steps or both, with variables of its own."""
 
-    parts: list[Chunk | tuple[str, Place]] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
     variables: dict[str, tuple[str, Place]] = field(default_factory=dict)  # their types, by name
     actions: list[tuple[str, Body, Place]] = field(default_factory=list)
 
@@ -34,11 +34,7 @@ class Body:
 
     def write(self, text: Text) -> None:
         """Adds the statements to a source."""
-        for part in self.parts:
-            if isinstance(part, Chunk):
-                text.copied([part])
-            else:
-                text.made(*part)
+        text.parts(self.parts)
 
     def write_variables(self, text: Text) -> None:
         """Adds the variables, also those of the actions."""

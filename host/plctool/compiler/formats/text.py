@@ -27,6 +27,16 @@ class Chunk(NamedTuple):
     column: int
 
 
+class Listing(NamedTuple):
+    """The instructions that the following statements were made of."""
+
+    text: str
+
+
+Part = Chunk | Listing | tuple[str, Place]
+"""What a text is made of: parts of the file, and what is made for a place in it."""
+
+
 class Findings:
     """What is said about a file while it is read; each thing once."""
 
@@ -58,6 +68,7 @@ class Text:
         self._parts: list[str] = []
         self._pieces: list[Piece] = []
         self._length = 0
+        self._lists: list[tuple[int, str]] = []
 
     def __bool__(self) -> bool:
         return bool(self._parts)
@@ -74,7 +85,17 @@ class Text:
                 self._add(part, line, column, copied=True)
                 line, column = line + 1, 1
 
-    def spliced(self, text: str, inserts: Iterable[tuple[int, int, str]]) -> None:
+    def parts(self, parts: Iterable[Part]) -> None:
+        """Adds several parts."""
+        for part in parts:
+            if isinstance(part, Chunk):
+                self.copied([part])
+            elif isinstance(part, Listing):
+                self._lists.append((self._length, part.text))
+            else:
+                self.made(*part)
+
+    def spliced(self, text: str, inserts: Iterable[tuple[int, int, str | list[Part]]]) -> None:
         """Adds a whole file in which parts are other ones: from offset, to offset, what stands there instead. The parts
         are in order and do not overlap."""
         at, line, start = 0, 1, 0
@@ -82,7 +103,7 @@ class Text:
             self.copied([Chunk(text[at:begin], line, at - start + 1)])
             line += text.count("\n", at, begin)
             start = max(start, text.rfind("\n", at, begin) + 1)
-            self.made(instead, Place(line, max(1, begin - start)))
+            self.parts([(instead, Place(line, max(1, begin - start)))] if isinstance(instead, str) else instead)
             line += text.count("\n", begin, end)
             start = max(start, text.rfind("\n", begin, end) + 1)
             at = end
@@ -92,6 +113,7 @@ class Text:
         """Adds the text of a whole file that may be another one."""
         pieces = source.pieces or Text.of_lines(source.text)
         self._pieces += [replace(p, offset=p.offset + self._length, path=p.path or source.path) for p in pieces]
+        self._lists += [(offset + self._length, text) for offset, text in source.lists]
         self._parts.append(source.text)
         self._length += len(source.text)
         self.made("\n", Place(pieces[-1].line, pieces[-1].column))
@@ -114,7 +136,8 @@ class Text:
     ) -> Source:
         """The text as a source of that file."""
         pieces = tuple(self._pieces) or (Piece(0, 1, 1, copied=False),)
-        return Source(path, "".join(self._parts), name, shared, original, pieces, findings)
+        text = "".join(self._parts)
+        return Source(path, text, name, shared, original, pieces, findings, lists=tuple(self._lists))
 
 
 def _lines(text: str) -> list[str]:

@@ -33,7 +33,8 @@ _ENDS = {
 class Part:
     """A unit, a member of one, a section of variables, a step ...: `tokens` from its keyword to its end, `gap` what
     stands before it, `text` both. The rest is for what holds parts: its declaration (`head`, with the gap), sections of
-    variables, members, the steps and transitions of a chart, and its statements (`body`)."""
+    variables, members, the steps and transitions of a chart, and its statements (`body`), or the `instructions` that
+    they were made of."""
 
     kind: str
     tokens: list[Token]
@@ -41,6 +42,7 @@ class Part:
     text: str
     head: str = ""
     body: str = ""
+    instructions: str = ""
     variables: list[Part] = field(default_factory=list)
     members: list[Part] = field(default_factory=list)
     chart: list[Part] = field(default_factory=list)
@@ -74,14 +76,15 @@ def outline(source: Source, declared: frozenset[str]) -> Outline:
     """The parts of a text without errors. `declared`: as in `parse_all`."""
     tokens: list[Token] = []
     parsed = parse_all(source, lambda *_: None, declared=declared, tokens=tokens)
-    reader = _Reader(source.text, tokens)
+    reader = _Reader(source, tokens)
     parts = reader.parts(len(tokens))
     return Outline(parts, parsed.attributes, source.text[reader.end :])
 
 
 class _Reader:
-    def __init__(self, text: str, tokens: list[Token]) -> None:
-        self._text = text
+    def __init__(self, source: Source, tokens: list[Token]) -> None:
+        self._text = source.text
+        self._lists = source.lists
         self._tokens = tokens
         self._at = 0
         self.end = 0  # of what was taken
@@ -145,6 +148,11 @@ class _Reader:
             else:
                 statements += self._statements(last)
         part.body = statements + self._text[self.end : self._tokens[last].pos]
+        inner = [(member.pos, member.tokens[-1].end) for member in part.members]
+        for offset, instructions in self._lists:
+            is_own = part.pos < offset <= self._tokens[last].pos
+            if is_own and not any(begin <= offset <= end for begin, end in inner):
+                part.instructions = instructions
 
     def _statements(self, last: int) -> str:
         start = self.end

@@ -297,6 +297,8 @@ class _File:
             for step in part.chart:
                 self._balanced(step.gap, step.pos)
             documentation(body, self._balanced(part.body, part.pos).strip())
+        elif part.instructions:
+            text_in(child(body, "IL"), part.instructions.strip("\r\n"))
         else:
             text_in(child(body, "ST"), self._balanced(part.body, part.pos).strip("\r\n"))
 
@@ -331,7 +333,16 @@ class _File:
         if part.kind != "PROPERTY":  # PROPERTY_GET and PROPERTY_SET, each by itself
             head = part.head.removeprefix(part.gap)
             part.head = part.gap + re.sub(r"_[GS]ET\b", "", head, count=1, flags=re.IGNORECASE)
-            single = Part(part.kind.removeprefix("PROPERTY_"), part.tokens, "", "", "", part.body, part.variables)
+            single = Part(
+                part.kind.removeprefix("PROPERTY_"),
+                part.tokens,
+                "",
+                "",
+                "",
+                part.body,
+                part.instructions,
+                part.variables,
+            )
             part.variables, accessors = [], [single]
         self._interface(written, part)
         for accessor in accessors:

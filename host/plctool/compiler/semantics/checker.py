@@ -44,6 +44,7 @@ class Checker:
         self.owner: ast.Expr | None = None  # the last one that a dot follows
         self.loops = 0  # around the statement
         self.labels = Labels([])  # of the body
+        self.temps: dict[str, Expr] = {}  # the values of the intermediate results of the body, by name
         self.around: list[list[ast.Stmt]] = []  # the statements it is one of, those around them ...
         self.last = 0  # how many of `around` are around the innermost __FINALLY
         self._expressions = 0

@@ -17,6 +17,7 @@ from plctool.compiler.formats import (
     beremiz,
     codesys2,
     global_lists,
+    il_files,
     object_text,
     plcopen,
     twincat,
@@ -40,7 +41,8 @@ def _structured_text(path: str, text: str) -> list[Source]:
     refused = unreadable.refused_text(text)
     if refused is not None:
         return [Source(path, "", original=text, pieces=(Piece(0, 1, 1, copied=False),), findings=(refused,))]
-    return [beremiz.without_blocks_in_c(object_text.read_object(path, text))]
+    lists = il_files.read_lists(path, text)
+    return [lists or beremiz.without_blocks_in_c(object_text.read_object(path, text))]
 
 
 def _export(path: str, text: str) -> list[Source]:

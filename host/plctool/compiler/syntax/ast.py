@@ -37,6 +37,20 @@ class Name:
 
 
 @dataclass(slots=True, eq=False)
+class Temp:
+    """`@x`: an intermediate result of a list of instructions or a diagram. No declaration names its type: it is that of
+    the expression assigned to it. One that is `@@x` is assigned at several places."""
+
+    pos: int
+    name: str
+
+    @property
+    def is_joined(self) -> bool:
+        """True if several assignments may give the value."""
+        return self.name.startswith("@@")
+
+
+@dataclass(slots=True, eq=False)
 class EnumValue:
     """`Color#Red`"""
 
@@ -178,7 +192,7 @@ class TypeArgument:
     spec: TypeSpec
 
 
-Value = Literal | Name | EnumValue | DirectAddress | Member | BitAccess | Index | Deref | Call
+Value = Literal | Name | Temp | EnumValue | DirectAddress | Member | BitAccess | Index | Deref | Call
 Expr = Value | Unary | Binary | Assigned | TypeArgument
 
 # ---- initial values ------------------------------------------------------------------------------------------------

@@ -611,6 +611,11 @@ class Builder:
     def name_expr(self, token: Token) -> ast.Name:
         return ast.Name(token.pos, token.text)
 
+    def temp(self, token: Token) -> ast.Temp:
+        if self.source.is_copied(token.pos):
+            self.report(token.pos, "character", "@ has no place in a program")
+        return ast.Temp(token.pos, token.text)
+
     def global_name(self, token: Token) -> ast.Name:
         return ast.Name(token.pos - 1, f".{token.text}")
 

@@ -28,6 +28,7 @@ _TOKEN = re.compile(
   | (?P<DIRECT>%(?:[IQMiqm](?:\*|[XBWDLxbwdl]?\d+(?:\.\d+)*|[XBWDLxbwdl]?(?!\w))|[XBWDLxbwdl]\d+))
   | (?P<PRAGMA>\{[^{}]*\})
   | (?P<FOREIGN>\{\{.*?\}\})
+  | (?P<TEMP>@@?\w+)
   | (?P<NESTED>\(\*|/\*)
   | (?P<SLIP>==|&&|!=|\|\|?|!|~|%(?=[\s\d(])|\d\w+|["""
     + "".join(slips.TYPESET)
@@ -163,8 +164,12 @@ class Lexer:
         start: int = 0,
         end: int | None = None,
         declared: frozenset[str] = frozenset(),
+        *,
+        made: bool = False,
     ) -> None:
-        """`declared`: what {IF defined(pou: NAME)} finds."""
+        """`declared`: what {IF defined(pou: NAME)} finds. `made`: of a text that plctool wrote, in which @x is one of
+        its own variables."""
+        self._made = made
         self.text = text
         self.attributes: dict[int, dict[str, str]] = {}
         self.repeated: dict[int, list[tuple[int, str, str]]] = {}
@@ -200,6 +205,10 @@ class Lexer:
                 elif kind == "FOREIGN":
                     self._foreign(pos)
                     continue
+                elif kind == "TEMP" and not self._made:
+                    self._bad("@", pos)
+                    at = pos + 1
+                    break
                 elif kind == "SLIP":
                     token = self._slip(word, pos)
                 elif kind == "BAD":

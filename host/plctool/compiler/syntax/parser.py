@@ -171,7 +171,7 @@ def parse_all(
     builder, new_parser = _machine(get_ident())
     parser, taken = new_parser(), [] if tokens is None else tokens
     recovery = Recovery(parser, taken, source, report)
-    lexer = Lexer(source.text, recovery.report_token, start, end, declared)
+    lexer = Lexer(source.text, recovery.report_token, start, end, declared, made=bool(source.pieces))
     places: dict[int, str] = {}
     builder.source, builder.attributes, builder.places, builder.report = source, lexer.attributes, places, report
     builder.repeated = lexer.repeated

@@ -219,7 +219,7 @@ class Recovery:
             if kind == "_SEMI":
                 before = self._source.text[: name.pos].rstrip()
                 instruction = self._earlier is not None and self._earlier.text.upper() in _INSTRUCTIONS
-                hint = "; Instruction List is not supported, write Structured Text" if instruction else ""
+                hint = "; a body is either all Structured Text or all Instruction List" if instruction else ""
                 self._say(len(before), f"expected ; after the {self._item_words(stack)}{hint}")
             else:
                 self._report_open(name, self._open())

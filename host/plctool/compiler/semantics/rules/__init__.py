@@ -14,7 +14,8 @@ from plctool.compiler.semantics.rules import (
     literals,
     operators,
     parts,
+    temps,
     variables,
 )
 
-__all__ = ["assignments", "call_statements", "calls", "control", "literals", "operators", "parts", "variables"]
+__all__ = ["assignments", "call_statements", "calls", "control", "literals", "operators", "parts", "temps", "variables"]

@@ -15,6 +15,7 @@ from plctool.compiler.semantics.rules.builtin import attempt
 from plctool.compiler.semantics.rules.call_statements import enabled
 from plctool.compiler.semantics.rules.calls import assign_property, assigned_property
 from plctool.compiler.semantics.rules.places import changeable_place, copied
+from plctool.compiler.semantics.rules.temps import define_temp
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed.nodes import Assign, AssignedValue, Const, DerefPlace, Expr, If, Load, Pos, Statement
@@ -32,6 +33,8 @@ def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
         return attempt(c, node)
     if node.op is not ast.Assigning.VALUE:
         return _set_or_reset(c, node)
+    if isinstance(node.targets[0], ast.Temp):
+        return define_temp(c, node.targets[0], node.value)
     if isinstance(node.value, ast.Call):
         declared = parameter_names(c, node.value)
         if has_enable(node.value, declared):

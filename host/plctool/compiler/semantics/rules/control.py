@@ -68,7 +68,7 @@ def write_body(c: Checker, nodes: list[ast.Stmt]) -> None:
     """Checks the statements into the unit of the scope."""
     pou = c.scope.pou
     assert pou is not None
-    c.labels = Labels(nodes)
+    c.labels, c.temps = Labels(nodes), {}
     report_repeated(c)
     try:
         pou.body = [*c.scope.prologue, *check_body(c, nodes)]
