@@ -550,7 +550,7 @@ def test_what_libraries_do_is_not_warned_of() -> None:
     assert not found
 
 
-@pytest.mark.parametrize("name", ["batch", "blink", "tanks", "traffic_light"])
+@pytest.mark.parametrize("name", ["batch", "blink", "five-languages", "tanks", "traffic_light"])
 def test_the_examples_have_no_pitfalls(name: str) -> None:
     found = check_with_tests(load_sources([ROOT / "examples" / name])).diagnostics
     assert not [d for d in found if d.code in (*PITFALLS, "pointer", "no-effect", "pragma")]
