@@ -17,6 +17,19 @@ from plctool.core import lib
 from plctool.debug.breakpoints import Debugger
 from plctool.debug.forced import ForcedPlace, ForceList, name_forced, place_of
 from plctool.debug.kept_changes import KeptChanges, kept_changes
+from plctool.debug.recipes import (
+    Difference,
+    Fitting,
+    Loaded,
+    Recipe,
+    differences,
+    fit_recipe,
+    not_kept,
+    read_recipe,
+    recipe_of,
+    recipe_variables,
+    write_recipe,
+)
 from plctool.debug.recording import Recording
 from plctool.debug.symbols import (
     SourceLine,
@@ -376,6 +389,59 @@ class Controller(ABC):
             symbol.check_writable(symbol.area)
         self._write(table, [(symbol, symbol.change(value)) for symbol, value in named])
 
+    # ---- recipes ----
+
+    def save_recipe(self, file: Path | str, names: Sequence[str] = ()) -> Recipe:
+        """Writes the values of variables to a recipe: of names and patterns, or of those that the file has already.
+        Raises UsageError for what is unknown or cannot be written."""
+        path = Path(file)
+        names = names or (list(read_recipe(path).values) if path.exists() else ())
+        recipe = self.recipe(names, str(path))
+        write_recipe(path, recipe)
+        return recipe
+
+    def recipe(self, names: Sequence[str], source: str = "The recipe") -> Recipe:
+        """The values of variables as a recipe; `source` is what messages call it."""
+        table = self.symbols()
+        variables = {symbol.name: symbol for symbol in recipe_variables(table, names)}
+        contents = self.sample_symbols(table, variables).contents
+        held = {name: (symbol, contents[name]) for name, symbol in variables.items()}
+        return recipe_of({name: (symbol, data) for name, (symbol, data) in held.items() if data is not None}, source)
+
+    def check_recipe(self, recipe: Recipe | Path | str) -> list[Fitting]:
+        """Checks names, types and ranges against the program. Raises UsageError, which names all mistakes."""
+        return fit_recipe(self.symbols(), _recipe(recipe))
+
+    def recipe_differences(self, recipe: Recipe | Path | str) -> list[Difference]:
+        """The variables whose values differ from the recipe. Raises UsageError if the recipe does not fit."""
+        return self._differences(self.check_recipe(recipe))
+
+    def _differences(self, fittings: Sequence[Fitting]) -> list[Difference]:
+        variables = {fitting.name: fitting.symbol for fitting in fittings}
+        return differences(fittings, self.sample_symbols(self.symbols(), variables).contents)
+
+    def load_recipe(self, recipe: Recipe | Path | str, then: Mapping[str, Any] | None = None) -> Loaded:
+        """Checks a recipe, writes all of its values and reads them back. What fits one request is written in one; no
+        power cut divides that. `then`: written after all that, such as {"Main.take_over": True}.
+
+        Raises UsageError, and writes nothing, if the recipe or `then` does not fit the program; DeviceError if a
+        variable has another value afterwards.
+        """
+        given = _recipe(recipe)
+        fittings = self.check_recipe(given)
+        for name, value in (then or {}).items():
+            symbol = self.symbols().resolve(name)
+            symbol.check_writable(symbol.area)
+            symbol.change(value)
+        changed = self._differences(fittings)
+        requests = self._write(self.symbols(), [(fitting.symbol, fitting.change) for fitting in fittings])
+        others = self._differences(fittings)
+        if others:
+            raise not_kept(given, others)
+        if then:
+            self.write(then)
+        return Loaded(len(fittings), changed, requests == 1)
+
     # ---- forced variables ----
 
     def force(self, values: Mapping[str, Any]) -> None:
@@ -604,8 +670,9 @@ class Controller(ABC):
         """Their bytes. Raises DeviceError when the symbols are no longer those of the application."""
 
     @abstractmethod
-    def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> None:
-        """Raises DeviceError when a pointer to one of the variables leads to no variable."""
+    def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> int:
+        """Returns how many requests it took. Raises DeviceError when a pointer to one of the variables leads to no
+        variable."""
 
     @abstractmethod
     def _force(self, table: SymbolTable, changes: Sequence[tuple[Symbol, ForcedPlace]]) -> None:
@@ -619,6 +686,10 @@ class Controller(ABC):
 
     @abstractmethod
     def _read_forces(self) -> ForceList: ...
+
+
+def _recipe(recipe: Recipe | Path | str) -> Recipe:
+    return recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))
 
 
 def _forcible(symbol: Symbol) -> Symbol:

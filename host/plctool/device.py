@@ -334,11 +334,11 @@ class Plc(Controller):
         values = [next(read) if s.fixed is None else s.fixed for s in symbols]
         return Contents(values, contents.consistent, contents.forced)
 
-    def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> None:
+    def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> int:
         """By one message if they fit."""
         writes = [Write(_range(s).part(c.offset, len(c.data)), c.data, c.mask) for s, c in changes]
         try:
-            write_memory(self._session, table.image_crc, writes)
+            return write_memory(self._session, table.image_crc, writes)
         except DeviceError:
             self._check_reachable(table, [symbol for symbol, _ in changes if symbol.pointer is not None])
             raise

@@ -454,7 +454,7 @@ class Simulator(Controller):
         forced = self._lib.ForceGetSerial() if self._lib.ForceGetCount() else None
         return Contents([self._content(symbol) for symbol in symbols], consistent=True, forced=forced)
 
-    def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> None:
+    def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> int:
         for symbol, _ in changes:
             self._writable(symbol)  # all or none are written
         for symbol, change in changes:
@@ -465,6 +465,7 @@ class Simulator(Controller):
             if is_input(symbol) and table.io:
                 first = symbol.offset * 8 + (symbol.bit or 0)
                 self.follow_inputs(first, first + (1 if symbol.bit is not None else symbol.size * 8))
+        return 1
 
     def _force(self, table: SymbolTable, changes: Sequence[tuple[Symbol, ForcedPlace]]) -> None:
         self._check_allowed(lib.OPERATION_FORCE, "force")

@@ -181,24 +181,26 @@ class Write:
     mask: int = _ALL_BITS
 
 
-def write_memory(session: Session, image_crc: int, values: Sequence[Write]) -> None:
+def write_memory(session: Session, image_crc: int, values: Sequence[Write]) -> int:
     """Writes all values, in one request if they fit, to the application with this CRC; in parts what is too long for
-    one.
+    one. Returns the number of requests.
 
     Not repeated when it is unknown whether they were written.
     """
     session.recover(session.application)
     room = session.connection.buffer_size - _MESSAGE_OVERHEAD
-    message = b""
+    message, requests = b"", 0
     parts = (part for value in values for part in _parts(value, room))
     for index, write in enumerate(parts):
         entry = _entry(write, index)
         if message and len(message) + len(entry) > room:
             _write_batch(session, image_crc, message)
-            message = b""
+            message, requests = b"", requests + 1
         message += entry
     if message:
         _write_batch(session, image_crc, message)
+        requests += 1
+    return requests
 
 
 def _entry(write: Write, number: int) -> bytes:
