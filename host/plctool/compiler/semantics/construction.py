@@ -7,6 +7,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Mapping
+from zlib import crc32
 
 from plctool.compiler.semantics.conversions import whole
 from plctool.compiler.semantics.instances import (
@@ -164,8 +165,8 @@ class Construction:
         for f in t.fields:
             part, own = member_place(place, f, pos), None if keep is None else keep.of_member(f.keep)
             statements += self.place(part, complete.members.get(f.name), pos, own, f"{path}.{f.name}")
-            if f.name.casefold() in named and isinstance(f.type, StringType):
-                statements.append(Assign(part, Const(path[: f.type.length], f.type, pos), pos))
+            if f.name.casefold() in named:
+                statements.append(Assign(part, Const(_path_value(path, f.type), f.type, pos), pos))
         for member in initialisers(self._world, t):
             statements.append(self._call(member, place, complete.arguments, pos, keep))
         statements += [self._set(t, place, key, value, pos) for key, value in complete.properties.items()]
@@ -325,6 +326,11 @@ def _is_computed(initial: Initial | None) -> bool:
     if isinstance(initial, ArrayInit):
         return _is_computed(initial.rest) or any(_is_computed(value) for _, value in initial.runs)
     return isinstance(initial, ComputedInit)
+
+
+def _path_value(path: str, t: Type) -> str | int:
+    """The path of an instance for its member of this type: a DWORD gets the CRC-32, by which tools find the name."""
+    return path[: t.length] if isinstance(t, StringType) else crc32(path.encode("latin-1"))
 
 
 def _moved_initial(initial: Initial | None, instance: Place) -> Initial | None:

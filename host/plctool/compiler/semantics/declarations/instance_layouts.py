@@ -36,7 +36,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed.nodes import Direction, Initial, Parameter, Pou, Storage, StructInit, Variable
-from plctool.iec.types import Field, Keep, ReferenceType, StringType, StructType
+from plctool.iec.types import DWORD, Field, Keep, ReferenceType, StringType, StructType
 
 # ---- function blocks ----
 
@@ -128,8 +128,9 @@ class Blocks:
                 symbol.constant = ast.Modifier.CONSTANT in block.qualifiers
                 symbol.is_path = "instance-path" in line.attributes
                 symbol.used = symbol.used or symbol.is_path
-                if symbol.is_path and not isinstance(t, StringType):
-                    scope.error(offset, "attribute", f"the path of the instance needs a STRING, not {t}")
+                if symbol.is_path and not isinstance(t, StringType) and t is not DWORD:
+                    message = f"the path of the instance needs a STRING, or a DWORD for its CRC-32, not {t}"
+                    scope.error(offset, "attribute", message)
                 if not scope.declare(symbol, offset):
                     continue
                 info.make_way(name, defaults)
