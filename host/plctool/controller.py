@@ -14,6 +14,22 @@ from pathlib import Path
 from typing import Any, Never, Self, overload
 
 from plctool.core import lib
+from plctool.debug.alarms import (
+    CONFIRM,
+    HISTORY,
+    NOW,
+    Alarm,
+    History,
+    alarm_of,
+    chosen,
+    history_of,
+    in_order,
+    member,
+    need_alarms,
+    now_of,
+    shared,
+    variables_of,
+)
 from plctool.debug.breakpoints import Debugger
 from plctool.debug.forced import ForcedPlace, ForceList, name_forced, place_of
 from plctool.debug.kept_changes import KeptChanges, kept_changes
@@ -441,6 +457,48 @@ class Controller(ABC):
         if then:
             self.write(then)
         return Loaded(len(fittings), changed, requests == 1)
+
+    # ---- alarms ----
+
+    def alarms(self, *, all: bool = False) -> list[Alarm]:
+        """The alarms of the program that are active or wait for an acknowledgement, these first, then by priority;
+        with `all` also those that are normal. Raises UsageError if the program has no ALARM."""
+        table = self.symbols()
+        there = need_alarms(table)
+        if not all:
+            states = {name: member(alarm, "State") for name, alarm in there.items()}
+            values = self.sample_symbols(table, states).values
+            there = {name: alarm for name, alarm in there.items() if values[name] != "NORMAL"}
+        values = self.sample_symbols(table, {NOW: now_of(table), **variables_of(there)}).values
+        found = in_order([alarm_of(name, values, values[NOW]) for name in there])
+        return [alarm for alarm in found if all or alarm.is_open]
+
+    def alarm_history(self) -> History:
+        """The changes of alarms that the controller still has. Raises UsageError if the program has no ALARM."""
+        table = self.symbols()
+        there = need_alarms(table)
+        ids = {name: member(alarm, "Id__") for name, alarm in there.items()}
+        values = self.sample_symbols(table, {HISTORY: shared(table, HISTORY), **ids}).values
+        return history_of(values[HISTORY], {values[name]: name for name in ids})
+
+    def acknowledge(self, names: Sequence[str] | None = None) -> list[str]:
+        """Acknowledges the alarms of these names and patterns, or all, as far as they wait for it: the block does so
+        when it is called next. Returns which. Raises UsageError for an unknown one."""
+        table = self.symbols()
+        there = need_alarms(table)
+        wanted = list(there) if names is None else chosen(names, there)
+        waiting = [alarm.name for alarm in self.alarms() if alarm.waits and alarm.name in wanted]
+        confirm = {name: member(there[name], CONFIRM) for name in waiting}
+        if confirm:
+            self._write(table, [(symbol, symbol.change(True)) for symbol in confirm.values()])
+        return waiting
+
+    def unconfirmed(self, names: Sequence[str]) -> list[str]:
+        """The alarms of these names whose blocks have not been called since they were acknowledged."""
+        table = self.symbols()
+        there = need_alarms(table)
+        values = self.sample_symbols(table, {name: member(there[name], CONFIRM) for name in names}).values
+        return [name for name, waits in values.items() if waits]
 
     # ---- forced variables ----
 

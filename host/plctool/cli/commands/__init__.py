@@ -56,6 +56,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("tasks", "device", "show the times of the tasks"),
         Row("latency", "latency", "show how late the cycles of each task began"),
         Row("forced", "values", "print what is forced"),
+        Row("alarms", "alarms", "list the alarms of a program, show their history, acknowledge them"),
         Row("recipe", "recipe", "save values to a file, check it against a program, load and compare it"),
         Row("dump", "dump", "write what the controller has in memory to a file, as after an exception"),
         Row("inspect", "dump", "print exception, calls and variables of a dump"),

@@ -19,7 +19,7 @@ from plctool.compiler.semantics.symbols import GlobalSymbol, Namespace, PouSymbo
 from plctool.compiler.sources.imports import ImportedLibrary
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.diagnostics import Diagnostics
-from plctool.compiler.syntax.library import Library, without_library
+from plctool.compiler.syntax.library import PARAMETERS, Library, without_library
 from plctool.compiler.typed.nodes import Pos
 from plctool.iec.types import ELEMENTARY
 
@@ -152,7 +152,9 @@ class Names:
         added = []
         for line in block.decls:
             for offset, name in line.names:
-                symbol = GlobalSymbol(name, prefix + name, offset, line, block.qualifiers, source)
+                hidden = library and self._own(name.casefold()) is not None  # gives way, as in unique_name()
+                full_name = f"Standard.{name}" if hidden else prefix + name
+                symbol = GlobalSymbol(name, full_name, offset, line, block.qualifiers, source)
                 key = (symbol.full_name if qualified or namespace is not None else name).casefold()
                 if namespace is not None:
                     symbol.namespace = namespace
@@ -199,6 +201,8 @@ class Names:
         """A global name: the program's own before those of its libraries and of the standard library; inside the
         standard library the other way round, inside one that is `imported` without those of the program. Variables come
         before types, so that `motor : Motor` hides nothing that is needed (see `unit`)."""
+        if library and key in PARAMETERS and key in self._globals:
+            return self._globals[key]
         if library and (symbol := self._library_symbol(key)) is not None:
             return symbol
         own = None if imported else self._own(key)

@@ -28,6 +28,9 @@ STAND_INS = (
 """Libraries of other systems that this one stands in for, as far as it has their names."""
 
 _QUALIFIED = re.compile(rf"(?:{'|'.join(STAND_INS)})\.(?=\w+$)", re.IGNORECASE)
+PARAMETERS = frozenset(("alarm_history_size",))
+"""Constants of the library in whose place it uses those that a program declares."""
+
 OTHER_BLOCKS = ("PID", "HYSTERESIS", "INTEGRAL", "DERIVATIVE")
 """What is another block with Util in front than without it."""
 
