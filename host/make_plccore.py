@@ -27,6 +27,7 @@ SHARED = [
     "CmpAppEmbedded.h",
     "CmpForce.h",
     "CmpOperationControl.h",
+    "AppReason.h",
     "CmpTraceMgr.h",
     "CmpAppBP.h",
     "CmpIecTask.h",

@@ -11,11 +11,14 @@
 #include "CmpStd.h"
 #include "SysStart.h"
 
+/* Code outside of tasks. */
+enum { APP_IN_INITIALISATION = -1, APP_IN_EVENT = -2 };
+
 /* The last exception; code RTSEXCPT_NOEXCEPTION when there is none. */
 typedef struct {
     RTS_UI32 code;
     RTS_UI32 code_offset; /* fault address in the code segment, APP_NO_CODE_OFFSET when it was elsewhere */
-    RTS_I32 task;         /* index of the task, -1 when in initialisation code */
+    RTS_I32 task;         /* index of the task, else APP_IN_... */
 } APP_EXCEPTION;
 
 #ifndef RTS_CFFI
@@ -26,7 +29,7 @@ void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address);
 /* The words for an RTSEXCPT_* code, for the log. From any context. */
 const char *AppExceptionName(RTS_UI32 code);
 
-/* What has happened. `task`: index, -1 in initialisation code. */
+/* What has happened. `task`: index, else APP_IN_... */
 typedef struct {
     RTS_I32 task;
     RTS_UI32 code; /* RTSEXCPT_* */

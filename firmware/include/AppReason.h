@@ -1,5 +1,5 @@
 /*
- * AppReason.h - why a component denied what a service asked for.
+ * AppReason.h - why a component denied what a service asked for (shared with the host).
  *
  * SPDX-License-Identifier: Apache-2.0
  */

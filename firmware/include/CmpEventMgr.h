@@ -14,6 +14,8 @@
 
 enum { EVTPARAMID_NONE = 0, EVENT_PARAM_VERSION = 1 };
 
+#define EVENT_ALL 0xFFFFFFFFu /* a callback for all events of a provider */
+
 typedef struct {
     RTS_UI32 event;        /* EVT_* of the provider */
     RTS_UI32 provider;     /* CMPID_* */

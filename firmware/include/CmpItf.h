@@ -100,6 +100,7 @@ enum {
     CMPID_CmpOperationControl = 0x0034,
     CMPID_SysMdns = 0x0038,
     CMPID_IecLog = 0x0040,
+    CMPID_IecEvents = 0x00A0,
 };
 
 /* Name of a component, "" when unknown. */

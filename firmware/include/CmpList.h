@@ -109,6 +109,9 @@ enum {
 #if HAS_IecLog
     CMP_ONE(IecLog)
 #endif
+#if HAS_IecEvents
+    CMP_ONE(IecEvents)
+#endif
 #if HAS_IoDrvModbus
     CMP_ONE(IoDrvModbus)
 #endif

@@ -51,6 +51,9 @@ X(CmpOperationControl)
 #if HAS_IecLog
 X(IecLog)
 #endif
+#if HAS_IecEvents
+X(IecEvents)
+#endif
 #if HAS_CmpTraceMgr
 X(CmpTraceMgr)
 #endif

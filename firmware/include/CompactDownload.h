@@ -117,7 +117,8 @@ typedef struct {
 } EXT_REF_INFO;
 enum { EXT_REF_INFO_SIZE = 18 }; /* on the wire: the name follows at once */
 
-/* Entry of the IEC function table, followed by name, NUL and padding. */
+/* Entry of the IEC function table, followed by name, NUL and padding. `identifier`: the event on which the runtime calls it
+ * as an IEC_ENTRY, EVT_* (AppEventIds.h); 0: none. */
 typedef struct {
     RTS_UI16 dummy;
     RTS_UI16 area;

@@ -80,6 +80,9 @@ void IecCycleForget(void);
  * Returns as SysExceptTry. */
 bool IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
 
+/* Sets the time that a cycle would have which begins now. From main. */
+void IecCycleSetTime(IEC_CONTEXT *context);
+
 /* Counts starts and ends of cycles of all tasks, so that a reader can tell whether one ran meanwhile. *busy: a task is
  * in its cycle now. From any context. */
 RTS_UI32 IecTaskGetActivity(bool *busy);

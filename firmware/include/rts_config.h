@@ -301,6 +301,12 @@
 #define IEC_LOG_REFILL_MS 1000
 #endif
 
+/* 1: events call functions of the program (IecEvents.h). It needs HAS_IecEvents in cmp_list.c, and one of
+ * EVENT_MAX_CALLBACKS. 0: no flash for it, and a program that has such functions is refused. */
+#ifndef IEC_EVENTS
+#define IEC_EVENTS 0
+#endif
+
 /* Bytes for what is traced (CmpTraceMgr.h): each packet takes some 150, 28 for each record, and its samples. 0: none, and
  * no flash for them. It needs HAS_CmpTraceMgr in cmp_list.c, and two of EVENT_MAX_CALLBACKS. */
 #ifndef TRACE_BUFFER
@@ -331,7 +337,7 @@
 #endif
 
 /* Event callbacks that may be registered, all for components of a port but one each of CmpForce,
- * CmpOperationControl and CmpAppBP, and two of CmpTraceMgr; five words each. 0: the application sends no events. */
+ * CmpOperationControl, IecEvents and CmpAppBP, and two of CmpTraceMgr; five words each. 0: the application sends no events. */
 #ifndef EVENT_MAX_CALLBACKS
 #define EVENT_MAX_CALLBACKS 8
 #endif

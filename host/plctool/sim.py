@@ -173,6 +173,10 @@ class Simulator(Controller):
         """As the services of a device do. Writing is always allowed: it stands for what happens at the inputs."""
         l7.check_result(self._lib.OperationMay(operation), action)
 
+    def _check_result(self, result: int, action: str) -> None:
+        reason = self._ffi.string(self._lib.AppTakeReason()).decode("latin-1")
+        l7.check_result(result, action, reason if result == lib.ERR_OPERATION_DENIED else "")
+
     def _download(self, data: bytes, start: bool, restart: bool, progress: Callable[[int], None]) -> None:
         self._check_allowed(lib.OPERATION_DOWNLOAD, "download")
         self._add_events(data)
@@ -201,14 +205,14 @@ class Simulator(Controller):
         self._application_crc()
         with self._functions.while_running():
             result = self._lib.AppStartApplication()
-        l7.check_result(result, "start")
+        self._check_result(result, "start")
 
     def stop(self) -> None:
         self._application_crc()
         self._check_allowed(lib.OPERATION_STOP, "stop")
         with self._not_debugged(), self._functions.while_running():
             result = self._lib.AppStopApplication()
-        l7.check_result(result, "stop")
+        self._check_result(result, "stop")
 
     def _reset(self, option: int) -> None:
         self._application_crc()
@@ -216,7 +220,7 @@ class Simulator(Controller):
             self._check_allowed(lib.OPERATION_RESET, "reset")
         with self._not_debugged(), self._functions.while_running():
             result = self._lib.AppReset(option)
-        l7.check_result(result, "reset")
+        self._check_result(result, "reset")
 
     def restart(self) -> None:
         """Power off and on again: what is in flash survives."""

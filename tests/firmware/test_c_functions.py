@@ -15,6 +15,7 @@ TABLES = re.compile(r"CMP_EXT_FUNCTION (\w+)\[\] = \{(.*?)\n *\};", re.DOTALL)
 COMPONENTS = {
     "CmpIecTask.externals": "CmpIecTask",
     "CmpMath.functions": "CmpMath",
+    "IecEvents.functions": "IecEvents",
     "IecLog.functions": "IecLog",
     "CmpOperationControl.functions": "CmpOperationControl",
     "CmpRetain.externals": "CmpRetain",

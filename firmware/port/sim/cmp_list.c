@@ -14,6 +14,7 @@
 #define HAS_CmpForce 1
 #define HAS_CmpOperationControl 1
 #define HAS_IecLog 1
+#define HAS_IecEvents 1
 #define HAS_CmpTraceMgr 1
 #define HAS_CmpAppBP (BP_MAX > 0)
 #define HAS_CmpIoMgrSrv 1

@@ -98,6 +98,13 @@ static bool is_proven(void)
 
 /* ---- exceptions ---- */
 
+static const char *place_of(RTS_I32 task)
+{
+    if (IEC_EVENTS && task == APP_IN_EVENT)
+        return "Event";
+    return task < 0 ? "Initialisation" : app.tables.tasks[task].name;
+}
+
 /* No IEC code runs. */
 static void record_exception(const APP_RAISED *raised)
 {
@@ -106,7 +113,7 @@ static void record_exception(const APP_RAISED *raised)
     if (SysExceptIsCode(raised->address))
         exception.code_offset = (RTS_UI32)(raised->address - (uintptr_t)app.code);
     SysExceptKeepTrace(raised->address);
-    AppExceptionSet(&exception, raised->task < 0 ? "Initialisation" : app.tables.tasks[raised->task].name);
+    AppExceptionSet(&exception, place_of(raised->task));
 }
 
 /* The safe state after an exception (again, since other tasks have finished their cycle); an application that is new
@@ -154,7 +161,7 @@ static void call_init(void *arg)
 static bool run_function(RTS_UI32 function, bool init_retains)
 {
     INIT_CALL call = {function, init_retains};
-    APP_RAISED raised = {-1, RTSEXCPT_NOEXCEPTION, 0};
+    APP_RAISED raised = {APP_IN_INITIALISATION, RTSEXCPT_NOEXCEPTION, 0};
     RTS_EXCEPTION exception;
 
     if (app.image.entry[function] == IMAGE_NO_ENTRY || IecTaskRunGuarded(call_init, &call, &exception))
@@ -328,13 +335,22 @@ static RTS_RESULT get_ready(void)
     return result == ERR_OK && AppHasException() ? (RTS_RESULT)ERR_EXCEPTION : result;
 }
 
+/* ERR_EXCEPTION: the program's function for the event failed. */
+static RTS_RESULT tell(RTS_UI32 event)
+{
+    RTS_UNUSED(event);
+    AppPostEvent(event);
+    return IEC_EVENTS && AppHasException() ? (RTS_RESULT)ERR_EXCEPTION : ERR_OK;
+}
+
 RTS_RESULT AppStart(void)
 {
     RTS_RESULT result = get_ready();
 
+    if (result == ERR_OK)
+        result = tell(EVT_PrepareStart);
     if (result != ERR_OK)
         return result;
-    AppPostEvent(EVT_PrepareStart);
     (void)AppCommitSetState(app.image.file, SLOT_STARTED);
     app.run_since_ms = SysTimeGetMs();
     result = IecTaskStartAll();
@@ -345,8 +361,7 @@ RTS_RESULT AppStart(void)
     }
     app.state = AS_RUN;
     LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application started");
-    AppPostEvent(EVT_StartDone);
-    return ERR_OK;
+    return tell(EVT_StartDone);
 }
 
 #if EVENT_MAX_CALLBACKS > 0
@@ -354,7 +369,9 @@ RTS_RESULT AppAskStart(RTS_UI32 event)
 {
     RTS_RESULT result = get_ready();
 
-    return result == ERR_OK ? AppEventAsk(event, &app.image) : result;
+    if (result == ERR_OK)
+        result = AppEventAsk(event, &app.image);
+    return IEC_EVENTS && AppHasException() ? (RTS_RESULT)ERR_EXCEPTION : result;
 }
 
 RTS_RESULT AppStartIfAllowed(void)
@@ -378,13 +395,14 @@ RTS_RESULT AppRunOnce(void)
 {
     RTS_RESULT result = get_ready();
 
+    if (result == ERR_OK)
+        result = tell(EVT_PrepareStart);
     if (result != ERR_OK)
         return result;
-    AppPostEvent(EVT_PrepareStart);
     app.run_since_ms = SysTimeGetMs();
     app.state = AS_RUN;
-    AppPostEvent(EVT_StartDone);
-    IecTaskRunOnce();
+    if (tell(EVT_StartDone) == ERR_OK)
+        IecTaskRunOnce();
     (void)AppStopTasks();
     return AppHasException() ? ERR_EXCEPTION : ERR_OK;
 }

@@ -74,7 +74,7 @@ RTS_RESULT EventPost(RTS_UI32 provider, RTS_UI32 event, RTS_UI16 parameter_id, v
 
     for (listener = events.first; listener != NULL; listener = next) {
         next = listener->next; /* the callback may unregister itself */
-        if (listener->provider == provider && listener->event == event) {
+        if (listener->provider == provider && (listener->event == event || listener->event == EVENT_ALL)) {
             EVENT_PARAM param = {event,     provider,       parameter_id, EVENT_PARAM_VERSION,
                                  parameter, listener->user, ERR_OK,       NULL};
             listener->callback(&param);

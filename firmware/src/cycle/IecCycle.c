@@ -570,6 +570,14 @@ void IecCycleForget(void)
     tasks.init_guard.limit_ns = (RTS_I64)APP_INIT_WATCHDOG_US * NS_PER_US;
 }
 
+void IecCycleSetTime(IEC_CONTEXT *context)
+{
+    RTS_UI32 rest;
+
+    context->time_ns = tasks.time_started ? SysTimeGetNs() - tasks.time_zero : 0;
+    context->time_ms = (RTS_I32)divide((RTS_UI64)context->time_ns, NS_PER_MS, &rest);
+}
+
 /* ---- what others ask ---- */
 
 RTS_UI32 IecTaskGetCount(void)

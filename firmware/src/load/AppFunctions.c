@@ -139,13 +139,35 @@ static RTS_RESULT check_iec_function(LOADER *l)
     return ERR_OK;
 }
 
-/* Names for tools that ask about the application; what they stand for is not called. */
+/* Those with an identifier are called on an event; others are names for tools. */
 RTS_RESULT LoaderCheckIecFunctions(LOADER *l)
 {
-    if (!SRV_INFORMATION)
+#if IEC_EVENTS
+    l->image->iec_functions = l->header.iec_function_table;
+#endif
+    if (!SRV_INFORMATION && !IEC_EVENTS)
         return ERR_OK;
     return LoaderCheckEntries(l, SEGMENT_IEC_FUNCTIONS, check_iec_function);
 }
+
+#if IEC_EVENTS
+RTS_UI32 AppLoaderFindEvent(const APP_IMAGE *image, RTS_UI32 event)
+{
+    RTS_UI32 offset = image->iec_functions.offset;
+    RTS_UI32 end = offset + image->iec_functions.size;
+    char name[APP_NAME_SIZE];
+    FUNCTION_INFO info;
+
+    while (offset < end && SysFileRead(image->file, offset, &info, sizeof info) == ERR_OK) {
+        if (info.identifier == event)
+            return info.offset;
+        offset += (RTS_UI32)sizeof info;
+        if (!read_name(image->file, &offset, end, name))
+            break;
+    }
+    return IMAGE_NO_ENTRY;
+}
+#endif
 
 /* ---- application info ---- */
 

@@ -22,4 +22,9 @@ RTS_RESULT AppLoaderRead(const APP_IMAGE *image, APP_TABLES *tables);
 /* Copies string `index` of the application info segment, cut to `size`; "" when there is none. */
 void AppLoaderReadInfo(const APP_IMAGE *image, RTS_UI32 index, char *text, RTS_SIZE size);
 
+#if IEC_EVENTS
+/* Returns where in the code the function of an event (EVT_*) is; IMAGE_NO_ENTRY without one. */
+RTS_UI32 AppLoaderFindEvent(const APP_IMAGE *image, RTS_UI32 event);
+#endif
+
 #endif

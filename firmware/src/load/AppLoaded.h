@@ -29,6 +29,9 @@ typedef struct {
     RTS_UI32 imports; /* offset of the names of external functions */
     RTS_UI32 task_count;
     RTS_UI32 import_count;
+#if IEC_EVENTS
+    CDL_SEGMENT iec_functions;
+#endif
 #if IO_MAX_CONNECTORS > 0
     CDL_SEGMENT io; /* the I/O configuration, in the code; size 0: none */
 #endif

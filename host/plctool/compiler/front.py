@@ -335,6 +335,7 @@ def place(checked: Checked) -> Placed:
         programs=program.programs.declared(),
         startup=program.startup,
         shutdown=program.shutdown,
+        events=checked.application.events,
         aliases=world.names.aliases(),
         accesses=program.config.accesses(),
         constants=world.constants,

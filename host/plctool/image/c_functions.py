@@ -20,6 +20,9 @@ _FUNCTIONS = {
         operation_control(POINTER TO BYTE):BOOL             64    80""",
     "IecLog": """
         log_add(UDINT,UDINT,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD):BOOL  352  480""",
+    "IecEvents": """
+        event_answer(BOOL):BOOL                             32    48
+        event_reason(LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD):BOOL  160  192""",
     "CmpMath": """
         sin(LREAL):LREAL                                  1008  1856
         cos(LREAL):LREAL                                  1008  1856

@@ -99,6 +99,16 @@ class ImageTask:
 
 
 @dataclass(frozen=True)
+class ImageEvent:
+    """A function that the runtime calls on an event. `event`: EVT_*; `name`: of the function in the program; `entry`:
+    code offset to call (with the Thumb bit on Arm)."""
+
+    event: int
+    name: str
+    entry: int
+
+
+@dataclass(frozen=True)
 class KeptVariable:
     """A variable that is kept, or the elements of an array (`is_run`), `stride` bytes apart. `hash`: of its name and
     type; `offset` in the retain area and `size` of one element [bytes]; `first`: index of the first element in the
@@ -130,6 +140,7 @@ class Image:
     device_version: int = DEVICE_VERSION
     compiler_version: int = COMPILER_VERSION
     flags: int = 0
+    events: list[ImageEvent] = field(default_factory=list)
     kept: list[KeptVariable] = field(default_factory=list)
     io: tuple[int, int] | None = None
     crc: int = 0  # set by `parse_image`
@@ -160,7 +171,7 @@ def build_image(image: Image) -> bytes:
         "area_table": b"".join(_area_entries(image)),
         "function_table": b"".join(_function_entries(image)),
         "external_function_table": b"".join(_external_entries(image)),
-        "iec_function_table": b"",
+        "iec_function_table": b"".join(_event_entries(image)),
         "blob": b"".join(_blobs(image)),
         "code": image.code,
     }
@@ -223,6 +234,13 @@ def _external_entries(image: Image) -> Iterator[bytes]:
         }
         head = _pack("EXT_REF_INFO", values, int(lib.EXT_REF_INFO_SIZE))
         yield _padded(head + external.name.encode("ascii") + b"\0")
+
+
+def _event_entries(image: Image) -> Iterator[bytes]:
+    for event in image.events:
+        values = {"area": lib.APP_AREA_CODE, "offset": event.entry, "identifier": event.event}
+        name = event.name[: lib.APP_NAME_SIZE - 1]
+        yield _padded(_pack("FUNCTION_INFO", values) + name.encode("ascii", "replace") + b"\0")
 
 
 def _blobs(image: Image) -> Iterator[bytes]:
@@ -319,6 +337,7 @@ def parse_image(data: bytes) -> Image:
         externals=list(_parse_externals(segments["external_function_table"])),
         tasks=_parse_tasks(blobs, len(code)),
         info=_parse_info(segments["application_info"]),
+        events=list(_parse_events(segments["iec_function_table"], len(code))),
         device_type=int(header.device_type),
         device_version=int(header.device_version),
         compiler_version=int(header.compiler_version),
@@ -437,6 +456,22 @@ def _parse_externals(data: bytes) -> Iterator[ExternalFunction]:
         at = end + 1 + -(end + 1) % 4
 
 
+def _parse_events(data: bytes, code_size: int) -> Iterator[ImageEvent]:
+    """The entries of the IEC function table that belong to events."""
+    size, at = ffi.sizeof("FUNCTION_INFO"), 0
+    while at < len(data):
+        end = data.find(b"\0", at + size, at + size + _MAX_NAME)
+        if end < 0:
+            raise _refuse("its IEC function table is cut off")
+        (entry,) = _entries("FUNCTION_INFO", data[at : at + size], "IEC function table")
+        name = data[at + size : end].decode("ascii", "replace")
+        if entry.area != lib.APP_AREA_CODE or entry.offset >= code_size:
+            raise _refuse(f"its function {name} is outside the code")
+        if entry.identifier:
+            yield ImageEvent(int(entry.identifier), name, int(entry.offset))
+        at = end + 1 + -(end + 1) % 4
+
+
 def _parse_blobs(data: bytes) -> dict[int, bytes]:
     """Payloads by id."""
     blobs, at, head = {}, 0, ffi.sizeof("CDL_BLOB")
@@ -540,6 +575,12 @@ def _numbered(prefix: str) -> dict[int, str]:
     return {int(getattr(lib, name)): name.removeprefix(prefix).lower() for name in dir(lib) if name.startswith(prefix)}
 
 
+def event_name(number: int) -> str:
+    """The name of an event, EVT_*, or its number in hex."""
+    names = (n for n in dir(lib) if n.startswith("EVT_") and getattr(lib, n) == number)
+    return next(names, f"0x{number:X}")
+
+
 def describe_image(data: bytes) -> dict[str, Any]:
     """What `plctool info` shows, ready for JSON. Raises UsageError for what is not an image."""
     image = parse_image(data)
@@ -583,4 +624,5 @@ def describe_image(data: bytes) -> dict[str, Any]:
             }
             for t in image.tasks
         ],
+        "events": [{"event": event_name(e.event), "function": e.name, "entry": e.entry} for e in image.events],
     }

@@ -1,5 +1,5 @@
-"""From the typed program to LLVM IR: one module with an external function per task, those for initialisation and one
-for the end."""
+"""From the typed program to LLVM IR: one module with an external function per task and event, those for initialisation
+and one for the end."""
 
 from __future__ import annotations
 
@@ -44,14 +44,15 @@ GLOBAL_EXIT = "global_exit"
 @dataclass(frozen=True)
 class Lowered:
     """LLVM IR, in parts, and what an image of it needs. `tasks`: entry symbols
-    in the order of the program's tasks; `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `pous`: by
-    symbol, all that are part of it; `imports`: in the order of their slots; `bounds`: what is checked;
-    `transient`: variables of blocks that are not kept in memory; `passed_lines`: by the numbers in the trail of an
-    exception, from 1."""
+    in the order of the program's tasks; `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `events`:
+    those of the program's events, in their order; `pous`: by symbol, all that are part of it; `imports`: in the order
+    of their slots; `bounds`: what is checked; `transient`: variables of blocks that are not kept in memory;
+    `passed_lines`: by the numbers in the trail of an exception, from 1."""
 
     parts: list[Part]
     tasks: list[str]
     functions: dict[int, str]
+    events: list[str]
     pous: dict[str, Pou]
     imports: list[External]
     bounds: list[BoundsCheck]
@@ -72,8 +73,11 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
         _global_init(unit, program.startup)
         functions[int(lib.CDL_FUNCTION_GLOBAL_INIT)] = GLOBAL_INIT
     if program.shutdown is not None:
-        _global_exit(unit, program.shutdown)
+        _entry_of(unit, GLOBAL_EXIT, program.shutdown)
         functions[int(lib.CDL_FUNCTION_GLOBAL_EXIT)] = GLOBAL_EXIT
+    events = [f"event.{number}" for number in range(len(program.events))]
+    for name, event in zip(events, program.events, strict=True):
+        _entry_of(unit, name, event.pou)
     effects = Effects()
     done = chosen = 0
     while done < len(unit.pous) or chosen < len(unit.dispatchers):
@@ -103,7 +107,7 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     options.passes.left(("sections", "memory", "lengths", "splice"), unit.module.whole)
     made = parts(unit.module, cut=options.passes.runs("parts"))
     options.passes.left(("parts",), lambda: "\n".join(f"; part {n}\n{part.text}" for n, part in enumerate(made, 1)))
-    return Lowered(made, tasks, functions, pous, unit.imports, bounds, unit.transient, unit.trail.lines)
+    return Lowered(made, tasks, functions, events, pous, unit.imports, bounds, unit.transient, unit.trail.lines)
 
 
 def _task_entry(unit: Unit, number: int, task: Task) -> str:
@@ -167,11 +171,12 @@ def _global_init(unit: Unit, startup: Pou) -> None:
     unit.module.add(GLOBAL_INIT, fn, linkage="")
 
 
-def _global_exit(unit: Unit, shutdown: Pou) -> None:
-    fn = Function(f"void @{GLOBAL_EXIT}({CONTEXT_PARAMETER})", unit.plain)
-    fn.call(unit.symbol(shutdown), [CONTEXT], " noinline")
+def _entry_of(unit: Unit, name: str, pou: Pou) -> None:
+    """A function of the image that calls one of the program."""
+    fn = Function(f"void @{name}({CONTEXT_PARAMETER})", unit.plain)
+    fn.call(unit.symbol(pou), [CONTEXT], " noinline")
     fn.terminate("ret void")
-    unit.module.add(GLOBAL_EXIT, fn, linkage="")
+    unit.module.add(name, fn, linkage="")
 
 
 def _overwriting(variables: list[Variable]) -> set[Variable]:

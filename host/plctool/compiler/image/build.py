@@ -28,7 +28,16 @@ from plctool.iec.areas import Area
 from plctool.iec.types import CLASS_NUMBER, Type, base_of
 from plctool.iec.values import encode
 from plctool.image.c_functions import find_c_function
-from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image, image_crc
+from plctool.image.file import (
+    ApplicationInfo,
+    ExternalFunction,
+    Image,
+    ImageEvent,
+    ImagePart,
+    ImageTask,
+    build_image,
+    image_crc,
+)
 from plctool.image.limits import Need, largest, needs_of_image, of_area
 from plctool.image.targets import Machine, Target
 from plctool.io.configuration import pack_configuration
@@ -75,7 +84,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo, keeps
     with room_for_nesting():
         lowered = lower(program, options)
     objects = emit_objects(lowered.parts, options)
-    linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], lowered.imports)
+    linked = link(objects, target, _roots(lowered), lowered.imports)
     symbols = _symbols(program, lowered, linked, target, info.project, steps=options.steps)
     kept = kept_parts(v for v in program.globals if keeps and v.area is Area.RETAIN)
     code, io = linked.code, None
@@ -100,6 +109,10 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo, keeps
             _task(task, _entry(linked, name, target)) for task, name in zip(program.tasks, lowered.tasks, strict=True)
         ],
         info=info,
+        events=[
+            ImageEvent(event.event, event.name, _entry(linked, name, target))
+            for event, name in zip(program.events, lowered.events, strict=True)
+        ],
         kept=kept_variables(kept),
         io=io,
     )
@@ -128,7 +141,7 @@ def _needs(
             needs[name] = replace(needs[name], parts=largest(parts))
     for name in ("code", "image"):
         needs[name] = replace(needs[name], parts=tuple(sizes.items()))
-    roots = [linked.symbols[name].offset for name in (*lowered.tasks, *lowered.functions.values())]
+    roots = [linked.symbols[name].offset for name in _roots(lowered)]
     # A stub takes what its C function takes.
     of_c = {offset: _stack_of(external, options) for offset, external in linked.stubs.items()}
     stubs: Frames = {offset: (0, size) for offset, size in of_c.items() if size is not None}
@@ -155,6 +168,11 @@ def _stack_of(external: External, options: Options) -> int | None:
     if options.firmware is not None:
         size = options.firmware.of_function(external.signature, with_pointers=known is not None)
     return known.stack(options.target.machine) if size is None and known is not None else size
+
+
+def _roots(lowered: Lowered) -> list[str]:
+    """The functions that the runtime calls."""
+    return [*lowered.tasks, *lowered.functions.values(), *lowered.events]
 
 
 def _entry(linked: Linked, name: str, target: Target) -> int:

@@ -77,7 +77,7 @@ def plan_images(program: TypedProgram, diagnostics: Diagnostics) -> None:
         return
     units = _Units()
     uses = [units.use(task.programs) for task in program.tasks]
-    kept = _kept_addresses(uses, units.use([program.startup] if program.startup else []))
+    kept = _kept_addresses(uses, units.use(_outside_of_tasks(program)))
     for area in IMAGE_AREAS:
         size = program.area_sizes[area]
         parts = [TaskPart() if area in kept else _part(use, area, size) for use in uses]
@@ -85,6 +85,11 @@ def plan_images(program: TypedProgram, diagnostics: Diagnostics) -> None:
             shared = any(o is not part and o.start < part.end and part.start < o.end for o in parts)
             task.parts[area] = TaskPart(part.start, part.end, part.written, shared)
     _report_shared_outputs(program.tasks, uses, diagnostics)
+
+
+def _outside_of_tasks(program: TypedProgram) -> list[Pou]:
+    events = [function.pou for function in program.events]
+    return events if program.startup is None else [program.startup, *events]
 
 
 def task_ranges(program: TypedProgram) -> list[dict[Area, set[tuple[int, int]]]]:

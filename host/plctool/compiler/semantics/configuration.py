@@ -20,6 +20,7 @@ from plctool.compiler.syntax.diagnostics import did_you_mean
 from plctool.compiler.typed.nodes import (
     BitPlace,
     Direction,
+    EventFunction,
     Load,
     MemberPlace,
     Place,
@@ -182,9 +183,10 @@ DEFAULT_PROGRAMS = ("PLC_PRG", "MAIN")
 
 @dataclass
 class Application:
-    """The tasks. `of_tests`: they are those of unit tests, not of a device."""
+    """The tasks, and the functions that events call. `of_tests`: they are those of unit tests, not of a device."""
 
     tasks: list[Task] = field(default_factory=list)
+    events: list[EventFunction] = field(default_factory=list)
     of_tests: bool = False
 
 

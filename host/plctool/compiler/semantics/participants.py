@@ -9,6 +9,7 @@ from typing import Protocol
 
 from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.configuration import Application, configure
+from plctool.compiler.semantics.event_functions import declare_event_functions
 from plctool.compiler.semantics.program import Program
 from plctool.compiler.syntax import ast
 
@@ -52,7 +53,9 @@ class _DeviceTasks(Participant):
         self._application = Application()
 
     def after_declare(self) -> Application:
-        self._application = configure(self._program.world, self._program.config)
+        world = self._program.world
+        self._application = configure(world, self._program.config)
+        self._application.events = declare_event_functions(world)
         return self._application
 
     def after_check(self) -> None:

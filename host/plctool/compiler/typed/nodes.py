@@ -685,6 +685,16 @@ class Task:
     parts: dict[Area, TaskPart] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class EventFunction:
+    """A FUNCTION that the runtime calls when something happens to the application. `event`: EVT_* (AppEventIds.h);
+    `name`: of the function in the program; `pou` calls it, and hands over its answer."""
+
+    event: int
+    name: str
+    pou: Pou
+
+
 @dataclass
 class TypedProgram:
     """A checked program. `globals` holds every AREA variable, program variables included (with dotted names Main.x)."""
@@ -702,6 +712,7 @@ class TypedProgram:
     constants: dict[str, Const] = field(default_factory=dict)  # that have no memory, by full name
     startup: Pou | None = None  # (init_retains : BOOL): what is called when the variables have their initial values
     shutdown: Pou | None = None  # what is called when the application ends, or its variables are initialised
+    events: list[EventFunction] = field(default_factory=list)
     externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not
     io: Description | None = None  # the inputs and outputs, each with its address
     may_recurse: bool = False  # a call may lead back to its caller, so that the depth of calls is not known

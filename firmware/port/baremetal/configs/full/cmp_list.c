@@ -15,6 +15,7 @@
 #define HAS_CmpForce 1
 #define HAS_CmpOperationControl 1
 #define HAS_IecLog 1
+#define HAS_IecEvents IEC_EVENTS
 #define HAS_CmpTraceMgr (TRACE_BUFFER > 0)
 #define HAS_CmpIoMgrSrv 1
 #define HAS_COMMUNICATION 1

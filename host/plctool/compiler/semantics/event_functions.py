@@ -1,0 +1,129 @@
+"""Functions with {attribute 'call_on' := 'EVT_...'}: the runtime calls them when the event happens (docs/events.md).
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from plctool.compiler.semantics.symbols import ERROR, NOTHING, FunctionInfo, PouSymbol
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax.attributes import CALL_ON
+from plctool.compiler.syntax.diagnostics import did_you_mean
+from plctool.compiler.typed.nodes import Call, CallStatement, Const, EventFunction, Pos, Pou, PouKind
+from plctool.core import lib
+from plctool.iec.types import BOOL
+
+EVENTS = (
+    "EVT_PrepareStart", "EVT_StartDone", "EVT_PrepareStop", "EVT_StopDone", "EVT_PrepareReset", "EVT_ResetDone",
+    "EVT_PrepareDownload", "EVT_DownloadDone", "EVT_CreateBootprojectDone", "EVT_DenyStartBootproject",
+    "EVT_PrepareStartBootproject", "EVT_StartBootprojectDone", "EVT_DenyStart", "EVT_DenyStop",
+)  # fmt: skip
+"""Those of AppEventIds.h that happen while the program has its values."""
+
+ALIASES = {
+    "OnStart": "EVT_PrepareStart",
+    "OnStop": "EVT_PrepareStop",
+    "BeforeReset": "EVT_PrepareReset",
+    "OnProgramChange": "EVT_PrepareDownload",
+    "OnDownload": "EVT_PrepareDownload",
+    "OnPowerOn": "EVT_PrepareStartBootproject",
+}
+"""Names in older systems."""
+
+_EARLY = "it happens before the program has its initial values; write EVT_PrepareStartBootproject"
+_NO_ONLINE_CHANGE = "there is no online change; write EVT_PrepareDownload"
+_NO_LOGIN = "no event says that a tool logs in or out"
+NOT_CALLED = {
+    "EVT_LoadBootprojectDone": _EARLY,
+    "EVT_DenyLoadBootproject": _EARLY,
+    "EVT_PrepareLoadBootproject": _EARLY,
+    "EVT_AllBootprojectsLoaded": _EARLY,
+    "EVT_PrepareOnlineChange": _NO_ONLINE_CHANGE,
+    "EVT_OnlineChangeDone": _NO_ONLINE_CHANGE,
+    "EVT_PrepareExit": "write FB_Exit",
+    "EVT_CmpApp_Exception": "a program that has failed is not called",
+    "OnInit": "write FB_Init, or EVT_PrepareStart",
+    "OnTimer": "write a TASK with an INTERVAL",
+    "OnLogin": _NO_LOGIN,
+    "OnLogout": _NO_LOGIN,
+}
+"""Why a program cannot have a function for an event, and what to write."""
+
+_BY_KEY = {name.casefold(): name for name in (*EVENTS, *ALIASES, *NOT_CALLED)}
+
+
+def declare_event_functions(world: World) -> list[EventFunction]:
+    """Declares the functions that the program attaches to events, in the order of the program."""
+    found: dict[str, EventFunction] = {}
+    for symbol in world.names.functions():
+        names = symbol.decl.attributes.get(CALL_ON)
+        info = None if names is None else _function(world, symbol)
+        if names is None or info is None:
+            continue
+        for event in _events(world, symbol, names):
+            other = found.get(event)
+            if other is None:
+                found[event] = EventFunction(int(getattr(lib, event)), symbol.decl.name, _caller(world, event, info))
+            else:
+                place = f"{other.pou.pos.file}, line {other.pou.pos.line}"
+                _error(world, symbol, f"{event} calls {other.name} already ({place}); let that call {symbol.decl.name}")
+    world.pous += [function.pou for function in found.values()]
+    return list(found.values())
+
+
+def _error(world: World, symbol: PouSymbol, message: str) -> None:
+    world.scope_of(symbol).error(symbol.decl.pos, "attribute", message)
+
+
+def _function(world: World, symbol: PouSymbol) -> FunctionInfo | None:
+    """The function if the runtime can call it."""
+    info = world.declared.function(symbol, {})
+    if info is None:
+        return None
+    if info.parameters:
+        _error(world, symbol, f"{symbol.decl.name} is called by an event, so it has no inputs and outputs")
+        return None
+    if info.result not in (None, BOOL, ERROR):
+        _error(world, symbol, f"{symbol.decl.name} is called by an event, so its result is a BOOL, or it has none")
+        return None
+    return info
+
+
+def _events(world: World, symbol: PouSymbol, names: str) -> Iterator[str]:
+    """The events that are listed, each once."""
+    known = dict[str, None]()
+    for name in (part.strip() for part in names.split(",")):
+        written = _BY_KEY.get(name.casefold(), name)
+        event = ALIASES.get(written, written)
+        if event in EVENTS:
+            known[event] = None
+        elif event in NOT_CALLED:
+            _error(world, symbol, f"no function is called on {event}: {NOT_CALLED[event]}")
+        elif not name:
+            _error(world, symbol, "name the event: {attribute 'call_on' := 'EVT_StartDone'}")
+        else:
+            hint = did_you_mean(name, [*EVENTS, *ALIASES])
+            _error(world, symbol, f"'{name}' is not an event{hint or '; they are listed in docs/events.md'}")
+    yield from known
+
+
+def _caller(world: World, event: str, info: FunctionInfo) -> Pou:
+    """The function that the runtime calls: it hands over the answer of the one in the program."""
+    pos = info.pou.pos
+    answer = world.names.unit("event_answer__", library=True)
+    assert isinstance(answer, PouSymbol)
+    answers = world.declared.function(answer, {})
+    assert answers is not None
+    pou = Pou(event, PouKind.FUNCTION, pos)
+    called = Call(info.pou, [], info.result or NOTHING, pos)
+    if info.result is None:
+        pou.body = [CallStatement(called, pos), _call(answers, Const(0, BOOL, pos), pos)]
+    else:
+        pou.body = [_call(answers, called, pos)]
+    return pou
+
+
+def _call(answers: FunctionInfo, answer: Call | Const, pos: Pos) -> CallStatement:
+    return CallStatement(Call(answers.pou, [answer], BOOL, pos), pos)
