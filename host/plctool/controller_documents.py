@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ from plctool.errors import DeviceError
 
 if TYPE_CHECKING:
     from plctool.controller import Controller, ExceptionInfo, PlcStatus
+    from plctool.link.services import LogEntry
 
 Document = dict[str, Any]
 
@@ -43,13 +45,21 @@ def tasks(plc: Controller) -> Document:
     return {"tasks": [vars(task) for task in plc.tasks()]}
 
 
+LOG_CLASSES = ("debug", "info", "warning", "error", "exception")
+"""Of log entries, the gravest last; those of LOG_DEBUG .. LOG_EXCEPTION (CmpLog.h)."""
+
+
 def log(plc: Controller) -> Document:
     """The log; the exception that holds the program at present comes with its source line."""
+    return {"entries": log_entries(plc, plc.log())}
+
+
+def log_entries(plc: Controller, entries: Sequence[LogEntry]) -> list[Document]:
+    """Entries of the log of a controller as documents."""
     from plctool.core import lib
 
-    names = {lib.LOG_INFO: "info", lib.LOG_WARNING: "warning", lib.LOG_ERROR: "error", lib.LOG_EXCEPTION: "exception",
-             lib.LOG_DEBUG: "debug"}  # fmt: skip
-    entries: list[Document] = [
+    names = {int(getattr(lib, f"LOG_{name.upper()}")): name for name in LOG_CLASSES}
+    documents: list[Document] = [
         {
             "handle": entry.handle,
             "time_s": entry.time_ns / 1e9,
@@ -58,11 +68,25 @@ def log(plc: Controller) -> Document:
             "error": entry.error,
             "text": entry.text,
         }
-        for entry in plc.log()
+        for entry in entries
     ]
-    exception = plc.status().exception
-    last = next((e for e in reversed(entries) if e["class"] == "exception"), None)
+    last = next((e for e in reversed(documents) if e["class"] == "exception"), None)
+    exception = plc.status().exception if last else None
     if exception and exception.file and last:
         known = exception_document(exception)
         last |= {name: known[name] for name in ("pou", "file", "line", "calls", "detail")}
-    return {"entries": entries}
+    return documents
+
+
+def follow_log(plc: Controller) -> Iterator[list[LogEntry]]:
+    """Yields the entries of the controller, then each time those that were added since, perhaps none. A controller
+    that restarts begins a new log, which is noticed by its first entries."""
+    last: LogEntry | None = None
+    while True:
+        entries = plc.log(last.handle - 1 if last else 0)
+        if last is not None and entries and entries[0] == last:
+            entries = entries[1:]
+        elif last is not None and (not entries or entries[0].handle <= last.handle):
+            entries = plc.log()
+        last = entries[-1] if entries else last
+        yield entries

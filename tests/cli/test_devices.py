@@ -239,6 +239,62 @@ def test_log_entries_come_with_class_component_and_place(tool: Any, running: Fak
     assert "main.st:8" in tool("log", *PORT).out
 
 
+LOG = [
+    (1, 1_000_000_000, lib.LOG_DEBUG, "CmpApp", "trivial"),
+    (2, 2_000_000_000, lib.LOG_INFO, "IecLog", "started"),
+    (3, 3_000_000_000, lib.LOG_WARNING, "CmpApp", "slow"),
+    (4, 4_000_000_000, lib.LOG_ERROR, "IecLog", "jammed"),
+]
+
+
+@pytest.mark.parametrize(
+    ("options", "texts"),
+    [
+        ("", ["trivial", "started", "slow", "jammed"]),
+        ("--class warning", ["slow", "jammed"]),
+        ("--component ieclog", ["started", "jammed"]),
+        ("--component IecLog --component CmpApp --class error", ["jammed"]),
+        ("--component Nothing", []),
+    ],
+)
+def test_log_shows_the_classes_and_components_that_are_asked_for(
+    tool: Any, running: FakePlc, options: str, texts: list[str]
+) -> None:
+    running.log = LOG
+    entries = tool("log", *PORT, *options.split(), "--json").json["entries"]
+    assert [entry["text"] for entry in entries] == texts
+
+
+def test_log_of_an_unknown_class_names_the_classes(tool: Any, running: FakePlc) -> None:
+    done = tool("log", *PORT, "--class", "fatal")
+    assert done.status == 2
+    assert "exception" in done.err
+
+
+def test_log_follows_what_is_added_and_a_device_that_restarts(
+    tool: Any, running: FakePlc, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    logs = iter([
+        LOG,
+        [*LOG[2:], (5, 5_000_000_000, lib.LOG_INFO, "IecLog", "added")],
+        [(n, n * 1_000_000_000, lib.LOG_INFO, "IecLog", f"rolled {n}") for n in (9, 10)],
+        [(1, 7_000_000, lib.LOG_INFO, "CmpApp", "new start")],
+        [(1, 8_000_000, lib.LOG_INFO, "CmpApp", "one more start")],
+    ])  # fmt: skip
+
+    def next_log(seconds: float) -> None:
+        running.log = next(logs, None)
+        if running.log is None:
+            raise KeyboardInterrupt
+
+    running.log = LOG[:2]
+    monkeypatch.setattr("plctool.cli.commands.device.time.sleep", next_log)
+    done = tool("log", *PORT, "--follow", "--json", "--class", "info")
+    assert done.status == 0
+    texts = [json.loads(line)["text"] for line in done.out.splitlines()]
+    assert texts == ["started", "slow", "jammed", "added", "rolled 9", "rolled 10", "new start", "one more start"]
+
+
 def test_scan_lists_the_devices(tool: Any, plc: FakePlc) -> None:
     (found,) = tool("scan", *PORT, "--json").json["devices"]
     assert found["node_name"] == "press-3"

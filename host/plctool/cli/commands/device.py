@@ -3,20 +3,33 @@
 from __future__ import annotations
 
 import argparse
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from plctool.cli import output
 from plctool.cli.arguments import add_link, utf8
-from plctool.cli.connections import on_device
+from plctool.cli.connections import connect, on_device
 from plctool.cli.documents import Document
-from plctool.cli.output import table
+from plctool.cli.output import EXIT_OK, table
 from plctool.cli.parser import Parser
-from plctool.controller_documents import log, program_document, status_document, tasks
+from plctool.controller_documents import (
+    LOG_CLASSES,
+    follow_log,
+    log,
+    log_entries,
+    program_document,
+    status_document,
+    tasks,
+)
 
 if TYPE_CHECKING:
     from plctool.device import Plc
 
 _LOG_COLUMN = 27  # where the text of a log entry begins
+_FOLLOW_S = 0.5  # between two questions for new entries
 
 
 def status_arguments(command: Parser) -> None:
@@ -54,6 +67,13 @@ def tasks_arguments(command: Parser) -> None:
 
 
 def log_arguments(command: Parser) -> None:
+    command.add_argument("--follow", action="store_true", help="go on until Ctrl-C, and show what is added")
+    command.add_argument(
+        "--class", dest="log_class", choices=LOG_CLASSES, default=LOG_CLASSES[0], help="this class and graver ones"
+    )
+    command.add_argument(
+        "--component", action="append", type=utf8, metavar="NAME", help="messages of this component, such as IecLog"
+    )
     add_link(command)
     command.set_defaults(action=_log)
 
@@ -154,7 +174,24 @@ def tasks_text(document: dict[str, Any]) -> str:
 
 
 def _log(args: argparse.Namespace) -> int:
-    return on_device(args, log, log_text)
+    wanted = _wanted(args)
+    if not args.follow:
+        return on_device(args, lambda plc: {"entries": [*filter(wanted, log(plc)["entries"])]}, log_text)
+    with connect(args) as plc, suppress(KeyboardInterrupt):
+        for entries in follow_log(plc):
+            for entry in filter(wanted, log_entries(plc, entries)):
+                output.say(output.as_json(entry) if args.json else log_text({"entries": [entry]}))
+            time.sleep(_FOLLOW_S)
+    return EXIT_OK
+
+
+def _wanted(args: argparse.Namespace) -> Callable[[Document], bool]:
+    """True for entries of the classes and components that are asked for, and of classes that plctool does not know."""
+    others = LOG_CLASSES[: LOG_CLASSES.index(args.log_class)]
+    components = [name.casefold() for name in args.component or ()]
+    return lambda entry: (
+        entry["class"] not in others and (not components or entry["component"].casefold() in components)
+    )
 
 
 def log_text(document: dict[str, Any]) -> str:
