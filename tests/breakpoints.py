@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -59,10 +61,11 @@ END_RESOURCE END_CONFIGURATION
 """
 
 
-def build(folder: Path, *, level: int = 0, debug: bool = True) -> Path:
+def build(folder: Path, *, level: int = 0, debug: bool = True, target: str = "") -> Path:
     """The image of PROGRAM."""
+    target = target or os.environ.get("PLCRT_TARGET", "") or host_target()
     (folder / FILE).write_text(PROGRAM)
-    built = compile_sources([folder / FILE], target=host_target(), level=level, debug=debug)
+    built = compile_sources([folder / FILE], target=target, level=level, debug=debug)
     built.write(folder / "halting.cdl")
     return folder / "halting.cdl"
 
@@ -271,6 +274,32 @@ class Breaking:
         debugger = plc.breakpoints
         debugger.set(FILE, 30)
         assert halt(debugger).calls[0].line == 30
+
+    @pytest.mark.parametrize("level", [0, 2])
+    def test_a_program_computes_the_same_with_a_trap_at_each_statement(
+        self, plc: Controller, tmp_path: Path, level: int
+    ) -> None:
+        folder = tmp_path / f"level{level}"
+        folder.mkdir()
+        plc.flash(build(folder, level=level, debug=level == 0))
+        debugger = plc.breakpoints
+        room = debugger._target.status().room
+        for offset in sorted(debugger.statements.stops)[:room]:
+            debugger._target.set(offset, 10**9, None)
+        start = plc.read("Main.cycles")
+        self.run_until(debugger, lambda: plc.read("Main.cycles") > start + 20)
+        hits = debugger._target.hits()
+        plc.stop()
+        cycles = plc.read("Main.cycles")
+        assert (plc.read("Main.total"), plc.read("Main.word")) == (6 * cycles, cycles)
+        assert max(hits.values()) >= 20
+
+    def run_until(self, debugger: Debugger, condition: Callable[[], bool]) -> None:
+        for _ in range(200):
+            assert debugger.wait(0.1) is None
+            if condition():
+                return
+        pytest.fail("the program does not run")
 
     def test_breakpoints_end_with_the_debugger(self, plc: Controller) -> None:
         debugger = plc.breakpoints

@@ -69,6 +69,7 @@ typedef struct {
     RTS_UI32 breakpoints;          /* set */
     RTS_UI32 room;                 /* BP_MAX */
     RTS_UI32 traps;                /* BP_TRAPS */
+    RTS_UI32 link;                 /* code offset that the link register holds; APP_NO_CODE_OFFSET: none */
 } BP_STATUS;
 
 /* ---- from main ---- */

@@ -18,6 +18,7 @@ typedef struct {
     uintptr_t address; /* of the trap, or of the exception */
     uintptr_t stack;   /* the stack pointer */
     uintptr_t end;     /* past the highest address of the stack */
+    uintptr_t link;    /* the link register; 0 without one */
     const void *arg;   /* of the running SysExceptTry */
 } SYS_DEBUG_STOP;
 

@@ -625,6 +625,7 @@ class _DebuggedSimulator:
             c.breakpoints,
             c.room,
             c.traps,
+            None if c.link == lib.APP_NO_CODE_OFFSET else c.link,
         )
 
     def set(self, offset: int, skip: int, condition: DeviceCondition | None) -> None:

@@ -22,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 E2E = ROOT / "tests" / "e2e"
 NOTHING_TO_TEST = 77  # exit status, as for meson
 SHORT = [
+    "test_breakpoints.py",
     "test_call_stack.py",
     "test_plcrt_programs.py::test_what_no_check_stops_the_processor_does",
     "test_plcrt_programs.py::test_a_killed_controller_runs_its_program_again_with_its_retain_variables",

@@ -15,6 +15,7 @@
 #include "SysExcept.h"
 
 #include "IecStack.h"
+#include "StepOver.h"
 #include "SysDebug.h"
 
 #include <pthread.h>
@@ -218,7 +219,7 @@ void SysDebugSetHandler(PF_SYS_DEBUG handler)
 static SYS_DEBUG_ACTION ask_debugger(const CONTEXT *context, RTS_UI32 code, PLACE place)
 {
     PF_SYS_DEBUG debugger = __atomic_load_n(&state.debugger, __ATOMIC_ACQUIRE);
-    SYS_DEBUG_STOP stop = {code, place.address, place.stack, context->stack.top, context->arg};
+    SYS_DEBUG_STOP stop = {code, place.address, place.stack, context->stack.top, place.link, context->arg};
     return debugger != NULL ? debugger(&stop) : SYS_DEBUG_LEAVE;
 }
 
@@ -249,11 +250,34 @@ static bool goes_on(const CONTEXT *context, RTS_UI32 code, const siginfo_t *info
     }
     return true;
 }
+#define abandon_step() ((void)0)
 #else
 static bool goes_on(const CONTEXT *context, RTS_UI32 code, const siginfo_t *info, void *ucontext)
 {
-    RTS_UNUSED(info);
-    return ask_debugger(context, code, place_of(ucontext)) != SYS_DEBUG_LEAVE;
+    PLACE place = place_of(ucontext);
+    STEP_TRAP step = StepEnd(ucontext);
+    if (step == STEP_OF_ANOTHER) {
+        return true;
+    }
+    if (step != STEP_NONE) {
+        (void)ask_debugger(context, RTSEXCPT_NOEXCEPTION, place);
+    }
+    if (step == STEP_ENDED && !SysDebugIsTrap(place.address)) {
+        return true;
+    }
+    if (info->si_signo == SIGTRAP || (info->si_signo == SIGILL && SysDebugIsTrap(place.address))) {
+        code = RTSEXCPT_BREAKPOINT;
+    }
+    SYS_DEBUG_ACTION action = ask_debugger(context, code, place);
+    if (action == SYS_DEBUG_PASS && StepBegin(ucontext)) {
+        (void)ask_debugger(context, RTSEXCPT_NOEXCEPTION, place);
+    }
+    return action != SYS_DEBUG_LEAVE;
+}
+
+static void abandon_step(void)
+{
+    (void)StepEnd(NULL);
 }
 #endif
 
@@ -294,6 +318,7 @@ static void on_break(int number, siginfo_t *info, void *ucontext)
     CONTEXT *context = self();
     const struct sigaction *previous = &find_signal(number)->previous;
     if (runs_iec_code(context) && is_broken(context) && begin_to_leave(context)) {
+        abandon_step();
         leave(context, context->break_code, place_of(ucontext));
     }
     if ((previous->sa_flags & SA_SIGINFO) != 0) {

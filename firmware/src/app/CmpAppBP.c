@@ -571,6 +571,7 @@ void AppBpGetStatus(BP_STATUS *status)
     status->room = BP_MAX;
     status->traps = BP_TRAPS;
     status->code_offset = APP_NO_CODE_OFFSET;
+    status->link = APP_NO_CODE_OFFSET;
     for (i = 0; i < APP_AREA_COUNT && AppGetState() != AS_NONE; i++)
         status->area[i] = (uintptr_t)AppGetContext()->area[i];
     if (!AppBpIsHalted())
@@ -580,6 +581,8 @@ void AppBpGetStatus(BP_STATUS *status)
     status->task = bp.owner - 1;
     if (SysExceptIsCode(bp.stop.address))
         status->code_offset = SysExceptCodeOffset(bp.stop.address);
+    if (SysExceptIsReturn(bp.stop.link))
+        status->link = SysExceptCodeOffset(bp.stop.link - APP_ENTRY_MODE_BIT);
     status->stack = bp.stop.stack;
     status->stack_size = bp.stop.stack < bp.stop.end ? (RTS_UI32)(bp.stop.end - bp.stop.stack) : 0;
 }

@@ -80,6 +80,7 @@ static RTS_RESULT state(SRV_REQUEST *request, BTAG_WRITER *reply)
     BytesPut32(wire.breakpoints, now.breakpoints);
     BytesPut32(wire.room, now.room);
     BytesPut32(wire.traps, now.traps);
+    BytesPut32(wire.link, now.link);
     BTagWrite(reply, TAG_BP_STATE, BTAG_ALIGN_0, &wire, sizeof wire);
     return ERR_OK;
 }

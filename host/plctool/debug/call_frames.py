@@ -102,10 +102,10 @@ class DebugInfo:
         """What is on the stack in the function at `offset`, by name: bytes from its stack pointer."""
         return next((names for begin, end, names in self._variables if begin <= offset < end), {})
 
-    def frames(self, offset: int | None, words: Mapping[int, int]) -> list[StackFrame]:
+    def frames(self, offset: int | None, words: Mapping[int, int], link: int | None = None) -> list[StackFrame]:
         """The calls that have not returned, the innermost first. `words`: by distance from the stack pointer, the code
-        offsets to which calls may return. `offset` is None in a function that is not the program's: then the first
-        return address is that of the program's call of it."""
+        offsets to which calls may return; `link`: that of the link register. `offset` is None in a function that is not
+        the program's: then the first return address is that of the program's call of it."""
         pointer = 0
         found: list[StackFrame] = []
         if offset is None:
@@ -116,12 +116,13 @@ class DebugInfo:
         while len(found) < _MOST_CALLS:
             found.append(StackFrame(offset, pointer))
             frame = self._frame(offset)
-            if frame is None or frame.return_address is None:
+            if frame is None:
                 break
-            back = words.get(pointer + frame.size + frame.return_address)
+            saved = frame.return_address
+            back = link if saved is None else words.get(pointer + frame.size + saved)
             if back is None:
                 break
-            offset, pointer = back - 1, pointer + frame.size
+            offset, pointer, link = back - 1, pointer + frame.size, None
         return found
 
     def _is_possible(self, chain: list[int]) -> bool:

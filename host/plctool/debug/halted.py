@@ -14,15 +14,16 @@ from plctool.debug.variables import Change, Symbol, Units, shown, walk
 from plctool.errors import DeviceError, UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import ELEMENTARY, Elementary, Kind, OpenArrayType, StructType, Type, base_of
+from plctool.image.targets import Machine, find_target
 
 STACK = 0x100  # the area of what is on the stack of the halted task; its offset counts from the stack pointer
-_ADDRESS = 8  # bytes of a pointer
 _MOST_STACK = 64 * 1024  # bytes that are read to find the calls
 
 
 @dataclass(frozen=True)
 class BpStatus:
-    """What a controller says of its breakpoints, as BP_STATUS has it. `areas`: the address of each."""
+    """What a controller says of its breakpoints, as BP_STATUS has it. `areas`: the address of each; `link`: the code
+    offset in the link register of processors that have one."""
 
     supported: bool
     attached: bool
@@ -37,6 +38,7 @@ class BpStatus:
     breakpoints: int
     room: int
     traps: int
+    link: int | None = None
 
 
 class Memory(Protocol):
@@ -70,6 +72,9 @@ class Halted:
         self._table = table
         self._memory = memory
         self._units = Units(table.classes)
+        target = find_target(table.target)
+        self._word = target.pointer_size
+        self._mode_bit = int(target.machine in (Machine.THUMB, Machine.THUMB_V6M))
         self.calls = list(self._calls())
 
     # ---- calls ----
@@ -91,11 +96,11 @@ class Halted:
         base = self._status.areas[Area.CODE.value]
         end = self._table.lines[-1][0] if self._table.lines else 0
         words = {}
-        for at in range(0, len(data) - _ADDRESS + 1, _ADDRESS):
-            target = int.from_bytes(data[at : at + _ADDRESS], "little") - base
+        for at in range(0, len(data) - self._word + 1, self._word):
+            target = int.from_bytes(data[at : at + self._word], "little") - self._mode_bit - base
             if 0 < target <= end:
                 words[at] = target
-        return self._table.debug_info.frames(self._status.code_offset, words)
+        return self._table.debug_info.frames(self._status.code_offset, words, self._status.link)
 
     # ---- variables ----
 
@@ -200,11 +205,11 @@ class Halted:
         """The variable in an area or on the stack, pointers followed as far as they begin on the stack."""
         if symbol.pointer is None or (symbol.place[0] != STACK and self._root(symbol).area != STACK):
             return symbol
-        pointer = self._found(replace(symbol.pointer, type=ELEMENTARY["LWORD"]))
+        pointer = self._found(replace(symbol.pointer, type=ELEMENTARY["LWORD" if self._word == 8 else "DWORD"]))
         if pointer is None:
             return None
         (data,) = self.read([pointer])
-        return None if data is None else self._at_address(symbol, int.from_bytes(data[:_ADDRESS], "little"))
+        return None if data is None else self._at_address(symbol, int.from_bytes(data[: self._word], "little"))
 
     @staticmethod
     def _root(symbol: Symbol) -> Symbol:

@@ -80,6 +80,7 @@ def status(session: Session) -> BpStatus:
         found.breakpoints,
         found.room,
         found.traps,
+        None if found.link == lib.APP_NO_CODE_OFFSET else found.link,
     )
 
 
