@@ -33,6 +33,7 @@ SHARED = [
     "CmpIecTask.h",
     "CmpItf.h",
     "CmpLog.h",
+    "SettingsCheck.h",
     "CmpPackets.h",
     "AppRecord.h",
     "BoardFacts.h",

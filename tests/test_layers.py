@@ -16,7 +16,7 @@ from import_graph import INTERNALS, MODULES, arrows, drawn, floors, imports, nam
 FLOORS = (
     ("errors", "printable", "version"),
     ("core",),
-    ("archives", "files", "iec", "project"),
+    ("archives", "files", "iec", "project", "settings"),
     ("image",),
     ("io",),
     ("debug",),

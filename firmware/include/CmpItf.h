@@ -101,6 +101,7 @@ enum {
     CMPID_SysMdns = 0x0038,
     CMPID_IecLog = 0x0040,
     CMPID_IecEvents = 0x00A0,
+    CMPID_CmpSettings = 0x0090,
 };
 
 /* Name of a component, "" when unknown. */

@@ -39,6 +39,9 @@
 #if HAS_CmpFileTransfer && FILE_STORE_FILES == 0
 #error "HAS_CmpFileTransfer: set FILE_STORE_FILES and FILE_STORE_SIZE in rts_config_port.h."
 #endif
+#if HAS_CmpSettings && !SETTINGS
+#error "HAS_CmpSettings: set SETTINGS to 1 in rts_config_port.h."
+#endif
 #if HAS_CmpTraceMgr && TRACE_BUFFER == 0
 #error "HAS_CmpTraceMgr: set TRACE_BUFFER, the bytes that traces may use, in rts_config_port.h."
 #endif

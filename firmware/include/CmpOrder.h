@@ -16,6 +16,9 @@ X(CmpLog)
 PORT_SYSTEM(X)
 #endif
 X(SysFileFlash)
+#if HAS_CmpSettings
+X(CmpSettings)
+#endif
 #if HAS_CmpEventMgrEmbedded
 X(CmpEventMgrEmbedded)
 #endif

@@ -1,18 +1,26 @@
 /*
- * CmpSettings.h - settings: a constant table of the port. Manual 3.8.
+ * CmpSettings.h - settings: what a user may change without building the firmware again. Manual 3.8.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The port lists its values in rts_config_port.h: #define SETTINGS_TABLE {"CmpXxx", "Key", 1, NULL}, {"CmpXxx", "Name",
- * 0, "text"},
+ * docs/settings.md. Back ends are asked in turn: the command line of plcrt, the text (plcrt --config FILE, else
+ * Settings.cfg of the file store), the table of the port (CmpSettingsEmbedded.h), the standard in CmpSettingNames.h.
+ * Values count from the next start on. No client changes them by a service: a file is put, which needs the download right.
  */
 #ifndef CMPSETTINGS_H
 #define CMPSETTINGS_H
 
-#include "CmpStd.h"
+#include "CmpItf.h"
+#include "IniText.h"
 
-/* The value of component's `key`, or `otherwise` when the table has none (of this type). From any context. */
-RTS_I32 SettgGetIntValue(const char *component, const char *key, RTS_I32 otherwise);
-const char *SettgGetStringValue(const char *component, const char *key, const char *otherwise);
+#define SETTINGS_FILE_NAME "Settings.cfg"
+
+/* Takes this text in place of the file. It stays where it is. Before CMInit, from main. */
+void SettingsGive(const char *text, RTS_UI32 size);
+
+/* The text that was given; false: none, the file counts. */
+bool SettingsGiven(INI_PART *text);
+
+RTS_RESULT CmpSettings_Hook(CMP_HOOK hook);
 
 #endif

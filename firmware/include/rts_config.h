@@ -352,10 +352,16 @@
 #define CHECKSUM_TABLE_ENTRIES 16
 #endif
 
-/* Settings of the port, see CmpSettings.h; each {"component", "key", number, text}, with a comma after it. plcrt looks for
- * {"SysTarget", "NodeName", 0, "name in a scan"}. */
+/* Constants of the port, see CmpSettings.h; each {"component", "key", number, text}, with a comma after it. With SETTINGS
+ * those of CmpSettingNames.h are read from here, too, where no file says anything else. */
 #ifndef SETTINGS_TABLE
 #define SETTINGS_TABLE
+#endif
+
+/* 1: users may change the settings of CmpSettingNames.h, by a file of the file store. It needs HAS_CmpSettings in
+ * cmp_list.c. 0: they are constants, and no flash for them. */
+#ifndef SETTINGS
+#define SETTINGS 0
 #endif
 
 /* Which of several configurations of a board this one is: for plctool. */

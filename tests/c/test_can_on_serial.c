@@ -5,7 +5,7 @@
  */
 #include <string.h>
 
-#include "CmpSettings.h"
+#include "CmpSettingsEmbedded.h"
 #include "CmpSrvNumbers.h"
 #include "SysCan.h"
 #include "SysCom.h"

@@ -6,7 +6,7 @@
 #define _GNU_SOURCE
 #include "SysTarget.h"
 
-#include "CmpSettings.h"
+#include "CmpSettingsEmbedded.h"
 #include "CompactDownload.h"
 #include "port.h"
 #include "rts_config.h"

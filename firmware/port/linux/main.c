@@ -13,6 +13,7 @@
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
 #include "CmpSrvNumbers.h"
+#include "ConfigFile.h"
 #include "IoConfig.h"
 #include "Modbus.h"
 #include "ModbusToolLine.h"
@@ -66,7 +67,7 @@ static const char usage[] =
     "             [--udp ADDRESS[:PORT]] [--mdns] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
     "             [--tunnel PATH] [--tunnel-unit N] [--tunnel-baud N] [--tunnel-parity even|odd|none] "
     "[--tunnel-drive]\n"
-    "             [--board NAME] [--event NAME=PIPE]... [--metrics FILE] [--metrics-every SECONDS]\n"
+    "             [--board NAME] [--event NAME=PIPE]... [--metrics FILE] [--metrics-every SECONDS] [--config FILE]\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
@@ -103,6 +104,10 @@ static const char usage[] =
     "docs/packages.md\n"
     "  --metrics-every SECONDS\n"
     "                  how often, 15 if not given\n"
+    "  --config FILE   reads settings from this file, also those of other options, which count unless they are given "
+    "here:\n"
+    "                  docs/settings.md\n"
+    "  --help-config   prints all settings, as a file to begin with\n"
     "  --reset-password\n"
     "                  removes the password that is in the flash file, and ends\n"
     "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
@@ -115,13 +120,16 @@ static volatile sig_atomic_t quit;
 
 /* ---- options ---- */
 
+/* Where the option comes from that is being read: "" on the command line, else "FILE:LINE: ". */
+static char option_place[PATH_MAX + 16];
+
 static void refuse(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
 
 static void refuse(const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
-    fprintf(stderr, "plcrt: ");
+    fprintf(stderr, "plcrt: %s", option_place);
     vfprintf(stderr, format, arguments);
     fprintf(stderr, "\n");
     va_end(arguments);
@@ -180,6 +188,8 @@ enum {
     OPTION_METRICS,
     OPTION_METRICS_EVERY,
     OPTION_MDNS,
+    OPTION_CONFIG,
+    OPTION_HELP_CONFIG,
 };
 
 /* clang-format off */
@@ -208,6 +218,8 @@ static const struct option long_options[] = {
     {"mdns", no_argument, NULL, OPTION_MDNS},
     {"metrics", required_argument, NULL, OPTION_METRICS},
     {"metrics-every", required_argument, NULL, OPTION_METRICS_EVERY},
+    {"config", required_argument, NULL, OPTION_CONFIG},
+    {"help-config", no_argument, NULL, OPTION_HELP_CONFIG},
     {NULL, 0, NULL, 0},
 };
 /* clang-format on */
@@ -400,6 +412,12 @@ static void take_option(OPTIONS *options, int option)
     case OPTION_HELP:
         print_and_exit(usage);
         break;
+    case OPTION_CONFIG: /* read before all others */
+        break;
+    case OPTION_HELP_CONFIG:
+        ConfigFileHelp();
+        print_and_exit("");
+        break;
     case OPTION_TCP:
         options->tcp = take_tcp(optarg != NULL ? optarg : "127.0.0.1");
         break;
@@ -430,6 +448,50 @@ static void take_place(int argc, char **argv, int option)
     }
 }
 
+/* Of an option that SettingsInfo knows. */
+static int option_number(const char *name)
+{
+    const struct option *option = long_options;
+    while (strcmp(option->name, name) != 0) {
+        option++;
+    }
+    return option->val;
+}
+
+static void take_config_file(OPTIONS *options, const char *path)
+{
+    CONFIG_OPTION next;
+    if (!ConfigFileRead(path)) {
+        exit(EXIT_USAGE);
+    }
+    while (ConfigFileNext(&next)) {
+        (void)snprintf(option_place, sizeof(option_place), "%s:%u: ", path, next.line);
+        optarg = next.value;
+        take_option(options, option_number(next.option));
+    }
+    option_place[0] = '\0';
+}
+
+/* What the file of --config says, which other options of the command line change. */
+static void take_config(OPTIONS *options, int argc, char **argv)
+{
+    const char *path = NULL;
+    int option;
+    while ((option = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
+        take_place(argc, argv, option);
+        if (option == OPTION_CONFIG && path != NULL) {
+            refuse("--config %s is one too many: there may be one file", optarg);
+        }
+        if (option == OPTION_CONFIG) {
+            path = optarg;
+        }
+    }
+    optind = 0; /* from the beginning */
+    if (path != NULL) {
+        take_config_file(options, path);
+    }
+}
+
 static OPTIONS parse_options(int argc, char **argv)
 {
     OPTIONS options = {.baud = DEFAULT_BAUD,
@@ -438,6 +500,7 @@ static OPTIONS parse_options(int argc, char **argv)
                        .tunnel = {NULL, {TUNNEL_BAUD, SYSCOM_PARITY_EVEN, 1, false}, TUNNEL_UNIT}};
     int option;
     opterr = 0;
+    take_config(&options, argc, argv);
     while ((option = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
         if (option == '?') {
             refuse_option(argv[optind - 1]);

@@ -36,6 +36,7 @@
 #define OPERATION_CONTROL 1
 #define IEC_LOG_BURST 32
 #define IEC_EVENTS 1
+#define SETTINGS 1
 #define TRACE_BUFFER (4 * 1024 * 1024)
 #define BP_MAX 128
 #define IEC_LATENESS 1

@@ -33,6 +33,7 @@
 #define OPERATION_CONTROL 1
 #define IEC_LOG_BURST 16
 #define IEC_EVENTS 1
+#define SETTINGS 1
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */
 #define TRACE_BUFFER (1024 * 1024)
 #endif

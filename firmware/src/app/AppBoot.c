@@ -17,6 +17,7 @@
 #include "../load/AppLoader.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
+#include "SettingValues.h"
 #include "SysExcept.h"
 #include "SysStart.h"
 
@@ -141,6 +142,8 @@ static void take_death(void)
         take_exception(start);
     if (died)
         AppCommitSetDead(start->text);
+    else if (start->cause == SYS_START_CRASH)
+        (void)AppEndUnclean(start->text);
 }
 
 static void start_boot_project(void)
@@ -152,19 +155,30 @@ static void start_boot_project(void)
         AppPostEvent(EVT_StartBootprojectDone);
 }
 
+/* Whether a boot project that is loaded waits for a user. After a rollback it is another one than the one that failed. */
+static bool waits(bool failed)
+{
+    if (failed && SETTING(BootStart) == BOOT_START_CLEAN)
+        (void)AppEndUnclean("");
+    return stays_stopped() || AppCommitIsDead() || SETTING(BootStart) == BOOT_START_NEVER ||
+           (failed && SETTING(BootStart) == BOOT_START_CLEAN);
+}
+
 /* A boot project starts automatically, unless it failed. One that stays stopped is loaded, whatever components say. */
 static void run_boot_project(void)
 {
     RTS_RESULT result;
+    bool failed;
 
     take_death();
+    failed = SETTINGS && AppCommitIsDead();
     result = stays_stopped() ? (RTS_RESULT)ERR_OK : AppEventAskBoot(EVT_DenyLoadBootproject);
     if (result == ERR_OK)
         result = load_boot_project(!stays_stopped());
     AppPostEvent(EVT_AllBootprojectsLoaded);
     if (result != ERR_OK)
         return;
-    if (stays_stopped() || AppCommitIsDead())
+    if (waits(failed))
         LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "Boot project not started%s",
                AppCommitIsDead() ? ": it failed before" : "");
     else

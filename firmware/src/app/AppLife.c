@@ -116,13 +116,23 @@ static void record_exception(const APP_RAISED *raised)
     AppExceptionSet(&exception, place_of(raised->task));
 }
 
+#if SETTINGS
+bool AppEndUnclean(const char *text)
+{
+    if (SETTING(BootStart) != BOOT_START_CLEAN || AppCommitGet()->state[AppCommitGet()->active] != SLOT_PROVEN)
+        return false;
+    AppCommitSetDead(text);
+    return true;
+}
+#endif
+
 /* The safe state after an exception (again, since other tasks have finished their cycle); an application that is new
  * will not be booted. */
 static void enter_exception_state(void)
 {
     AppEnterSafeState();
     app.state = AS_STOP;
-    if (!AppWasBrokenOff())
+    if (!AppWasBrokenOff() && !(app.image.file == AppCommitGet()->active && AppEndUnclean("")))
         (void)AppCommitSetState(app.image.file, SLOT_FAILED);
     AppPostEvent(EVT_CmpApp_Exception);
 }

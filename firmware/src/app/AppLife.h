@@ -13,6 +13,7 @@
 #include "AppRefusal.h"
 #include "AppState.h"
 #include "CmpErrors.h"
+#include "SettingValues.h"
 
 /* Slot of the loaded application, SLOT_NONE without one. */
 RTS_UI32 AppGetSlot(void);
@@ -75,6 +76,14 @@ RTS_RESULT AppStartIfAllowed(void);
 #define AppAskStop() ((RTS_RESULT)ERR_OK)
 #define AppAskStart(event) ((RTS_RESULT)ERR_OK)
 #define AppStartIfAllowed() AppStart()
+#endif
+
+/* With Bootproject.Start=clean: notes in flash that the active application, which has proven itself, ended by an exception or
+ * crash. It runs on request only. False: it goes by the usual rules. */
+#if SETTINGS
+bool AppEndUnclean(const char *text);
+#else
+#define AppEndUnclean(text) false
 #endif
 
 /* An application that has run for APP_PROVE_US, and is in no long cycle, has proven itself. In each pass of main. */

@@ -265,7 +265,7 @@ static RTS_RESULT set_node_name(SRV_REQUEST *request, BTAG_WRITER *reply)
     return result;
 }
 
-/* Settings are constants of the firmware (CmpSettings.h): no client has the right to see or change them. Writing such
+/* Settings are a file or constants of the firmware (CmpSettings.h): no service shows or changes them. Writing such
  * limits was how others were attacked (CVE-2020-7052). */
 static RTS_RESULT refuse_setting(SRV_REQUEST *request, BTAG_WRITER *reply)
 {

@@ -14,6 +14,7 @@
 #include "CmpChecksum.h"
 #include "CmpLog.h"
 #include "CmpPackets.h"
+#include "CmpSettings.h"
 #include "CmpSrv.h"
 #include "FileStore.h"
 #include "SysTarget.h"
@@ -35,6 +36,8 @@ struct FILE_KIND {
     RTS_RESULT (*find)(FILE_ENTRY *entry);
     /* Within its size. ERR_NO_CONSISTENCY: it is another file now. */
     RTS_RESULT (*read)(const FILE_ENTRY *entry, RTS_UI32 offset, RTS_UI8 *data, RTS_UI32 size);
+    /* Whether a client may write and delete it; NULL: no. */
+    bool (*may_change)(void);
 };
 
 /* A file that a client reads; session 0: none. */
@@ -166,10 +169,54 @@ static RTS_RESULT read_stored(const FILE_ENTRY *entry, RTS_UI32 offset, RTS_UI8 
     return FileStoreRead(entry, offset, data, size);
 }
 
+static bool always(void)
+{
+    return true;
+}
+
+/* ---- the settings ---- */
+
+#if SETTINGS
+/* Those that the device started with, as plcrt has them from a file of its machine; else those of the store, which
+ * are there, empty, also before they are put. */
+static RTS_RESULT find_settings(FILE_ENTRY *entry)
+{
+    INI_PART given;
+
+    if (!SettingsGiven(&given)) {
+        (void)find_stored(entry);
+        return ERR_OK;
+    }
+    entry->size = given.size;
+    entry->crc = CRC32Update(0, given.text, given.size);
+    return ERR_OK;
+}
+
+static RTS_RESULT read_settings(const FILE_ENTRY *entry, RTS_UI32 offset, RTS_UI8 *data, RTS_UI32 size)
+{
+    INI_PART given;
+
+    if (!SettingsGiven(&given))
+        return read_stored(entry, offset, data, size);
+    memcpy(data, given.text + offset, size);
+    return ERR_OK;
+}
+
+static bool are_not_given(void)
+{
+    INI_PART given;
+
+    return !SettingsGiven(&given);
+}
+#endif
+
 static const FILE_KIND kinds[] = {
-    {FILE_NAME_IMAGE, find_image, read_image},
-    {FILE_NAME_LOG, find_log, read_log},
-    {NULL, find_stored, read_stored},
+    {FILE_NAME_IMAGE, find_image, read_image, NULL},
+    {FILE_NAME_LOG, find_log, read_log, NULL},
+#if SETTINGS
+    {SETTINGS_FILE_NAME, find_settings, read_settings, are_not_given},
+#endif
+    {NULL, find_stored, read_stored, always},
 };
 
 static const FILE_KIND *kind_of(const char *name)
@@ -179,6 +226,12 @@ static const FILE_KIND *kind_of(const char *name)
     while (kind->name != NULL && strcmp(kind->name, name) != 0)
         kind++;
     return kind;
+}
+
+/* Whether a client may write and delete files of this kind. */
+static bool may_change(const FILE_KIND *kind)
+{
+    return kind->may_change != NULL && kind->may_change();
 }
 
 /* ---- what requests say ---- */
@@ -217,7 +270,7 @@ static RTS_RESULT read_own_name(const SRV_REQUEST *request, FILE_ENTRY *entry)
 {
     RTS_RESULT result = read_name(request, entry);
 
-    return result == ERR_OK && kind_of(entry->name)->name != NULL ? ERR_OPERATION_DENIED : result;
+    return result == ERR_OK && !may_change(kind_of(entry->name)) ? ERR_OPERATION_DENIED : result;
 }
 
 /* A malformed request is refused as a whole, all else in TAG_FILE_RESULT. */
@@ -269,10 +322,12 @@ static RTS_RESULT find_by_index(RTS_UI32 index, SOURCE *source)
     source->kind = &kinds[index < MADE ? index : MADE];
     if (index < MADE) {
         memcpy(source->entry.name, source->kind->name, strlen(source->kind->name));
-        return source->kind->find(&source->entry);
+        RTS_RESULT result = source->kind->find(&source->entry);
+        bool is_put = result == ERR_OK && may_change(source->kind); /* listed when it is */
+        return is_put && source->entry.size == 0 ? ERR_NO_OBJECT : result;
     }
     const FILE_ENTRY *file = FileStoreGet(index - MADE);
-    if (file == NULL)
+    if (file == NULL || kind_of(file->name)->name != NULL) /* that was listed */
         return ERR_NO_OBJECT;
     source->entry = *file;
     return ERR_OK;
@@ -288,7 +343,7 @@ static bool write_entry(BTAG_WRITER *reply, const SOURCE *source)
     BTagOpen(reply, TAG_FILE_ENTRY, BTAG_ALIGN_0);
     BTagWriteText(reply, TAG_FILE_ENTRY_NAME, source->entry.name, FILE_NAME_MAX);
     write_content(reply, TAG_FILE_ENTRY_CONTENT, &source->entry);
-    BTagWrite32(reply, TAG_FILE_ENTRY_FIXED, source->kind->name != NULL);
+    BTagWrite32(reply, TAG_FILE_ENTRY_FIXED, !may_change(source->kind));
     BTagClose(reply);
     return true;
 }

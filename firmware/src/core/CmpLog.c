@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "CMUtils.h"
+#include "SettingValues.h"
 #include "SysAtomic.h"
 #include "SysTime.h"
 
@@ -22,12 +23,22 @@ static struct {
     LOG_ENTRY ring[PLACES];
 } logger;
 
+/* True if the settings leave entries of this class out. */
+static bool is_filtered(RTS_UI32 log_class)
+{
+    return SETTINGS && (log_class & ((RTS_UI32)SETTING(LogFilter) | LOG_EXCEPTION)) == 0;
+}
+
 void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...)
 {
-    RTS_UI32 handle = SysAtomicAdd(&logger.count, 1) + 1;
-    LOG_ENTRY *entry = &logger.ring[handle % PLACES];
+    RTS_UI32 handle;
+    LOG_ENTRY *entry;
     va_list arguments;
 
+    if (is_filtered(log_class))
+        return;
+    handle = SysAtomicAdd(&logger.count, 1) + 1;
+    entry = &logger.ring[handle % PLACES];
     SysAtomicStore(&entry->handle, 0);
     SysAtomicFence();
     entry->component = component;

@@ -1,9 +1,9 @@
 /*
- * CmpSettingsEmbedded.c - settings from a constant table.
+ * CmpSettingsEmbedded.c - settings from a constant table of the port.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CmpSettings.h"
+#include "CmpSettingsEmbedded.h"
 
 #include <string.h>
 

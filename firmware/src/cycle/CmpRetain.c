@@ -13,6 +13,7 @@
 #include "CmpLog.h"
 #include "IecCycle.h"
 #include "RetainTable.h"
+#include "SettingValues.h"
 #include "SysFileFlash.h"
 #include "SysTime.h"
 #include "rts_config.h"
@@ -40,7 +41,7 @@ enum { HAS_RETAIN = APP_RETAIN_SIZE > 0 };
 static RTS_UI8 saved_area[HAS_RETAIN ? APP_RETAIN_SIZE : 1];
 static RTS_UI8 taken_at[sizeof saved_area / 8 + 1]; /* a bit for each byte: a value that was put back begins there */
 
-#define SAVE_MS (APP_RETAIN_SAVE_US / 1000)
+#define SAVE_MS ((RTS_UI32)SETTING(RetainSave))
 
 RTS_UI32 RetainCapacity(void)
 {

@@ -15,6 +15,7 @@
 #include "CmpItf.h"
 #include "CyclePhases.h"
 #include "SchedEvents.h"
+#include "SettingValues.h"
 #include "SysAtomic.h"
 #include "SysDebug.h"
 #include "SysTime.h"
@@ -482,6 +483,16 @@ bool IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 
 /* ---- all tasks ---- */
 
+/* Of a task that has no watchdog of its own. */
+static RTS_I64 default_limit(RTS_I64 most_ns)
+{
+    RTS_I64 limit_ns = (RTS_I64)SETTING(Watchdog) * 1000 * NS_PER_US;
+
+    if (limit_ns == 0)
+        return (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
+    return most_ns != 0 && limit_ns > most_ns ? most_ns : limit_ns;
+}
+
 /* How long a cycle of the task may take. */
 static RTS_I64 limit_of(const TASK *task)
 {
@@ -489,7 +500,7 @@ static RTS_I64 limit_of(const TASK *task)
     RTS_I64 limit_ns = task->watchdog_ns * (RTS_I64)task->sensitivity;
 
     if (limit_ns == 0)
-        return (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
+        return default_limit(most_ns);
     return most_ns != 0 && limit_ns > most_ns ? most_ns : limit_ns;
 }
 

@@ -5,7 +5,7 @@
  *
  * The line is number CAN_SLCAN_LINE of SysCom.h, which no other driver may use: COM_MAX_LINES is not above it.
  */
-#include "CmpSettings.h"
+#include "CmpSettingsEmbedded.h"
 #include "CmpSrvNumbers.h"
 #include "Slcan.h"
 #include "SysCan.h"

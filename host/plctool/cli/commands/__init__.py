@@ -61,6 +61,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("dump", "dump", "write what the controller has in memory to a file, as after an exception"),
         Row("inspect", "dump", "print exception, calls and variables of a dump"),
         Row("files", "files", "list, get, put and delete the files of a device"),
+        Row("settings", "settings", "show, check and put the settings of a device"),
         Row("source", "source", "keep the sources of the program on the device, and get them back"),
         Row("passwd", "device", "set, change or remove the password of a device"),
         Row("shell", "device", "send a command to the PLC shell of a device; ? lists them"),

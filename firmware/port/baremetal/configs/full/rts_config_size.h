@@ -31,6 +31,9 @@
 #ifndef IEC_EVENTS
 #define IEC_EVENTS 1
 #endif
+#ifndef SETTINGS
+#define SETTINGS 1
+#endif
 #ifndef TRACE_BUFFER
 #define TRACE_BUFFER 4096
 #endif
