@@ -11,10 +11,6 @@
 
 #include "CmpItf.h"
 
-/* Those that the device makes itself; they cannot be written or deleted. */
-#define FILE_NAME_IMAGE "Application.cdl"
-#define FILE_NAME_LOG "PlcLog.txt"
-
 RTS_RESULT CmpFileTransfer_Hook(CMP_HOOK hook);
 
 #endif

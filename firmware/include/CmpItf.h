@@ -102,6 +102,8 @@ enum {
     CMPID_IecLog = 0x0040,
     CMPID_IecEvents = 0x00A0,
     CMPID_CmpSettings = 0x0090,
+    CMPID_CmpAppCalls = 0x0070,
+    CMPID_IecFile = 0x0071,
 };
 
 /* Name of a component, "" when unknown. */

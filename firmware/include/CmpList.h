@@ -42,6 +42,12 @@
 #if HAS_CmpSettings && !SETTINGS
 #error "HAS_CmpSettings: set SETTINGS to 1 in rts_config_port.h."
 #endif
+#if HAS_CmpAppCalls && APP_CALLS == 0
+#error "HAS_CmpAppCalls: set APP_CALLS, the calls of programs that main carries out, in rts_config_port.h."
+#endif
+#if HAS_IecFile && (IEC_FILES == 0 || !HAS_CmpAppCalls || !HAS_CmpFileTransfer)
+#error "HAS_IecFile: set IEC_FILES in rts_config_port.h, and HAS_CmpAppCalls and HAS_CmpFileTransfer in cmp_list.c."
+#endif
 #if HAS_CmpTraceMgr && TRACE_BUFFER == 0
 #error "HAS_CmpTraceMgr: set TRACE_BUFFER, the bytes that traces may use, in rts_config_port.h."
 #endif
@@ -114,6 +120,12 @@ enum {
 #endif
 #if HAS_IecEvents
     CMP_ONE(IecEvents)
+#endif
+#if HAS_CmpAppCalls
+    CMP_ONE(CmpAppCalls)
+#endif
+#if HAS_IecFile
+    CMP_ONE(IecFile)
 #endif
 #if HAS_IoDrvModbus
     CMP_ONE(IoDrvModbus)

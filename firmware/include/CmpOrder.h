@@ -57,6 +57,12 @@ X(IecLog)
 #if HAS_IecEvents
 X(IecEvents)
 #endif
+#if HAS_CmpAppCalls
+X(CmpAppCalls)
+#endif
+#if HAS_IecFile
+X(IecFile)
+#endif
 #if HAS_CmpTraceMgr
 X(CmpTraceMgr)
 #endif

@@ -14,6 +14,10 @@
 #include "CmpSrvNumbers.h"
 #include "CmpStd.h"
 
+/* Files that the device makes itself: they are not in the store, and cannot be written or deleted. */
+#define FILE_NAME_IMAGE "Application.cdl"
+#define FILE_NAME_LOG "PlcLog.txt"
+
 typedef struct {
     char name[FILE_NAME_MAX + 4]; /* NUL and zeros to its end; "" for an entry that is free */
     RTS_UI32 start;               /* in FILE_STORE, a multiple of the sector size */
@@ -38,6 +42,9 @@ RTS_UI32 FileStoreRoom(void);
 /* Begins a file; one that has begun and not ended is dropped. ERR_PARAMETER not a name; ERR_DISK_FULL no room, or too many
  * files; ERR_DEVICE. */
 RTS_RESULT FileStoreBegin(const char *name, RTS_UI32 size, RTS_UI32 crc);
+/* Begins a file whose size is known at its end: it has the largest gap until then. Errors as FileStoreBegin; FileStoreFinish
+ * ends it. */
+RTS_RESULT FileStoreCreate(const char *name);
 /* Appends. ERR_INVALID_SEQUENCE not begun; ERR_FT_FILE_SIZE_MISMATCH more than was said; ERR_DEVICE, which drops it. */
 RTS_RESULT FileStoreWrite(const RTS_UI8 *data, RTS_UI32 size);
 /* Bytes written of the file that has begun. */
@@ -47,6 +54,8 @@ bool FileStoreIsWriting(void);
 /* Puts the file in place of the previous one of its name. ERR_FT_FILE_SIZE_MISMATCH bytes are missing,
  * ERR_FT_CRC_MISMATCH, ERR_DEVICE: the previous one stays. */
 RTS_RESULT FileStoreEnd(void);
+/* The same for a file of FileStoreCreate, with what has been written, whose CRC-32 this is. */
+RTS_RESULT FileStoreFinish(RTS_UI32 crc);
 void FileStoreAbort(void);
 
 /* Reads from a file, of which `entry` is a copy. ERR_NO_CONSISTENCY it has been changed or deleted since,
@@ -55,5 +64,8 @@ RTS_RESULT FileStoreRead(const FILE_ENTRY *entry, RTS_UI32 offset, void *data, R
 
 /* ERR_NO_OBJECT there is none, ERR_DEVICE it is still there. */
 RTS_RESULT FileStoreDelete(const char *name);
+
+/* ERR_NO_OBJECT there is none, ERR_DUPLICATE there is one of the new name, ERR_PARAMETER not a name, ERR_DEVICE. */
+RTS_RESULT FileStoreRename(const char *name, const char *new_name);
 
 #endif

@@ -306,6 +306,21 @@
 #ifndef IEC_EVENTS
 #define IEC_EVENTS 0
 #endif
+/* Calls of a program that main carries out (CmpAppCalls.h) at a time, and bytes of data that each has room for, a multiple
+ * of 32: the more, the fewer calls a long file takes. 48 bytes of RAM and the data for each. It needs HAS_CmpAppCalls in
+ * cmp_list.c and one of EVENT_MAX_CALLBACKS. 0: no flash for it, and a program that needs one is refused. */
+#ifndef APP_CALLS
+#define APP_CALLS 0
+#endif
+#ifndef APP_CALL_DATA
+#define APP_CALL_DATA 128
+#endif
+
+/* Files that a program may have open at a time (IecFile.h); 68 bytes of RAM for each. It needs HAS_IecFile in cmp_list.c
+ * and one of EVENT_MAX_CALLBACKS. 0: no flash for them, and a program that opens one is refused. */
+#ifndef IEC_FILES
+#define IEC_FILES 0
+#endif
 
 /* Bytes for what is traced (CmpTraceMgr.h): each packet takes some 150, 28 for each record, and its samples. 0: none, and
  * no flash for them. It needs HAS_CmpTraceMgr in cmp_list.c, and two of EVENT_MAX_CALLBACKS. */

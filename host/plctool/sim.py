@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
 _MAX_CYCLES = 0xFFFF_FFFF  # of one call of the C core
 _SECTOR = 4096
+_FILE_STORE = 1 << 20  # bytes for files, as on plcrt; the program's own room stays as it was
 _PROGRAM_UNIT = 8
 MAX_NS = 2**62  # at once; the clock goes twice as far
 _TRACE_MESSAGE = 64 * 1024  # bytes of samples at a time
@@ -142,7 +143,8 @@ class Simulator(Controller):
 
     def _power_on(self, cycle_limit_ms: int) -> None:
         """With an empty flash and no events."""
-        made = self._lib.SimFlashConfigure(_FLASH_SIZE, _SECTOR, _PROGRAM_UNIT, 0xFF)
+        self._lib.SimSetFileStore(_FILE_STORE)
+        made = self._lib.SimFlashConfigure(_FLASH_SIZE + _FILE_STORE, _SECTOR, _PROGRAM_UNIT, 0xFF)
         _check(made, "The simulated flash cannot be made")
         self._limited = cycle_limit_ms > 0
         if self._limited:
@@ -159,6 +161,7 @@ class Simulator(Controller):
         with self._functions.while_running():
             self._closed = True
             self._lib.SimStop()
+            self._lib.SimSetFileStore(0)
             self._functions.disconnect(self._core)
             if self._limited:
                 self._lib.SimSetCycleLimit(0)
@@ -230,6 +233,27 @@ class Simulator(Controller):
         _check(result, "The simulator does not start")
         for plant in self._plants:  # the clock begins at 0 again
             plant.due_ns = self.now_ns + plant.every_ns
+
+    # ---- files ----
+
+    def put_file(self, name: str, data: bytes) -> None:
+        """Gives the device a file, which its program may read. Raises DeviceError if there is no room for it."""
+        put = self._lib.SimPutFile(name.encode("latin-1", "replace"), data, len(data))
+        _check(put, f"The simulated device cannot have the file {name}")
+
+    def files(self) -> dict[str, bytes]:
+        """The files that the device has, by name."""
+        found: dict[str, bytes] = {}
+        name, size = self._ffi.new("char[36]"), self._ffi.new("RTS_UI32 *")
+        index = 0
+        while self._lib.SimGetFile(index, name, size) == lib.ERR_OK:
+            index += 1
+            if name[0] == b"\0":
+                continue
+            data = self._ffi.new("RTS_UI8[]", max(size[0], 1))
+            _check(self._lib.SimReadFile(name, data, size[0]), "A file of the simulated device cannot be read")
+            found[self._ffi.string(name).decode("latin-1")] = bytes(self._ffi.buffer(data, size[0]))
+        return found
 
     def raw_status(self) -> Status:
         c = self._ffi.new("APP_STATUS *")

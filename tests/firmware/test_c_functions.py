@@ -16,6 +16,8 @@ COMPONENTS = {
     "CmpIecTask.externals": "CmpIecTask",
     "CmpMath.functions": "CmpMath",
     "IecEvents.functions": "IecEvents",
+    "CmpAppCalls.functions": "CmpAppCalls",
+    "IecFile.functions": "IecFile",
     "IecLog.functions": "IecLog",
     "CmpOperationControl.functions": "CmpOperationControl",
     "CmpRetain.externals": "CmpRetain",

@@ -37,6 +37,9 @@
 #define IEC_LOG_BURST 32
 #define IEC_EVENTS 1
 #define SETTINGS 1
+#define APP_CALLS 32
+#define APP_CALL_DATA 4096
+#define IEC_FILES 16
 #define TRACE_BUFFER (4 * 1024 * 1024)
 #define BP_MAX 128
 #define IEC_LATENESS 1

@@ -10,6 +10,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "CmpAppCalls.h"
 #include "CmpAppEmbedded.h"
 #include "CmpIecTask.h"
 #include "CmpScheduleTimer.h"
@@ -362,11 +363,13 @@ static void run_timer(TIMER *timer)
 
 const SIM_BUS *SimBus;
 
-/* The next pass is when a bus needs it. */
+/* The next pass is when a bus needs it, or a call of the program. */
 static void serve_bus(void)
 {
     RTS_I64 due_ns = SimBus != NULL ? SimBus->due_ns(sim.now_ns) : NEVER;
 
+    if (AppCallsWait())
+        due_ns = sim.now_ns;
     if (due_ns < sim.last_comm_ns + COMM_PAUSE_NS)
         due_ns = sim.last_comm_ns + COMM_PAUSE_NS;
     if (due_ns < sim.next_comm_ns)

@@ -120,6 +120,18 @@ enum { SIM_CUT_BEFORE = 0, SIM_CUT_AFTER = 1, SIM_CUT_TORN = 2, SIM_FAULT = 3 };
 /* A new, erased flash. From power off. ERR_PARAMETER for a geometry that SysFlash.h does not allow, ERR_NOMEMORY. */
 RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 program_size, RTS_UI8 erased);
 
+/* Bytes of it for files (FileStore.h), whole sectors at its end, two of them for the catalog; the default is 0. Before
+ * SimStart; it stays. */
+void SimSetFileStore(RTS_UI32 size);
+
+/* A file, as a program or a tool writes it. While power is on. Errors as FileStoreBegin; ERR_INVALID_STATE: one is being
+ * written. */
+RTS_RESULT SimPutFile(const char *name, const RTS_UI8 *data, RTS_UI32 size);
+/* Name and size of file `index`; "" for an entry that is free. ERR_OUT_OF_LIMITS past the last entry. */
+RTS_RESULT SimGetFile(RTS_UI32 index, char name[36], RTS_UI32 *size);
+/* Reads all of a file. ERR_NO_OBJECT; ERR_SIZE_MISMATCH: it has another size. */
+RTS_RESULT SimReadFile(const char *name, RTS_UI8 *data, RTS_UI32 size);
+
 /* 0: the flash is read through its read function only. From power off; the default is 1. */
 void SimFlashSetMapped(int mapped);
 

@@ -359,6 +359,11 @@ static bool renew_cells(RTS_UI32 size, RTS_UI8 erased)
     return true;
 }
 
+void SimSetFileStore(RTS_UI32 size)
+{
+    SimFileStoreSize = size;
+}
+
 RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 program_size, RTS_UI8 erased)
 {
     if (!is_power_of_two(sector_size) || !is_power_of_two(program_size) || program_size > 16 || size == 0 ||

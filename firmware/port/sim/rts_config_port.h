@@ -34,6 +34,9 @@
 #define IEC_LOG_BURST 16
 #define IEC_EVENTS 1
 #define SETTINGS 1
+#define APP_CALLS 32
+#define APP_CALL_DATA 1024
+#define IEC_FILES 16
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */
 #define TRACE_BUFFER (1024 * 1024)
 #endif

@@ -517,7 +517,7 @@ static bool is_anothers(const COMM_CLIENT *client)
 
 static RTS_RESULT begin(const COMM_CLIENT *client, const FILE_ENTRY *entry)
 {
-    if (is_anothers(client))
+    if (is_anothers(client) || (files.writer == NULL && FileStoreIsWriting()))
         return ERR_INVALID_STATE;
     files.writer = NULL;
     RTS_RESULT result = FileStoreBegin(entry->name, entry->size, entry->crc);

@@ -103,6 +103,20 @@ static RTS_UI32 gap(RTS_UI32 index)
     return file == NULL ? 0 : file->start + span(file->size);
 }
 
+static RTS_UI32 largest_gap(RTS_UI32 *start)
+{
+    RTS_UI32 largest = 0;
+
+    for (RTS_UI32 i = 0; i <= FILE_STORE_FILES; i++) {
+        RTS_UI32 room = room_at(gap(i));
+        if (room <= largest)
+            continue;
+        largest = room;
+        *start = gap(i);
+    }
+    return largest;
+}
+
 /* The smallest gap that has `size` bytes; false if there is none. */
 static bool find_place(RTS_UI32 size, RTS_UI32 *start)
 {
@@ -120,15 +134,9 @@ static bool find_place(RTS_UI32 size, RTS_UI32 *start)
 
 RTS_UI32 FileStoreRoom(void)
 {
-    RTS_UI32 largest = 0;
+    RTS_UI32 start;
 
-    if (store.opened != ERR_OK || find("") == NULL)
-        return 0;
-    for (RTS_UI32 i = 0; i <= FILE_STORE_FILES; i++) {
-        RTS_UI32 room = room_at(gap(i));
-        largest = room > largest ? room : largest;
-    }
-    return largest;
+    return store.opened != ERR_OK || find("") == NULL ? 0 : largest_gap(&start);
 }
 
 /* ---- the catalog ---- */
@@ -190,6 +198,15 @@ static FILE_ENTRY *place_of(const char *name)
     return place == NULL ? find("") : place;
 }
 
+static void begin_at_place(const char *name)
+{
+    memset(store.next.name, 0, sizeof(store.next.name));
+    memcpy(store.next.name, name, strlen(name));
+    store.written = 0;
+    store.writing = true;
+    SysFileCreateAt(FILE_STORE, store.next.start);
+}
+
 RTS_RESULT FileStoreBegin(const char *name, RTS_UI32 size, RTS_UI32 crc)
 {
     FileStoreAbort();
@@ -199,13 +216,24 @@ RTS_RESULT FileStoreBegin(const char *name, RTS_UI32 size, RTS_UI32 crc)
         return store.opened;
     if (size > capacity() || place_of(name) == NULL || !find_place(span(size), &store.next.start))
         return ERR_DISK_FULL;
-    memset(store.next.name, 0, sizeof(store.next.name));
-    memcpy(store.next.name, name, strlen(name));
     store.next.size = size;
     store.next.crc = crc;
-    store.written = 0;
-    store.writing = true;
-    SysFileCreateAt(FILE_STORE, store.next.start);
+    begin_at_place(name);
+    return ERR_OK;
+}
+
+RTS_RESULT FileStoreCreate(const char *name)
+{
+    FileStoreAbort();
+    if (!FileStoreIsName(name))
+        return ERR_PARAMETER;
+    if (store.opened != ERR_OK)
+        return store.opened;
+    if (place_of(name) == NULL)
+        return ERR_DISK_FULL;
+    store.next.start = 0; /* of an empty file in a store that is full */
+    store.next.size = largest_gap(&store.next.start);
+    begin_at_place(name);
     return ERR_OK;
 }
 
@@ -256,6 +284,13 @@ RTS_RESULT FileStoreEnd(void)
     return result == ERR_OK ? change(place_of(store.next.name), &store.next) : result;
 }
 
+RTS_RESULT FileStoreFinish(RTS_UI32 crc)
+{
+    store.next.size = store.written;
+    store.next.crc = crc;
+    return FileStoreEnd();
+}
+
 void FileStoreAbort(void)
 {
     store.writing = false;
@@ -284,6 +319,22 @@ RTS_RESULT FileStoreDelete(const char *name)
     if (FileStoreFind(name) == NULL)
         return ERR_NO_OBJECT;
     return change(find(name), &none);
+}
+
+RTS_RESULT FileStoreRename(const char *name, const char *new_name)
+{
+    if (store.opened != ERR_OK)
+        return store.opened;
+    if (!FileStoreIsName(new_name))
+        return ERR_PARAMETER;
+    if (FileStoreFind(name) == NULL)
+        return ERR_NO_OBJECT;
+    if (FileStoreFind(new_name) != NULL)
+        return ERR_DUPLICATE;
+    FILE_ENTRY renamed = *FileStoreFind(name);
+    memset(renamed.name, 0, sizeof(renamed.name));
+    memcpy(renamed.name, new_name, strlen(new_name));
+    return change(find(name), &renamed);
 }
 
 #endif

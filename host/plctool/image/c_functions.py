@@ -23,6 +23,16 @@ _FUNCTIONS = {
     "IecEvents": """
         event_answer(BOOL):BOOL                             32    48
         event_reason(LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD):BOOL  160  192""",
+    "CmpAppCalls": """
+        call_put(DINT,UDINT,LWORD,LWORD,LWORD,LWORD):BOOL  112   160
+        call_send(DINT,UDINT):BOOL                          48    64
+        call_state(DINT):DINT                               48    64
+        call_result(DINT):UDINT                             32    48
+        call_get(DINT,UDINT):LWORD                          48    64
+        call_free(DINT):BOOL                                32    48
+        call_room():UDINT                                   16    16""",
+    "IecFile": """
+        file_call(UDINT,UDINT,UDINT):DINT                   80   112""",
     "CmpMath": """
         sin(LREAL):LREAL                                  1008  1856
         cos(LREAL):LREAL                                  1008  1856

@@ -35,7 +35,7 @@ _WHY = {
     lib.ERR_DISK_FULL: "there is no room for it; delete others with 'plctool files delete'",
     lib.ERR_OPERATION_DENIED: "the device makes this file itself; it can only be read",
     lib.ERR_NO_CONSISTENCY: "it changed while it was read; try again",
-    lib.ERR_INVALID_STATE: "another tool is writing a file; try again when it is done",
+    lib.ERR_INVALID_STATE: "another tool or the program is writing a file; try again when it is done",
     lib.ERR_FT_CRC_MISMATCH: "it did not arrive as it was sent; try again",
     lib.ERR_DEVICE: "its flash has failed, or it has no room for files",
 }

@@ -27,6 +27,11 @@ STAND_INS = (
 )  # fmt: skip
 """Libraries of other systems that this one stands in for, as far as it has their names."""
 
+PREFIXED = ("CAA", "FILE")
+"""Namespaces whose names are too common without them: `FILE.Open` is FILE_Open here."""
+
+_PREFIXED = re.compile(rf"({'|'.join(PREFIXED)})\.(?=\w+$)", re.IGNORECASE)
+
 _QUALIFIED = re.compile(rf"(?:{'|'.join(STAND_INS)})\.(?=\w+$)", re.IGNORECASE)
 PARAMETERS = frozenset(("alarm_history_size",))
 """Constants of the library in whose place it uses those that a program declares."""
@@ -44,7 +49,7 @@ def without_library(key: str) -> str:
     """A name without the library of other systems before it: there is one library here."""
     if "." not in key:
         return key
-    return _OTHERS.get(key.casefold()) or _QUALIFIED.sub("", key, count=1)
+    return _OTHERS.get(key.casefold()) or _PREFIXED.sub(r"\1_", _QUALIFIED.sub("", key, count=1), count=1)
 
 
 @dataclass(frozen=True)

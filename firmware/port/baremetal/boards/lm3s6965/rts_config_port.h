@@ -9,6 +9,8 @@
 #define TRACE_BUFFER 0 /* the full configuration has no room for traces in 64 KiB of RAM */
 #define IEC_EVENTS 0   /* nor for functions of events */
 #define SETTINGS 0     /* nor for settings */
+#define APP_CALLS 0    /* nor for calls of programs, such as files */
+#define IEC_FILES 0
 
 /* A second connection has no room in its 64 KiB. */
 #define COMM_MAX_CLIENTS 1

@@ -7,6 +7,10 @@
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H
 
+/* So programs have none either. */
+#define APP_CALLS 0
+#define IEC_FILES 0
+
 #include "rts_config_size.h"
 
 /* No sectors are left for files. */

@@ -34,6 +34,12 @@
 #ifndef SETTINGS
 #define SETTINGS 1
 #endif
+#ifndef APP_CALLS
+#define APP_CALLS 4
+#endif
+#ifndef IEC_FILES
+#define IEC_FILES 4
+#endif
 #ifndef TRACE_BUFFER
 #define TRACE_BUFFER 4096
 #endif
@@ -44,7 +50,7 @@
 #endif
 #define CM_OWN_EXT_TABLES 2
 #define CYCLE_OWN_PHASES 6
-#define EVENT_MAX_CALLBACKS 14
+#define EVENT_MAX_CALLBACKS 16
 #define COM_MAX_LINES 2
 #define LOG_MAX_ENTRIES 32
 #define CHECKSUM_TABLE_ENTRIES 256
