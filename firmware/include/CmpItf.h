@@ -104,6 +104,10 @@ enum {
     CMPID_CmpSettings = 0x0090,
     CMPID_CmpAppCalls = 0x0070,
     CMPID_IecFile = 0x0071,
+    CMPID_CmpCan = 0x0050,
+    CMPID_IecCan = 0x0051,
+    CMPID_SimCanBus = 0x0052,
+    CMPID_IoDrvCanopen = 0x0053,
 };
 
 /* Name of a component, "" when unknown. */

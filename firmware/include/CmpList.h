@@ -51,6 +51,15 @@
 #if HAS_CmpTraceMgr && TRACE_BUFFER == 0
 #error "HAS_CmpTraceMgr: set TRACE_BUFFER, the bytes that traces may use, in rts_config_port.h."
 #endif
+#if HAS_CmpCan && CAN_MAX_USERS == 0
+#error "HAS_CmpCan: set CAN_MAX_USERS, the users of a controller, in rts_config_port.h."
+#endif
+#if CAN_MAX_USERS > 0 && HAS_CmpBlkDrvCan && !HAS_CmpCan
+#error "HAS_CmpBlkDrvCan: with CAN_MAX_USERS it needs HAS_CmpCan in cmp_list.c."
+#endif
+#if HAS_IecCan && (CAN_MAX_RECEIVERS == 0 || !HAS_CmpCan)
+#error "HAS_IecCan: set CAN_MAX_RECEIVERS in rts_config_port.h, and HAS_CmpCan in cmp_list.c."
+#endif
 #if HAS_CmpLogSrv && !HAS_CmpLog
 #error "HAS_CmpLogSrv needs HAS_CmpLog in cmp_list.c."
 #endif
@@ -126,6 +135,9 @@ enum {
 #endif
 #if HAS_IecFile
     CMP_ONE(IecFile)
+#endif
+#if HAS_IecCan
+    CMP_ONE(IecCan)
 #endif
 #if HAS_IoDrvModbus
     CMP_ONE(IoDrvModbus)

@@ -22,6 +22,9 @@ X(CmpSettings)
 #if HAS_CmpEventMgrEmbedded
 X(CmpEventMgrEmbedded)
 #endif
+#if HAS_CmpCan
+X(CmpCan)
+#endif
 X(CmpScheduleTimer)
 X(CmpIecTask)
 #if HAS_SysWatchdog
@@ -62,6 +65,9 @@ X(CmpAppCalls)
 #endif
 #if HAS_IecFile
 X(IecFile)
+#endif
+#if HAS_IecCan
+X(IecCan)
 #endif
 #if HAS_CmpTraceMgr
 X(CmpTraceMgr)

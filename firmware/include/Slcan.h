@@ -26,7 +26,7 @@ enum {
     SLCAN_TEXT_SIZE = 1 + 8 + 1 + 2 * CAN_DATA_SIZE + SLCAN_STAMP_SIZE + 1, /* the longest line */
     SLCAN_COMMANDS_SIZE = 16,
     SLCAN_CHUNK = 32,
-    SLCAN_FILTERS = 4,
+    SLCAN_FILTERS = CAN_FILTERS,
     SLCAN_ASK_MS = 1000, /* the status flags are asked for so often: adapters want 500 ms at least */
 };
 

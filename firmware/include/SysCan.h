@@ -3,7 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Called by CmpBlkDrvCan from main. Nothing blocks: a port buffers received frames (interrupt driven) and frames to send.
+ * Called by the owner of a controller, CmpCan or where there is no other user CmpBlkDrvCan, from main; SysCanSend by
+ * CmpCan also from tasks, one at a time. Nothing blocks: a port buffers received frames (interrupt driven) and frames to
+ * send. Of the frames that wait to be sent those of 11 bits go before those of 29 bits, as far as the hardware lets them.
  * Frames of one identifier are sent and received in order. Every identifier may be received as the filters say; who
  * calls looks at the identifier nevertheless, because a controller with few filters lets more pass.
  */
@@ -89,6 +91,14 @@ RTS_RESULT SysCanSetFilters(RTS_UI32 index, const CAN_FILTER *filters, RTS_UI32 
 /* Queues a frame. ERR_NOBUFFER: no room now, offer it again; ERR_DEVICE: bus off, or not open; ERR_PARAMETER: the
  * identifier, the size or a flag is not one of a frame, or of this controller. */
 RTS_RESULT SysCanSend(RTS_UI32 index, const CAN_FRAME *frame);
+
+/* Takes an 11-bit frame that passes the filters. False: SysCanReceive is to return it. */
+typedef bool (*PF_CAN_URGENT)(RTS_UI32 index, const CAN_FRAME *frame);
+
+/* From now on the port shows each 11-bit frame to `handler` when it arrives: in the interrupt of the controller, on Linux
+ * in a thread that receives, in the simulator at the time of the frame; where there is none of these, in SysCanReceive.
+ * NULL: not any more; the handler does not run after that. Only where CAN_MAX_USERS is not 0. */
+void SysCanSetUrgent(RTS_UI32 index, PF_CAN_URGENT handler);
 
 /* Takes the oldest received frame; ERR_NOTHING_TO_DO when there is none. */
 RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame);

@@ -436,6 +436,38 @@
 #define CAN_FD 0
 #endif
 
+/* Users that share a CAN controller (CmpCan.h): the block driver, CANopen, frames of programs. 0: the block driver has
+ * it for itself, which takes no flash. */
+#ifndef CAN_MAX_USERS
+#define CAN_MAX_USERS 0
+#endif
+
+/* Controllers that are shared, each with room for so many 11-bit frames that wait to be sent (24 bytes each, 80 with
+ * CAN FD). */
+#ifndef CAN_CONTROLLERS
+#define CAN_CONTROLLERS 1
+#endif
+#ifndef CAN_URGENT_FRAMES
+#define CAN_URGENT_FRAMES 16
+#endif
+
+/* Filters of a controller (12 bytes each). With more, a shared one lets all frames pass. */
+#ifndef CAN_FILTERS
+#define CAN_FILTERS 4
+#endif
+
+/* Frames of programs (IecCan.h): receivers that they may have at a time, 0: none; frames that wait in each (24 bytes
+ * each), a power of two; and frames that wait to be sent. */
+#ifndef CAN_MAX_RECEIVERS
+#define CAN_MAX_RECEIVERS 0
+#endif
+#ifndef CAN_RECEIVE_FRAMES
+#define CAN_RECEIVE_FRAMES 8
+#endif
+#ifndef CAN_SEND_FRAMES
+#define CAN_SEND_FRAMES 8
+#endif
+
 /* Packets that may arrive over CAN at a time, from as many tools; each costs a packet of CAN_PACKET_SIZE bytes
  * and 30. */
 #ifndef CAN_RX_SESSIONS

@@ -33,6 +33,7 @@ from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
 from plctool.link.session import no_application
 from plctool.link.traces import TraceState
+from plctool.sim_can import CanFrame, send_frame, take_frames
 from plctool.sim_functions import SimFunctions
 from plctool.sim_io import SimIo, is_input, read_parameter, set_fault, set_modbus
 from plctool.sim_worker import Worker
@@ -333,6 +334,14 @@ class Simulator(Controller):
         holding register, 5 for a coil. It also has what MODBUS_WRITE wrote, and refuses to read all else. Raises
         DeviceError if the description names no such device."""
         set_modbus(self._core, device, reference, value)
+
+    def can_send(self, id: int, data: bytes = b"", *, extended: bool = False, remote: bool = False) -> None:
+        """A frame of another node on the CAN bus: it is there when time passes."""
+        send_frame(self._core, CanFrame(id, bytes(data), extended, remote))
+
+    def can_receive(self) -> list[CanFrame]:
+        """The frames that the device has sent on the CAN bus since the last call, the 4096 newest at most."""
+        return take_frames(self._core)
 
     def attach(self, step: Callable[[Simulator], None], every_ms: float = 1) -> None:
         """A plant: `step(plc)` is called each `every_ms` of virtual time, from now on, while time passes. It reads

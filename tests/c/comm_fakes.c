@@ -14,6 +14,7 @@
 #include "CmpAppSrv.h"
 #include "CmpTraceSrv.h"
 #include "CmpBytes.h"
+#include "CmpCan.h"
 #include "CmpBlkDrvCan.h"
 #include "CmpBlkDrvSimpleCom.h"
 #include "CmpBlkDrvTcp.h"
@@ -55,6 +56,13 @@ RTS_UI32 SysTimeGetMs(void)
 {
     return fakes.now_ms;
 }
+
+#if COMM_CAN_TESTED && CAN_MAX_USERS > 0
+void SysTimeWantPass(RTS_UI32 ms)
+{
+    RTS_UNUSED(ms);
+}
+#endif
 
 SYS_STACK SysTargetGetStack(void)
 {
@@ -637,6 +645,9 @@ void fakes_hook(CMP_HOOK hook)
         CmpNameServiceServer_Hook,
         CmpRouterEmbedded_Hook,
         CmpBlkDrvSimpleCom_Hook,
+#if COMM_CAN_TESTED && CAN_MAX_USERS > 0
+        CmpCan_Hook,
+#endif
 #if COMM_CAN_TESTED
         CmpBlkDrvCan_Hook,
 #endif

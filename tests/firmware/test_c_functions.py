@@ -18,6 +18,7 @@ COMPONENTS = {
     "IecEvents.functions": "IecEvents",
     "CmpAppCalls.functions": "CmpAppCalls",
     "IecFile.functions": "IecFile",
+    "IecCan.functions": "IecCan",
     "IecLog.functions": "IecLog",
     "CmpOperationControl.functions": "CmpOperationControl",
     "CmpRetain.externals": "CmpRetain",

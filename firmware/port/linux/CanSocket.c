@@ -16,7 +16,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { FILTERS = 8 };
+enum { FILTERS = CAN_FILTERS, TOOLS_PRIORITY = 0, URGENT_PRIORITY = 6 };
 
 /* ---- opening ---- */
 
@@ -86,8 +86,24 @@ bool CanSocketSetFilters(int file, const CAN_FILTER *filters, RTS_UI32 count)
 
 /* ---- frames ---- */
 
+/* The queue of an interface (pfifo_fast) has bands: frames of 11 bits leave it before those of 29 bits. */
+static void choose_band(int file, const CAN_FRAME *frame)
+{
+    static struct {
+        int file;
+        int priority;
+    } last = {-1, 0};
+    int priority = (frame->flags & CAN_FLAG_EXTENDED) != 0 ? TOOLS_PRIORITY : URGENT_PRIORITY;
+    if (last.file != file || last.priority != priority) {
+        (void)setsockopt(file, SOL_SOCKET, SO_PRIORITY, &priority, sizeof(priority));
+        last.file = file;
+        last.priority = priority;
+    }
+}
+
 RTS_RESULT CanSocketSend(int file, const CAN_FRAME *frame)
 {
+    choose_band(file, frame);
     bool fd = (frame->flags & CAN_FLAG_FD) != 0;
     struct canfd_frame out = {.can_id = frame->id, .len = frame->size};
     out.can_id |= (frame->flags & CAN_FLAG_EXTENDED) != 0 ? CAN_EFF_FLAG : 0;

@@ -4,6 +4,10 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * An interface or adapter may go away and come back: it is opened again. A pseudo terminal stays open.
+ *
+ * With an urgent handler a thread receives (SysCanSetUrgent): 11-bit frames go to the handler, all others to a ring for
+ * main, which then waits for the ring instead of the line. `lock` is held where the line is used: main, tasks that send,
+ * the thread; the log is written without it.
  */
 #define _GNU_SOURCE
 #include "SysCan.h"
@@ -12,21 +16,25 @@
 #include "CmpLog.h"
 #include "CmpSrvNumbers.h"
 #include "Slcan.h"
+#include "SysAtomic.h"
 #include "SysTime.h"
 #include "port.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <pthread.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/eventfd.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
-enum { FILTERS = 4 };
+enum { FILTERS = CAN_FILTERS, RING = 512, LOOK_MS = 100, SLCAN_BACKLOG = 256 };
 
 static const char slcan_prefix[] = "slcan:";
 
@@ -45,7 +53,51 @@ static struct {
     CAN_FILTER filter[FILTERS];
     RTS_UI32 filters;
     SLCAN slcan;
+    pthread_t main;
 } can = {.line = {.file = -1}, .slave = -1};
+
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+
+static struct {
+    PF_CAN_URGENT handler;
+    pthread_t thread;
+    bool runs;
+    RTS_UI32 ends;
+    int nudge;         /* makes the thread look at the line and `ends` */
+    PORT_SOURCE ready; /* frames are in the ring */
+    RTS_UI32 written;
+    RTS_UI32 read;
+    RTS_UI32 lost;
+    CAN_FRAME ring[RING];
+} urgent = {.nudge = -1, .ready = {.file = -1, .events = POLLIN}};
+
+/* What main waits for is main's. */
+static bool is_main(void)
+{
+    return pthread_equal(pthread_self(), can.main) != 0;
+}
+
+static void not_now(void)
+{
+    if (is_main()) {
+        PortWaitNotNow();
+    }
+}
+
+static void signal_event(int event)
+{
+    const RTS_UI64 one = 1;
+    if (event >= 0 && write(event, &one, sizeof(one)) < 0 && errno != EAGAIN) {
+        SysAtomicAdd(&urgent.lost, 1);
+    }
+}
+
+static void clear_event(int event)
+{
+    RTS_UI64 count;
+    while (read(event, &count, sizeof(count)) > 0) {
+    }
+}
 
 /* ---- a serial line ---- */
 
@@ -92,7 +144,7 @@ static int open_pty(void)
 static RTS_UI32 moved(ssize_t count)
 {
     if (count > 0) {
-        PortWaitNotNow();
+        not_now();
         return (RTS_UI32)count;
     }
     if (!(count < 0 && (errno == EAGAIN || errno == EINTR)) && can.slave < 0) {
@@ -110,6 +162,9 @@ static RTS_UI32 write_line(const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 taken = moved(write(can.line.file, data, size));
     can.line.events = taken < size ? POLLIN | POLLOUT : POLLIN;
+    if (taken < size && urgent.runs) {
+        signal_event(urgent.nudge);
+    }
     return taken;
 }
 
@@ -149,35 +204,43 @@ static void close_line(void)
 
 static void lose_line(void)
 {
-    LogAdd(CMPID_SysCan, LOG_WARNING, ERR_DEVICE, "CAN %s is gone", can.name);
     close_line();
     can.state.bus = CAN_BUS_STOPPED;
     can.tried_ms = SysTimeGetMs();
 }
 
-static void look_for_line(void)
+/* True if it is back. */
+static bool look_for_line(void)
 {
     if (SysTimeGetMs() - can.tried_ms < PORT_REOPEN_MS) {
-        return;
+        return false;
     }
     can.tried_ms = SysTimeGetMs();
-    if (open_line() && begin() == ERR_OK) {
+    return open_line() && begin() == ERR_OK;
+}
+
+/* In main: opens the line again, and says what has become of it. */
+static void mind_line(void)
+{
+    pthread_mutex_lock(&lock);
+    bool gone = can.line.file >= 0 && can.state.bus == CAN_BUS_STOPPED;
+    if (gone) {
+        lose_line();
+    }
+    bool back = can.line.file < 0 && look_for_line();
+    pthread_mutex_unlock(&lock);
+    if (gone) {
+        LogAdd(CMPID_SysCan, LOG_WARNING, ERR_DEVICE, "CAN %s is gone", can.name);
+    }
+    if (back) {
         LogAdd(CMPID_SysCan, LOG_INFO, ERR_OK, "CAN %s is back", can.name);
+        signal_event(urgent.nudge);
     }
 }
 
-static bool ready(RTS_UI32 index)
+static bool is_ready(RTS_UI32 index)
 {
-    if (index != 0 || !can.open) {
-        return false;
-    }
-    if (can.line.file >= 0 && can.state.bus == CAN_BUS_STOPPED) {
-        lose_line();
-    }
-    if (can.line.file < 0) {
-        look_for_line();
-    }
-    return can.line.file >= 0;
+    return index == 0 && can.open && can.line.file >= 0 && can.state.bus != CAN_BUS_STOPPED;
 }
 
 /* ---- what main opens ---- */
@@ -305,6 +368,7 @@ RTS_RESULT SysCanOpen(RTS_UI32 index, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
     can.options.data_bit_rate = data_bit_rate != 0 ? data_bit_rate : can.options.data_bit_rate;
     can.filters = 0;
     can.open = true;
+    can.main = pthread_self();
     if (can.line.file < 0 && !open_line()) {
         can.state.bus = CAN_BUS_STOPPED;
         LogAdd(CMPID_SysCan, LOG_WARNING, ERR_DEVICE, "CAN %s is away: %s", can.name, strerror(errno));
@@ -325,11 +389,8 @@ bool SysCanIsFd(RTS_UI32 index)
     return index == 0 && can.options.data_bit_rate != 0;
 }
 
-RTS_RESULT SysCanSetFilters(RTS_UI32 index, const CAN_FILTER *filters, RTS_UI32 count)
+static RTS_RESULT set_filters(const CAN_FILTER *filters, RTS_UI32 count)
 {
-    if (index != 0 || count > FILTERS) {
-        return ERR_DEVICE;
-    }
     memcpy(can.filter, filters, count * sizeof(*filters));
     can.filters = count;
     if (can.is_slcan) {
@@ -338,54 +399,240 @@ RTS_RESULT SysCanSetFilters(RTS_UI32 index, const CAN_FILTER *filters, RTS_UI32 
     return can.line.file < 0 || CanSocketSetFilters(can.line.file, filters, count) ? ERR_OK : ERR_DEVICE;
 }
 
-RTS_RESULT SysCanSend(RTS_UI32 index, const CAN_FRAME *frame)
+RTS_RESULT SysCanSetFilters(RTS_UI32 index, const CAN_FILTER *filters, RTS_UI32 count)
 {
-    if (!CanIsFrame(frame)) {
-        return ERR_PARAMETER;
-    }
-    if (!ready(index) || can.state.bus == CAN_BUS_OFF) {
+    if (index != 0 || count > FILTERS) {
         return ERR_DEVICE;
     }
-    if (can.is_slcan) {
-        return SlcanSend(&can.slcan, frame);
+    pthread_mutex_lock(&lock);
+    RTS_RESULT result = set_filters(filters, count);
+    pthread_mutex_unlock(&lock);
+    return result;
+}
+
+/* ---- sending ---- */
+
+/* True if the line has many bytes that it has not sent yet. */
+static bool is_line_busy(void)
+{
+    int backlog = 0;
+    return ioctl(can.line.file, TIOCOUTQ, &backlog) == 0 && backlog > SLCAN_BACKLOG;
+}
+
+/* What the line has taken leaves in order, so frames of 29 bits that would wait there for long wait here. */
+static RTS_RESULT send_slcan(const CAN_FRAME *frame)
+{
+    if (urgent.runs && (frame->flags & CAN_FLAG_EXTENDED) != 0 && is_line_busy()) {
+        return ERR_NOBUFFER;
     }
+    return SlcanSend(&can.slcan, frame);
+}
+
+static RTS_RESULT send_socket(const CAN_FRAME *frame)
+{
     RTS_RESULT result = CanSocketSend(can.line.file, frame);
     if (result == ERR_OK) {
-        PortWaitNotNow();
-    } else if (result == ERR_NOBUFFER) {
-        SysTimeWantPass(1); /* poll does not know the queue of the interface: for it there is always room */
+        not_now();
     } else if (result == ERR_DEVICE) {
         can.state.bus = CAN_BUS_STOPPED;
     }
     return result;
 }
 
-RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)
+RTS_RESULT SysCanSend(RTS_UI32 index, const CAN_FRAME *frame)
 {
-    if (!ready(index)) {
-        return ERR_NOTHING_TO_DO;
+    if (!CanIsFrame(frame)) {
+        return ERR_PARAMETER;
     }
-    RTS_RESULT result =
-        can.is_slcan ? SlcanReceive(&can.slcan, frame) : CanSocketReceive(can.line.file, frame, &can.state);
-    frame->time_us = (RTS_UI32)(SysTimeGetNs() / 1000);
-    if (can.is_slcan) {
-        if (result != ERR_OK && can.slave < 0) { /* at the other end of a pseudo terminal is a tool */
-            SlcanAsk(&can.slcan, SysTimeGetMs());
-        }
-        return result;
+    pthread_mutex_lock(&lock);
+    RTS_RESULT result = ERR_DEVICE;
+    if (is_ready(index) && can.state.bus != CAN_BUS_OFF) {
+        result = can.is_slcan ? send_slcan(frame) : send_socket(frame);
     }
-    if (result == ERR_DEVICE) {
-        can.state.bus = CAN_BUS_STOPPED;
-        return ERR_NOTHING_TO_DO;
-    }
-    if (result == ERR_OK) {
-        PortWaitNotNow();
+    pthread_mutex_unlock(&lock);
+    if (result == ERR_NOBUFFER && is_main() && (urgent.runs || !can.is_slcan)) {
+        SysTimeWantPass(1); /* poll does not know the queue of the interface: for it there is always room */
     }
     return result;
 }
 
+/* ---- receiving ---- */
+
+/* A frame from the line, with `lock`. */
+static RTS_RESULT receive(CAN_FRAME *frame)
+{
+    RTS_RESULT result =
+        can.is_slcan ? SlcanReceive(&can.slcan, frame) : CanSocketReceive(can.line.file, frame, &can.state);
+    frame->time_us = (RTS_UI32)(SysTimeGetNs() / 1000);
+    if (result == ERR_DEVICE) {
+        can.state.bus = CAN_BUS_STOPPED;
+        return ERR_NOTHING_TO_DO;
+    }
+    if (result == ERR_OK && !can.is_slcan) {
+        not_now();
+    }
+    return result;
+}
+
+static RTS_RESULT receive_locked(CAN_FRAME *frame)
+{
+    pthread_mutex_lock(&lock);
+    RTS_RESULT result = ERR_NOTHING_TO_DO;
+    if (is_ready(0)) {
+        result = receive(frame);
+    }
+    pthread_mutex_unlock(&lock);
+    return result;
+}
+
+static RTS_RESULT take_from_ring(CAN_FRAME *frame)
+{
+    if (SysAtomicLoad(&urgent.written) == urgent.read) {
+        clear_event(urgent.ready.file);
+    }
+    if (SysAtomicLoad(&urgent.written) == urgent.read) {
+        return ERR_NOTHING_TO_DO;
+    }
+    *frame = urgent.ring[urgent.read % RING];
+    SysAtomicStore(&urgent.read, urgent.read + 1);
+    PortWaitNotNow();
+    return ERR_OK;
+}
+
+RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)
+{
+    if (index != 0 || !can.open) {
+        return ERR_NOTHING_TO_DO;
+    }
+    mind_line();
+    RTS_RESULT result = urgent.runs ? take_from_ring(frame) : receive_locked(frame);
+    if (result != ERR_OK && can.is_slcan && can.slave < 0) { /* at the other end of a pseudo terminal is a tool */
+        pthread_mutex_lock(&lock);
+        if (is_ready(index)) {
+            SlcanAsk(&can.slcan, SysTimeGetMs());
+        }
+        pthread_mutex_unlock(&lock);
+    }
+    return result;
+}
+
+/* ---- the thread ---- */
+
+static void add_to_ring(const CAN_FRAME *frame)
+{
+    if (urgent.written - SysAtomicLoad(&urgent.read) >= RING) {
+        SysAtomicAdd(&urgent.lost, 1);
+        return;
+    }
+    urgent.ring[urgent.written % RING] = *frame;
+    SysAtomicStore(&urgent.written, urgent.written + 1);
+    signal_event(urgent.ready.file);
+}
+
+static void deliver_all(void)
+{
+    CAN_FRAME frame;
+    while (receive_locked(&frame) == ERR_OK) {
+        if ((frame.flags & CAN_FLAG_EXTENDED) != 0 || !urgent.handler(0, &frame)) {
+            add_to_ring(&frame);
+        }
+    }
+}
+
+static void *run_thread(void *unused)
+{
+    RTS_UNUSED(unused);
+    while (SysAtomicLoad(&urgent.ends) == 0) {
+        pthread_mutex_lock(&lock);
+        struct pollfd polled[] = {{.fd = is_ready(0) ? can.line.file : -1, .events = can.line.events},
+                                  {.fd = urgent.nudge, .events = POLLIN}};
+        pthread_mutex_unlock(&lock);
+        if (poll(polled, RTS_COUNT(polled), LOOK_MS) > 0 && polled[1].revents != 0) {
+            clear_event(urgent.nudge);
+        }
+        deliver_all();
+    }
+    return NULL;
+}
+
+/* Without the right to SCHED_FIFO it has the priority of others, as the timers have then. */
+static bool create_thread(bool realtime)
+{
+    const struct sched_param parameters = {.sched_priority = PORT_PRIORITY_EVENTS};
+    pthread_attr_t attributes;
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_attr_init(&attributes);
+    if (realtime) {
+        pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+        pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
+        pthread_attr_setschedparam(&attributes, &parameters);
+    }
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    int error = pthread_create(&urgent.thread, &attributes, run_thread, NULL);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    pthread_attr_destroy(&attributes);
+    return error == 0;
+}
+
+static void close_event(int *event)
+{
+    if (*event >= 0) {
+        close(*event);
+    }
+    *event = -1;
+}
+
+static void start_thread(void)
+{
+    urgent.ends = urgent.written = urgent.read = 0;
+    urgent.nudge = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    urgent.ready.file = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    urgent.runs = urgent.nudge >= 0 && urgent.ready.file >= 0 && PortWaitAdd(&urgent.ready);
+    urgent.runs = urgent.runs && (create_thread(true) || create_thread(false));
+    if (urgent.runs) {
+        PortWaitRemove(&can.line);
+        return;
+    }
+    LogAdd(CMPID_SysCan, LOG_ERROR, ERR_NOMEMORY, "CAN %s has no thread: 11-bit frames are lost", can.name);
+    PortWaitRemove(&urgent.ready);
+    close_event(&urgent.nudge);
+    close_event(&urgent.ready.file);
+}
+
+static void stop_thread(void)
+{
+    SysAtomicStore(&urgent.ends, 1);
+    signal_event(urgent.nudge);
+    (void)pthread_join(urgent.thread, NULL);
+    urgent.runs = false;
+    PortWaitRemove(&urgent.ready);
+    close_event(&urgent.nudge);
+    close_event(&urgent.ready.file);
+    if (can.configured) {
+        (void)PortWaitAdd(&can.line); /* the place that it had */
+    }
+}
+
+void SysCanSetUrgent(RTS_UI32 index, PF_CAN_URGENT handler)
+{
+    if (index != 0) {
+        return;
+    }
+    if (urgent.runs) {
+        stop_thread();
+    }
+    urgent.handler = handler;
+    if (handler != NULL) {
+        start_thread();
+    }
+}
+
+/* ---- state ---- */
+
 void SysCanGetState(RTS_UI32 index, CAN_STATE *state)
 {
+    pthread_mutex_lock(&lock);
     *state = can.state;
     if (can.is_slcan) {
         SlcanGetState(&can.slcan, state);
@@ -393,12 +640,16 @@ void SysCanGetState(RTS_UI32 index, CAN_STATE *state)
     if (index != 0 || !can.open || can.state.bus == CAN_BUS_STOPPED) {
         state->bus = CAN_BUS_STOPPED;
     }
+    pthread_mutex_unlock(&lock);
+    state->lost += SysAtomicLoad(&urgent.lost);
 }
 
 /* The kernel restarts a controller, if its interface has a restart-ms; a process without rights cannot. */
 void SysCanRestart(RTS_UI32 index)
 {
-    if (can.is_slcan && ready(index)) {
+    pthread_mutex_lock(&lock);
+    if (can.is_slcan && is_ready(index)) {
         SlcanRestart(&can.slcan);
     }
+    pthread_mutex_unlock(&lock);
 }

@@ -24,6 +24,8 @@
 #define HAS_IecEvents 1
 #define HAS_CmpAppCalls 1
 #define HAS_IecFile 1
+#define HAS_CmpCan 1
+#define HAS_IecCan 1
 #define HAS_CmpTraceMgr 1
 #define HAS_CmpAppBP 1
 #define HAS_CmpIoMgrSrv 1

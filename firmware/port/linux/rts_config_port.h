@@ -46,6 +46,12 @@
 #define TCP_BUFFER_SIZE 16384
 #define CAN_FD 1
 #define CAN_BLOCK_SIZE 0 /* the kernel has room */
+#define CAN_MAX_USERS 4
+#define CAN_FILTERS 32
+#define CAN_URGENT_FRAMES 64
+#define CAN_MAX_RECEIVERS 16
+#define CAN_RECEIVE_FRAMES 32
+#define CAN_SEND_FRAMES 64
 #define LOG_MAX_ENTRIES 256
 #define CHECKSUM_TABLE_ENTRIES 256
 

@@ -211,6 +211,23 @@ RTS_RESULT SimIoGetState(const char *connector, IO_DEVICE_STATE *state);
  * ...; `address` as on the wire. ERR_NO_OBJECT: no such device; ERR_NOMEMORY: too many others are set. */
 RTS_RESULT SimModbusSet(const char *device, RTS_UI32 table, RTS_UI32 address, RTS_UI32 number);
 
+/* ---- the CAN bus ---- */
+
+enum { SIM_CAN_EXTENDED = 1, SIM_CAN_REMOTE = 2 }; /* CAN_FLAG_* */
+
+typedef struct {
+    RTS_UI32 id;
+    RTS_UI32 time_us; /* virtual, of a frame that was heard */
+    RTS_UI8 flags;    /* SIM_CAN_EXTENDED, _REMOTE */
+    RTS_UI8 size;
+    RTS_UI8 data[8];
+} SIM_CAN_FRAME;
+
+/* A node of the test, which acknowledges all frames: sends one, which is on the bus when time passes, and takes the oldest
+ * of the last 4096 that it has heard. ERR_PARAMETER: it cannot be a frame; ERR_NOBUFFER; ERR_NOTHING_TO_DO. */
+RTS_RESULT SimCanPut(const SIM_CAN_FRAME *frame);
+RTS_RESULT SimCanGet(SIM_CAN_FRAME *frame);
+
 /* ---- serial line 0 ---- */
 
 /* Bytes to the device, and what the device sent; both return how many were moved. */

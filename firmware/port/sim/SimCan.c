@@ -17,7 +17,7 @@ enum {
     ERROR_BITS = 20,     /* of an error frame and the pause after it */
     OFF_BITS = 128 * 11, /* until a node takes part again */
     MAX_BITS = 640,      /* from the start of a frame to its check sum */
-    FILTERS = 8,
+    FILTERS = CAN_FILTERS,
     WARNING = 96,
     PASSIVE = 128,
     OFF = 256,
@@ -51,6 +51,7 @@ static struct {
     RTS_UI32 bit_rate;
     RTS_UI32 data_bit_rate;
     CAN_ADDRESS address;
+    PF_CAN_URGENT urgent;
     RTS_I64 now_ns;
     RTS_I64 end_ns; /* of what is on the bus; NEVER: it is free */
     bool broken;    /* what is on the bus ends with an error */
@@ -66,6 +67,23 @@ static bool push(QUEUE *queue, const CAN_FRAME *frame)
     if (queue->count == SIM_CAN_QUEUE)
         return false;
     queue->frame[(queue->first + queue->count++) % SIM_CAN_QUEUE] = *frame;
+    return true;
+}
+
+/* Before the frames of 29 bits; the first `sent` frames are on the bus. */
+static bool push_urgent(QUEUE *queue, const CAN_FRAME *frame, RTS_UI32 sent)
+{
+    RTS_UI32 place = queue->count;
+
+    if (!push(queue, frame))
+        return false;
+    for (; place > sent; place--) {
+        const CAN_FRAME *before = &queue->frame[(queue->first + place - 1) % SIM_CAN_QUEUE];
+        if ((before->flags & CAN_FLAG_EXTENDED) == 0)
+            break;
+        queue->frame[(queue->first + place) % SIM_CAN_QUEUE] = *before;
+    }
+    queue->frame[(queue->first + place) % SIM_CAN_QUEUE] = *frame;
     return true;
 }
 
@@ -257,6 +275,13 @@ static void count_success(RTS_UI32 *counter)
         --*counter;
 }
 
+/* At the end of the frame. */
+static bool take_urgent(const NODE *node, const CAN_FRAME *frame)
+{
+    return node == &bus.node[SIM_CAN_DEVICE] && bus.urgent != NULL && (frame->flags & CAN_FLAG_EXTENDED) == 0 &&
+           bus.urgent(0, frame);
+}
+
 static void deliver(NODE *node, const CAN_FRAME *frame)
 {
     CAN_FRAME stamped = *frame;
@@ -267,6 +292,8 @@ static void deliver(NODE *node, const CAN_FRAME *frame)
     stamped.time_us = (RTS_UI32)(bus.now_ns / 1000);
     node->received++;
     bool loses = node->lose_period != 0 && node->received % node->lose_period == 0;
+    if (!loses && take_urgent(node, &stamped))
+        return;
     if (loses || !push(&node->in, &stamped))
         node->lost++;
 }
@@ -426,7 +453,9 @@ RTS_RESULT SimCanSend(RTS_UI32 node, const CAN_FRAME *frame)
         return ERR_PARAMETER;
     if (!takes_part(&bus.node[node]))
         return ERR_DEVICE;
-    return push(&bus.node[node].out, frame) ? ERR_OK : ERR_NOBUFFER;
+    QUEUE *out = &bus.node[node].out;
+    bool is_urgent = (frame->flags & CAN_FLAG_EXTENDED) == 0;
+    return (is_urgent ? push_urgent(out, frame, bus.node[node].sends) : push(out, frame)) ? ERR_OK : ERR_NOBUFFER;
 }
 
 RTS_RESULT SimCanReceive(RTS_UI32 node, CAN_FRAME *frame)
@@ -527,6 +556,12 @@ RTS_RESULT SysCanSend(RTS_UI32 index, const CAN_FRAME *frame)
 {
     RTS_UNUSED(index);
     return SimCanSend(SIM_CAN_DEVICE, frame);
+}
+
+void SysCanSetUrgent(RTS_UI32 index, PF_CAN_URGENT handler)
+{
+    RTS_UNUSED(index);
+    bus.urgent = handler;
 }
 
 RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)

@@ -17,6 +17,7 @@
 #include "IoDrvModbus.h"
 #include "IoDrvSim.h"
 #include "Sim.h"
+#include "SimCanBus.h"
 #include "SimWire.h"
 #include "SysTime.h"
 #include "sim_port.h"
@@ -443,7 +444,8 @@ static RTS_I64 due_ns(RTS_I64 now_ns)
         if (of_client < due)
             due = of_client;
     }
-    return due;
+    RTS_I64 of_can = SimCanBusGetDueNs(now_ns);
+    return of_can < due ? of_can : due;
 }
 
 /* ---- configurations ---- */

@@ -30,7 +30,10 @@
 #define HAS_CmpBlkDrvSimpleCom 1
 #ifdef SIM_HAS_BUSES
 #define HAS_IoDrvModbus 1
+#define HAS_CmpCan 1
+#define HAS_IecCan 1
 #define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim) X(SimModbus)
+#define PORT_SYSTEM(X) X(SimCanBus)
 #else
 #define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim)
 #endif

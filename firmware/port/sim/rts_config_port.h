@@ -46,6 +46,10 @@
 #define BP_HOLDS_TASKS 0
 #define BP_ALIVE_MS 0 /* its time does not go on by itself */
 #define IEC_LATENESS 1
+#define CAN_FILTERS 32
+#define CAN_URGENT_FRAMES 64
+#define CAN_RECEIVE_FRAMES 32
+#define CAN_SEND_FRAMES 64
 #define LOG_MAX_ENTRIES 64
 #define LOG_TEXT_SIZE 160
 #define CM_OWN_EXT_TABLES 8

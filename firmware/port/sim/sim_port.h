@@ -55,5 +55,6 @@ typedef struct {
 
 extern const SIM_BUS *SimBus;
 RTS_RESULT SimModbus_Hook(CMP_HOOK hook);
+RTS_RESULT SimCanBus_Hook(CMP_HOOK hook);
 
 #endif

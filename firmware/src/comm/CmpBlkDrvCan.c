@@ -10,7 +10,9 @@
 
 #include <string.h>
 
+#include "../can/CanWatch.h"
 #include "CmpBytes.h"
+#include "CmpCan.h"
 #include "CmpLog.h"
 #include "CmpPackets.h"
 #include "IsoTp.h"
@@ -23,8 +25,7 @@
 
 enum {
     CONTROLLER = 0,
-    READ_MAX = 64, /* frames per cycle, so that a busy bus does not stop the rest of the runtime */
-    SCANS = 2,     /* requests that wait for their moment */
+    SCANS = 2, /* requests that wait for their moment */
     FILTERS = 3,
     ROUTER_HEADER_MAX = sizeof(ROUTER_HEADER) + 4 * ROUTER_MAX_ADDRESS + 2,
     /* A packet with the largest message of the channel in one block. No packet is larger, in either direction. */
@@ -59,17 +60,122 @@ typedef struct {
 
 static struct {
     bool open : 1;
-    bool off : 1; /* the bus; `changed_ms` since when, or when it was started again */
     bool told_same_node : 1;
     bool fd : 1;
-    RTS_UI16 times_off; /* in this trouble; 0: none, 0xFFFF: as often or more */
-    RTS_UI32 changed_ms;
     CAN_ADDRESS own;
     BLK_DRV driver;
     SCAN_REQUEST scan[SCANS];
     RX_SESSION rx[CAN_RX_SESSIONS];
     TX_SESSION tx[CAN_TX_SESSIONS];
 } can;
+
+/* ---- the controller ---- */
+
+static void take_frame(const CAN_FRAME *frame, RTS_UI32 now_ms);
+static void note_off(void);
+
+static void get_filters(CAN_FILTER *filters)
+{
+    const RTS_UI32 to = CAN_BASE_MASK | (RTS_UI32)CAN_ADDRESS_MASK << CAN_TARGET_SHIFT;
+
+    filters[0] = (CAN_FILTER){can.own.base | can.own.node << CAN_TARGET_SHIFT, to, true};
+    filters[1] = (CAN_FILTER){can.own.base | (RTS_UI32)CAN_TO_ALL << CAN_TARGET_SHIFT, to, true};
+    filters[2] = (CAN_FILTER){can.own.base | can.own.node, CAN_BASE_MASK | CAN_ADDRESS_MASK, true}; /* its own number */
+}
+
+#if CAN_MAX_USERS > 0
+static CAN_FILTER own_filters[FILTERS];
+
+static void take_shared(RTS_UI32 index, const CAN_FRAME *frame, RTS_UI32 now_ms)
+{
+    RTS_UNUSED(index);
+    take_frame(frame, now_ms);
+}
+
+static void note_bus(RTS_UI32 index, bool off)
+{
+    RTS_UNUSED(index);
+    if (off)
+        note_off();
+}
+
+static CAN_USER user = {own_filters, FILTERS, NULL, take_shared, note_bus};
+
+static RTS_RESULT open_controller(void)
+{
+    get_filters(own_filters);
+    return CanAttach(CONTROLLER, &user);
+}
+
+static void close_controller(void)
+{
+    CanDetach(CONTROLLER, &user);
+}
+
+static RTS_RESULT send(const CAN_FRAME *frame)
+{
+    return CanSend(CONTROLLER, frame);
+}
+
+static bool is_off(void)
+{
+    return CanIsOff(CONTROLLER);
+}
+
+/* CmpCan does both. */
+static void receive(void)
+{
+}
+
+static void watch_bus(RTS_UI32 now_ms)
+{
+    RTS_UNUSED(now_ms);
+}
+#else
+enum { READ_MAX = 64 }; /* frames per cycle, so that a busy bus does not stop the rest of the runtime */
+
+static CAN_WATCH watch;
+
+static RTS_RESULT open_controller(void)
+{
+    CAN_FILTER filters[FILTERS];
+
+    CMP_CLEAR(watch);
+    get_filters(filters);
+    RTS_RESULT result = SysCanOpen(CONTROLLER, 0, 0);
+    return result == ERR_OK ? SysCanSetFilters(CONTROLLER, filters, FILTERS) : result;
+}
+
+static void close_controller(void)
+{
+    SysCanClose(CONTROLLER);
+}
+
+static RTS_RESULT send(const CAN_FRAME *frame)
+{
+    return SysCanSend(CONTROLLER, frame);
+}
+
+static bool is_off(void)
+{
+    return watch.off;
+}
+
+/* Each frame at its own time: a service that the previous one has completed may take long. */
+static void receive(void)
+{
+    CAN_FRAME frame;
+
+    for (RTS_UI32 i = 0; i < READ_MAX && SysCanReceive(CONTROLLER, &frame) == ERR_OK; i++)
+        take_frame(&frame, SysTimeGetMs());
+}
+
+static void watch_bus(RTS_UI32 now_ms)
+{
+    if (CanWatchPoll(&watch, CONTROLLER, CMPID_CmpBlkDrvCan, now_ms) && watch.off)
+        note_off();
+}
+#endif
 
 static CAN_COUNTERS counters;
 
@@ -92,7 +198,7 @@ static RTS_RESULT send_frame(RTS_UI32 to, const RTS_UI8 *data, RTS_UI32 size)
     frame.size = (RTS_UI8)CanRoundSize(size);
     memcpy(frame.data, data, size);
     memset(frame.data + size, 0, frame.size - size);
-    return SysCanSend(CONTROLLER, &frame);
+    return send(&frame);
 }
 
 /* ---- receiving packets ---- */
@@ -263,15 +369,6 @@ static void take_frame(const CAN_FRAME *frame, RTS_UI32 now_ms)
         take_isotp(source, frame, now_ms);
 }
 
-/* Each frame at its own time: a service that the previous one has completed may take long. */
-static void receive(void)
-{
-    CAN_FRAME frame;
-
-    for (RTS_UI32 i = 0; i < READ_MAX && SysCanReceive(CONTROLLER, &frame) == ERR_OK; i++)
-        take_frame(&frame, SysTimeGetMs());
-}
-
 /* ---- sending packets ---- */
 
 /* A free session; NULL when there is none, or the tool has one. */
@@ -306,7 +403,7 @@ static RTS_RESULT can_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_U
     RTS_UI32 tool = (RTS_UI32)peer->endpoint;
     TX_SESSION *session = claim_tx(tool);
 
-    if (session == NULL || can.off)
+    if (session == NULL || is_off())
         return ERR_NOBUFFER;
     RTS_UI32 size = join(session->packet, parts, count);
     session->tool = (RTS_UI8)tool;
@@ -362,42 +459,10 @@ static void forget_packets(void)
     memset(can.tx, 0, sizeof(can.tx));
 }
 
-/* A trouble lasts until the bus has been on for a while, and is two entries of the log, however often it goes off. */
-static void go_off(void)
+static void note_off(void)
 {
     COMM_COUNT(counters.bus_off);
-    if (can.times_off == 0)
-        LogAdd(CMPID_CmpBlkDrvCan, LOG_WARNING, ERR_DEVICE, "CAN: bus off; check the bit rate and the cable");
-    if (can.times_off < 0xFFFF)
-        can.times_off++;
     forget_packets();
-}
-
-static void end_trouble(void)
-{
-    LogAdd(CMPID_CmpBlkDrvCan, LOG_INFO, ERR_OK, "CAN: the bus is back (times off: %u)", (unsigned)can.times_off);
-    can.times_off = 0;
-}
-
-/* The controller tries again after a while; if the bus is still bad, it goes off again. */
-static void watch_bus(RTS_UI32 now_ms)
-{
-    CAN_STATE state;
-
-    SysCanGetState(CONTROLLER, &state);
-    bool off = state.bus == CAN_BUS_OFF;
-    RTS_UI32 since_ms = now_ms - can.changed_ms;
-    if (off != can.off) {
-        can.changed_ms = now_ms;
-        if (off)
-            go_off();
-    } else if (off && since_ms >= CAN_RESTART_MS) {
-        can.changed_ms = now_ms;
-        SysCanRestart(CONTROLLER);
-    } else if (!off && can.times_off != 0 && since_ms >= CAN_STEADY_MS) {
-        end_trouble();
-    }
-    can.off = off;
 }
 
 static void cycle(void)
@@ -413,19 +478,6 @@ static void cycle(void)
 }
 
 /* ---- life ---- */
-
-static RTS_RESULT open_controller(void)
-{
-    const RTS_UI32 to = CAN_BASE_MASK | (RTS_UI32)CAN_ADDRESS_MASK << CAN_TARGET_SHIFT;
-    const CAN_FILTER filters[FILTERS] = {
-        {can.own.base | can.own.node << CAN_TARGET_SHIFT, to, true},
-        {can.own.base | (RTS_UI32)CAN_TO_ALL << CAN_TARGET_SHIFT, to, true},
-        {can.own.base | can.own.node, CAN_BASE_MASK | CAN_ADDRESS_MASK, true}, /* of another device with this number */
-    };
-    RTS_RESULT result = SysCanOpen(CONTROLLER, 0, 0);
-
-    return result == ERR_OK ? SysCanSetFilters(CONTROLLER, filters, FILTERS) : result;
-}
 
 /* Says what is not. */
 static bool is_address_possible(const CAN_ADDRESS *address)
@@ -479,7 +531,7 @@ static void close_bus(void)
 {
     if (can.open) {
         transmit(SysTimeGetMs());
-        SysCanClose(CONTROLLER);
+        close_controller();
     }
     can.open = false;
 }

@@ -33,6 +33,16 @@ _FUNCTIONS = {
         call_room():UDINT                                   16    16""",
     "IecFile": """
         file_call(UDINT,UDINT,UDINT):DINT                   80   112""",
+    "IecCan": """
+        can_send(USINT,DWORD,USINT,USINT,LWORD):DINT            160   208
+        can_sent(DINT):DINT                                     64   80
+        can_take(USINT,DWORD,DWORD,BOOL):DINT                   64   80
+        can_next(DINT):DINT                                     64   80
+        can_head(DINT):LWORD                                    64   80
+        can_data(DINT):LWORD                                    64   80
+        can_time(DINT):UDINT                                    64   80
+        can_lost(DINT):UDINT                                    64   80
+        can_free(DINT):BOOL                                     64   80""",
     "CmpMath": """
         sin(LREAL):LREAL                                  1008  1856
         cos(LREAL):LREAL                                  1008  1856

@@ -77,10 +77,35 @@ RTS_RESULT SysCanSend(RTS_UI32 index, const CAN_FRAME *frame)
     return is_open ? SlcanSend(&slcan, frame) : ERR_DEVICE;
 }
 
+#if CAN_MAX_USERS > 0
+static PF_CAN_URGENT urgent;
+
+void SysCanSetUrgent(RTS_UI32 index, PF_CAN_URGENT handler)
+{
+    RTS_UNUSED(index);
+    urgent = handler;
+}
+
+static RTS_RESULT receive(CAN_FRAME *frame)
+{
+    RTS_RESULT result;
+
+    do {
+        result = SlcanReceive(&slcan, frame);
+    } while (result == ERR_OK && urgent != NULL && (frame->flags & CAN_FLAG_EXTENDED) == 0 && urgent(0, frame));
+    return result;
+}
+#else
+static RTS_RESULT receive(CAN_FRAME *frame)
+{
+    return SlcanReceive(&slcan, frame);
+}
+#endif
+
 RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)
 {
     RTS_UNUSED(index);
-    RTS_RESULT result = is_open ? SlcanReceive(&slcan, frame) : ERR_NOTHING_TO_DO;
+    RTS_RESULT result = is_open ? receive(frame) : ERR_NOTHING_TO_DO;
     if (result == ERR_OK)
         frame->time_us = 1000 * SysTimeGetMs();
     else if (is_open)

@@ -1,0 +1,87 @@
+/*
+ * SimCanBus.c - the CAN bus of the simulator (SimCan.h), on the clock of Sim.c.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Node 0 is the device, node 1 a test, which hears and sends everything.
+ */
+#include "SimCanBus.h"
+
+#include <string.h>
+
+#include "IecCan.h"
+#include "Sim.h"
+#include "SimCan.h"
+#include "SysTime.h"
+
+enum { TEST = 1, HEARD = 4096 };
+
+static struct {
+    RTS_UI32 frames; /* on the bus when main made its last pass */
+    RTS_UI32 first;
+    RTS_UI32 count;
+    CAN_FRAME heard[HEARD];
+} sim_bus;
+
+/* The newest frames stay. */
+static void hear(void)
+{
+    CAN_FRAME frame;
+
+    while (SimCanReceive(TEST, &frame) == ERR_OK) {
+        if (sim_bus.count == HEARD) {
+            sim_bus.first = (sim_bus.first + 1) % HEARD;
+            sim_bus.count--;
+        }
+        sim_bus.heard[(sim_bus.first + sim_bus.count++) % HEARD] = frame;
+    }
+}
+
+static void advance(RTS_I64 now_ns)
+{
+    SimCanAdvance(now_ns);
+    hear();
+}
+
+RTS_I64 SimCanBusGetDueNs(RTS_I64 now_ns)
+{
+    advance(now_ns);
+    return IecCanWaits() || SimCanFrames() != sim_bus.frames ? now_ns : SimCanNext();
+}
+
+RTS_RESULT SimCanPut(const SIM_CAN_FRAME *frame)
+{
+    CAN_FRAME sent = {.id = frame->id, .flags = frame->flags, .size = frame->size};
+
+    if (frame->size > CAN_CLASSIC_SIZE)
+        return ERR_PARAMETER;
+    memcpy(sent.data, frame->data, frame->size);
+    return SimIsOn() ? SimCanSend(TEST, &sent) : (RTS_RESULT)ERR_NOTINITIALIZED;
+}
+
+RTS_RESULT SimCanGet(SIM_CAN_FRAME *frame)
+{
+    const CAN_FRAME *heard = &sim_bus.heard[sim_bus.first];
+
+    if (sim_bus.count == 0)
+        return ERR_NOTHING_TO_DO;
+    *frame = (SIM_CAN_FRAME){heard->id, heard->time_us, heard->flags, heard->size, {0}};
+    memcpy(frame->data, heard->data, heard->size);
+    sim_bus.first = (sim_bus.first + 1) % HEARD;
+    sim_bus.count--;
+    return ERR_OK;
+}
+
+RTS_RESULT SimCanBus_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT_SYSTEM) {
+        memset(&sim_bus, 0, sizeof(sim_bus));
+        SimCanReset(CAN_BIT_RATE, 0);
+        SimCanStart(TEST);
+    }
+    if (hook == CH_COMM_CYCLE) {
+        advance(SysTimeGetNs());
+        sim_bus.frames = SimCanFrames();
+    }
+    return ERR_OK;
+}
