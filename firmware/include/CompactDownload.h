@@ -139,6 +139,7 @@ enum {
     CDL_BLOB_TASKS = 1,   /* array of CDL_TASK */
     CDL_BLOB_RETAIN = 2,  /* what is kept: CDL_KEPT, some with a CDL_KEPT_RUN, in ascending order of their hashes */
     CDL_BLOB_EVENTS = 3,  /* names of the external events tasks wait for, each with NUL; for readers of the image */
+    CDL_BLOB_CHANGE = 4,  /* a CDL_CHANGE: it can take the place of another image while that runs */
     CDL_BLOB_IMAGES = 16, /* CDL_IMAGE for inputs and outputs of each task; those it lacks work on the shared areas */
 };
 
@@ -212,6 +213,39 @@ typedef struct {
     RTS_I32 first; /* index of the first one in the program */
 } CDL_KEPT_RUN;
 
+/*
+ * An online change (AppChange.h). The image takes the place of that with the CRC `base` between two cycles. Variables that
+ * both have are at the same places; steps at `offset` of the code do the rest, and `init` is called then.
+ */
+typedef struct {
+    RTS_UI32 base;
+    RTS_UI32 init;   /* an IEC_ENTRY: calculated initial values of new variables; CDL_CHANGE_NO_INIT: none */
+    RTS_UI32 offset; /* of the steps, a multiple of 4 */
+    RTS_UI32 size;   /* of all, bytes */
+} CDL_CHANGE;
+
+#ifdef RTS_CFFI
+static const RTS_UI32 CDL_CHANGE_NO_INIT;
+#else
+#define CDL_CHANGE_NO_INIT 0xFFFFFFFFu
+#endif
+
+/* What becomes of `size` bytes at `to` of an area. */
+enum {
+    CDL_CHANGE_CLEAR = 0,
+    CDL_CHANGE_PUT = 1,  /* they follow, padded to a multiple of 4 */
+    CDL_CHANGE_MOVE = 2, /* they are at `from` of `from_area` */
+};
+typedef struct {
+    RTS_UI32 to;
+    RTS_UI32 size;
+    RTS_UI32 from;
+    RTS_UI8 kind; /* CDL_CHANGE_* */
+    RTS_UI8 area;
+    RTS_UI8 from_area;
+    RTS_UI8 reserved;
+} CDL_CHANGE_STEP;
+
 /* Download flags (5.4), low word of CDL_HEADER.flags and of the download service. */
 enum {
     DLF_CONTINUEDOWNLOAD = 1,
@@ -219,6 +253,7 @@ enum {
     DLF_WRITEBOOTAPPLICATION = 4,
     DLF_REPLYMAYWAIT = 0x100, /* own, of the service: the next block follows at once, and its reply will do for both */
     DLF_START = 0x200,        /* own, of the service: the application starts when its last block has installed it */
+    DLF_CHANGE = 0x400,       /* own, of the service: an online change, or nothing */
 };
 
 /* Device identities that plctool compiles for. Vendor 0 is the open default; a vendor's own id comes from SysTarget. */
@@ -243,6 +278,8 @@ RTS_STATIC_ASSERT(sizeof(CDL_TASK) == 56, cdl_task_is_56_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_KEPT) == 12, cdl_kept_is_12_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_KEPT_RUN) == 12, cdl_kept_run_is_12_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_IMAGE) == 8, cdl_image_is_8_bytes);
+RTS_STATIC_ASSERT(sizeof(CDL_CHANGE) == 16, cdl_change_is_16_bytes);
+RTS_STATIC_ASSERT(sizeof(CDL_CHANGE_STEP) == 16, cdl_change_step_is_16_bytes);
 #endif
 
 #endif

@@ -36,6 +36,11 @@ def add_build_arguments(parser: Parser) -> None:
     parser.add_argument(
         "--no-limits", action="store_true", help="build also what no device that plctool knows has room for"
     )
+    parser.add_argument(
+        "--base", type=usable_path, metavar="OLD.cdl",
+        help="keep the places that variables have in this image, so that the new one can replace it while it runs",
+    )  # fmt: skip
+    parser.add_argument("--dry-run", action="store_true", help="with --base: say what the change does, write nothing")
     add_build_options(parser)
     add_passes(parser)
     add_warnings(parser)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from plctool.cli import io_documents, output
 from plctool.cli.documents import Document, diagnostic_document
+from plctool.cli.online_changes import change_document, change_text, check_possible
 from plctool.cli.overwriting import check_no_way_out, check_not_read, check_output
 from plctool.errors import counted
 from plctool.printable import one_line
@@ -125,6 +126,8 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
     _check_way_of(settings)
     made_of = fingerprint(settings)  # before the sources are read: a change during the build makes the image stale
     result = _compile(settings, settings.target)
+    if result.change is not None:
+        check_possible(result.change)
     result.symbols.made_of = made_of
     if settings.own_folder:
         make_folder(output.parent)
@@ -141,6 +144,8 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
     }
     if settings.dump_after is not None:
         document["dump"] = [line for text in result.dumps for line in text.expandtabs().splitlines()]
+    if result.change is not None:
+        document["change"] = change_document(result)
     if channels:
         document["io"] = io_documents.summary(result.symbols.io)
     return document, result.rendered_warnings
@@ -178,4 +183,6 @@ def build_text(document: dict[str, Any]) -> str:
         if oldest := io["oldest_input"]:
             lines[-1] += f"; oldest input: {oldest['channel']}, up to {io_documents.age_text(oldest['age_us'])}"
         lines += [f"line {line['name']} is {line['load']:.0%} in use" for line in io["lines"]]
+    if "change" in document:
+        lines.append(change_text(document["change"]))
     return "\n".join(lines)

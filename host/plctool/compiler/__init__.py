@@ -195,6 +195,7 @@ def build(request: BuildRequest, python: PythonFunctions | None = None) -> Build
     from plctool.compiler.front import check_sources
     from plctool.compiler.image.build import build_program
     from plctool.compiler.image.fit import board_meant, check_program_fits
+    from plctool.compiler.image.online_change import previous_of
     from plctool.compiler.syntax.diagnostics import render_all
     from plctool.iec.dialect import find_dialect
 
@@ -219,13 +220,14 @@ def build(request: BuildRequest, python: PythonFunctions | None = None) -> Build
             python=python,
             dialect=system,
             information=files.information,
+            previous=None if request.base is None else previous_of(request.base),
         )
     if checked.program is None:
         raise CompileError(checked.diagnostics, shown)
     # No time of build: the same sources give the same image, so that its symbols are found again anywhere.
     info = replace(files.info, date=source_date())
     with bugs_reported():
-        built = build_program(checked.program, options, info)
+        built = build_program(checked.program, options, info, change=checked.change)
     if request.limits:
         check_program_fits(built, options.target, board, device)
     found = checked.diagnostics

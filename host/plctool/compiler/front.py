@@ -37,6 +37,7 @@ from plctool.compiler.syntax.library import Library, standard_library
 from plctool.compiler.syntax.parser import ParsedText, parse_all
 from plctool.compiler.syntax.warnings import ALL_WARNINGS, WarningOptions
 from plctool.compiler.typed.nodes import Pos, TypedProgram
+from plctool.compiler.typed.online_change import OnlineChange, Previous
 from plctool.iec.areas import Area
 from plctool.iec.dialect import OWN, Dialect
 from plctool.iec.types import MAX_SIZE
@@ -56,6 +57,7 @@ class CheckResult:
     program: TypedProgram | None
     diagnostics: list[Diagnostic]
     has_tests: bool = False  # there are TEST blocks, whether they were looked at or not
+    change: OnlineChange | None = None  # how it takes the place of the previous program
 
     @property
     def ok(self) -> bool:
@@ -78,6 +80,7 @@ def check_sources(
     observers: Sequence[Guest] = (),
     max_errors: int = MAX_ERRORS,
     information: Information = NO_INFORMATION,
+    previous: Previous | None = None,
 ) -> CheckResult:
     """Checks the files of a program together.
 
@@ -87,7 +90,8 @@ def check_sources(
     `libraries`: what the program uses besides the standard library. `python`: functions that Python implements, in the
     simulator; raises UsageError for those that cannot be. `dialect`: the system whose rules it has. `trees`: keeps the
     syntax trees for another check. `observers` take part last; what they raise ends the check. `max_errors`: after so
-    many the check ends. `information`: what plc.toml says about the program.
+    many the check ends. `information`: what plc.toml says about the program. `previous`: the program whose place it
+    shall take while that runs.
     Whatever the sources contain, the result is a program or diagnostics, never another exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
@@ -97,14 +101,15 @@ def check_sources(
     placed: Placed | None = None
     with reporting(diagnostics, sources):
         parsed = parse(sources, chosen, libraries, diagnostics, trees or Trees())
-        parsed = replace(parsed, information=information)
+        parsed = replace(parsed, information=information, previous=previous)
         if parsed.broken:
             _check_whole_units(parsed, [DeviceTasks(), *observers])
         else:
             placed = _placed(parsed, io, guests)
         diagnostics.settle(parsed.knows)
     program = None if placed is None or diagnostics.errors else placed.program
-    return CheckResult(program, diagnostics.sorted(), parsed is not None and parsed.has_tests)
+    change = None if placed is None else placed.change
+    return CheckResult(program, diagnostics.sorted(), parsed is not None and parsed.has_tests, change)
 
 
 def diagnostics_of(
@@ -243,7 +248,9 @@ def declare(
 ) -> Declared | None:
     """Declares all that a program has, used or not. `io`: its inputs and outputs; `guests` take part in the check, and
     one of them decides the tasks. None after an error from which many others would follow."""
-    program = Program(parsed.library, parsed.libraries, parsed.diagnostics, IoChannels(io), parsed.information)
+    program = Program(
+        parsed.library, parsed.libraries, parsed.diagnostics, IoChannels(io), parsed.information, parsed.previous
+    )
     world = program.world
     files: Files = [(source, _looked_at(source, text, world.diagnostics)) for source, text in parsed.texts]
     participants = [guest.begin(program) for guest in guests]
@@ -334,6 +341,7 @@ def place(checked: Checked) -> Placed:
         defaults=world.defaults,
         programs=program.programs.declared(),
         startup=program.startup,
+        startup_of_new=program.startup_of_new,
         shutdown=program.shutdown,
         events=checked.application.events,
         aliases=world.names.aliases(),
@@ -346,7 +354,7 @@ def place(checked: Checked) -> Placed:
     )
     if not diagnostics.errors:
         plan_images(typed, diagnostics)
-    return Placed(checked, typed)
+    return Placed(checked, typed, None if allocation.stable is None else allocation.stable.change)
 
 
 def _check_sizes(world: World, sources: Sequence[Source]) -> None:

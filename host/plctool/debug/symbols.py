@@ -83,7 +83,8 @@ class SymbolTable:
     `internal`: the variables of blocks of the standard library that are neither inputs nor outputs, by the name of the
     block.
     `passed_lines`: those that the trail of an exception names by their numbers. `frames`: the types of what a debugger
-    finds on the stack (`frames.py`), by POU and name."""
+    finds on the stack (`frames.py`), by POU and name. `online`: what another program has to have alike that shall take
+    its place while it runs (`compiler/image/online_change.py`)."""
 
     image_crc: int
     target: str
@@ -106,6 +107,7 @@ class SymbolTable:
     internal: dict[str, list[str]] = field(default_factory=dict)
     passed_lines: list[PassedLine] = field(default_factory=list)
     frames: dict[str, dict[str, Type]] = field(default_factory=dict)
+    online: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -344,6 +346,7 @@ class SymbolTable:
             "internal": self.internal,
             "passed_lines": self.passed_lines,
             "frames": frames,
+            "online": self.online,
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))
@@ -381,6 +384,7 @@ class SymbolTable:
                 document.get("internal", {}),
                 [PassedLine(pou, file, line) for pou, file, line in document.get("passed_lines", [])],
                 {p: {n: types.get(t) for n, t in v.items()} for p, v in document.get("frames", {}).items()},
+                document.get("online", {}),
             )
         except (ArchiveError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None

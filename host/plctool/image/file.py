@@ -41,6 +41,7 @@ _NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 ELF_TAG = b"\x7fELF"
 TAG = int(lib.CDL_HEADER_TAG).to_bytes(4, "little")
 _BLOB_IO = int(lib.CDL_BLOB_IO)
+_NO_INIT = int(lib.CDL_CHANGE_NO_INIT)
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,30 @@ class KeptVariable:
 
 
 @dataclass(frozen=True)
+class ChangeStep:
+    """A step of an online change: `size` bytes at `to` of an area become zero, `data`, or those at `source`."""
+
+    kind: int
+    area: int
+    to: int
+    size: int
+    source_area: int = 0
+    source: int = 0
+    data: bytes = b""
+
+
+@dataclass(frozen=True)
+class ImageChange:
+    """How the application takes the place of the one with CRC `base` while that runs. `init`: code offset to call, None
+    if nothing; `place`: offset of the steps in the code."""
+
+    base: int
+    init: int | None
+    place: int
+    steps: tuple[ChangeStep, ...]
+
+
+@dataclass(frozen=True)
 class Image:
     """An application. `areas`: bytes of RAM by area index. `functions`: CDL_FUNCTION_* -> code offset to call. `kept`:
     in ascending order of their hashes. `io`: offset and size of the I/O configuration in the code."""
@@ -143,6 +168,7 @@ class Image:
     events: list[ImageEvent] = field(default_factory=list)
     kept: list[KeptVariable] = field(default_factory=list)
     io: tuple[int, int] | None = None
+    change: ImageChange | None = None
     crc: int = 0  # set by `parse_image`
 
 
@@ -253,8 +279,33 @@ def _blobs(image: Image) -> Iterator[bytes]:
     if image.io is not None:
         offset, size = image.io
         yield _blob(_BLOB_IO, _pack("IO_CONFIG_PLACE", {"offset": offset, "size": size}))
+    if image.change is not None:
+        yield _blob(lib.CDL_BLOB_CHANGE, _change_entry(image.change))
     if any(task.parts != NO_PARTS for task in image.tasks):
         yield _blob(lib.CDL_BLOB_IMAGES, b"".join(_part_entry(part) for task in image.tasks for part in task.parts))
+
+
+def _change_entry(change: ImageChange) -> bytes:
+    init = _NO_INIT if change.init is None else change.init
+    values = {"base": change.base, "init": init, "offset": change.place, "size": len(packed_steps(change))}
+    return _pack("CDL_CHANGE", values)
+
+
+def packed_steps(change: ImageChange) -> bytes:
+    """The steps of an online change as they are in the code."""
+    return b"".join(map(_step_entry, change.steps))
+
+
+def _step_entry(step: ChangeStep) -> bytes:
+    values = {
+        "to": step.to,
+        "size": step.size,
+        "from": step.source,
+        "kind": step.kind,
+        "area": step.area,
+        "from_area": step.source_area,
+    }
+    return _pack("CDL_CHANGE_STEP", values) + _padded(step.data)
 
 
 def _blob(number: int, payload: bytes) -> bytes:
@@ -344,6 +395,7 @@ def parse_image(data: bytes) -> Image:
         flags=int(header.flags),
         kept=list(_parse_kept(blobs.get(int(lib.CDL_BLOB_RETAIN), b""))),
         io=_parse_io(blobs.get(_BLOB_IO, b""), len(code)),
+        change=_parse_change(blobs.get(int(lib.CDL_BLOB_CHANGE), b""), code),
         crc=int(header.crc),
     )
 
@@ -546,6 +598,32 @@ def _parse_io(payload: bytes, code_size: int) -> tuple[int, int] | None:
     return int(place.offset), int(place.size)
 
 
+def _parse_change(payload: bytes, code: bytes) -> ImageChange | None:
+    if not payload:
+        return None
+    (change,) = _entries("CDL_CHANGE", payload[: ffi.sizeof("CDL_CHANGE")], "online change")
+    at, end = int(change.offset), int(change.offset + change.size)
+    if end > len(code):
+        raise _refuse("the steps of its online change are outside the code")
+    steps, size = [], ffi.sizeof("CDL_CHANGE_STEP")
+    while at < end:
+        (step,) = _entries("CDL_CHANGE_STEP", code[at : at + size], "online change")
+        at += size
+        length = step.size if step.kind == lib.CDL_CHANGE_PUT else 0
+        if length > end - at:
+            raise _refuse("the steps of its online change are cut off")
+        source = int(getattr(step, "from"))
+        steps.append(
+            ChangeStep(
+                int(step.kind), int(step.area), int(step.to), int(step.size), int(step.from_area), source,
+                code[at : at + length],
+            )
+        )  # fmt: skip
+        at += length + -length % 4
+    init = None if change.init == lib.CDL_CHANGE_NO_INIT else int(change.init)
+    return ImageChange(int(change.base), init, int(change.offset), tuple(steps))
+
+
 def _parse_info(data: bytes) -> ApplicationInfo:
     texts: list[str] = []
     at = 0
@@ -596,6 +674,7 @@ def describe_image(data: bytes) -> dict[str, Any]:
         "device_version": image.device_version,
         "compiler_version": image.compiler_version,
         "code_size": len(image.code),
+        **({} if image.change is None else {"replaces": f"{image.change.base:08X}"}),
         "info": {
             "project": info.project,
             "author": info.author,

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from plctool.cli import output
 from plctool.cli.arguments import add_build_arguments, add_io_files, add_sources, add_warnings
-from plctool.cli.builds import build, build_text, settings_with_dialect
+from plctool.cli.builds import build, build_text, compiled, settings_with_dialect
 from plctool.cli.documents import Document, diagnostic_document
+from plctool.cli.online_changes import change_document, change_text, with_base
 from plctool.cli.output import EXIT_OK, EXIT_USAGE, table
 from plctool.cli.overwriting import check_not_read, check_output
 from plctool.cli.parser import Parser
@@ -67,7 +68,14 @@ def _build(args: argparse.Namespace) -> int:
     image = next((path for path in args.sources if path.suffix.lower() == IMAGE_SUFFIX), None)
     if image is not None:
         raise UsageError(f"{image} is not a source; to name the image that is built, write -o {image}.", "usage")
-    document, warnings = build(settings_with_dialect(args))
+    settings = with_base(settings_with_dialect(args), args)
+    if args.dry_run:
+        planned = compiled(settings)
+        output.print_warnings(args, planned.rendered_warnings)
+        document = change_document(planned)
+        output.show(args, document, change_text)
+        return EXIT_USAGE if document["problems"] else EXIT_OK
+    document, warnings = build(settings)
     output.print_warnings(args, warnings)
     return output.show(args, document, build_text)
 

@@ -39,15 +39,16 @@ from plctool.iec.types import BOOL
 CODE_INIT = "code_init"
 GLOBAL_INIT = "global_init"
 GLOBAL_EXIT = "global_exit"
+CHANGE_INIT = "change_init"
 
 
 @dataclass(frozen=True)
 class Lowered:
-    """LLVM IR, in parts, and what an image of it needs. `tasks`: entry symbols
-    in the order of the program's tasks; `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `events`:
-    those of the program's events, in their order; `pous`: by symbol, all that are part of it; `imports`: in the order
-    of their slots; `bounds`: what is checked; `transient`: variables of blocks that are not kept in memory;
-    `passed_lines`: by the numbers in the trail of an exception, from 1."""
+    """LLVM IR, in parts, and what an image of it needs. `tasks`: entry symbols in the order of the program's tasks;
+    `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `events`: those of the program's events, in their
+    order; `change_init`: what it calls at an online change, empty if nothing; `pous`: by symbol, all that are part of
+    it; `imports`: in the order of their slots; `bounds`: what is checked; `transient`: variables of blocks that are not
+    kept in memory; `passed_lines`: by the numbers in the trail of an exception, from 1."""
 
     parts: list[Part]
     tasks: list[str]
@@ -58,6 +59,12 @@ class Lowered:
     bounds: list[BoundsCheck]
     transient: TransientVariables
     passed_lines: list[PassedLine]
+    change_init: str = ""
+
+    @property
+    def entries(self) -> list[str]:
+        """All that the runtime calls."""
+        return [*self.tasks, *self.functions.values(), *self.events, *([self.change_init] if self.change_init else [])]
 
 
 def lower(program: TypedProgram, options: Options) -> Lowered:
@@ -75,6 +82,8 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     if program.shutdown is not None:
         _entry_of(unit, GLOBAL_EXIT, program.shutdown)
         functions[int(lib.CDL_FUNCTION_GLOBAL_EXIT)] = GLOBAL_EXIT
+    if program.startup_of_new is not None:
+        _entry_of(unit, CHANGE_INIT, program.startup_of_new)
     events = [f"event.{number}" for number in range(len(program.events))]
     for name, event in zip(events, program.events, strict=True):
         _entry_of(unit, name, event.pou)
@@ -107,7 +116,18 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     options.passes.left(("sections", "memory", "lengths", "splice"), unit.module.whole)
     made = parts(unit.module, cut=options.passes.runs("parts"))
     options.passes.left(("parts",), lambda: "\n".join(f"; part {n}\n{part.text}" for n, part in enumerate(made, 1)))
-    return Lowered(made, tasks, functions, events, pous, unit.imports, bounds, unit.transient, unit.trail.lines)
+    return Lowered(
+        made,
+        tasks,
+        functions,
+        events,
+        pous,
+        unit.imports,
+        bounds,
+        unit.transient,
+        unit.trail.lines,
+        CHANGE_INIT if program.startup_of_new is not None else "",
+    )
 
 
 def _task_entry(unit: Unit, number: int, task: Task) -> str:

@@ -15,8 +15,7 @@ from plctool.compiler.codegen.ir import Value, round_to_single
 from plctool.compiler.codegen.lower_arith import constant
 from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.codegen.lower_string import copy_literal, encode_text
-from plctool.compiler.codegen.lower_unit import Unit
-from plctool.compiler.typed.nodes import Initial, ScalarInit, array_runs, struct_members
+from plctool.compiler.typed.nodes import Initial, ScalarInit, StructInit, array_runs, struct_members
 from plctool.iec.types import BYTE, ArrayType, Elementary, Kind, StringType, StructType, Type, base_of, is_scalar
 
 _LOOP_FROM = 5  # equal scalars that are worth a loop
@@ -35,16 +34,16 @@ def encode_scalar(value: int | float | str, t: Type) -> bytes:
     return (int(value) & ((1 << 8 * t.size) - 1)).to_bytes(t.size, "little")
 
 
-def image_of(unit: Unit, t: Type, initial: Initial | None) -> bytes:
-    """The bytes of a variable with its initial value."""
+def image_of(defaults: dict[str, StructInit], t: Type, initial: Initial | None) -> bytes:
+    """The bytes of a variable with its initial value. `defaults`: those of types (`TypedProgram.defaults`)."""
     if isinstance(initial, ScalarInit):
         return encode_scalar(initial.value, t)
     if isinstance(t, ArrayType):
-        return b"".join(image_of(unit, t.element, value) * count for count, value in array_runs(t, initial))
+        return b"".join(image_of(defaults, t.element, value) * count for count, value in array_runs(t, initial))
     data = bytearray(t.size)
     if isinstance(t, StructType):
-        for f, value in struct_members(t, initial, unit.defaults.get(t.name)):
-            member = image_of(unit, f.type, value)
+        for f, value in struct_members(t, initial, defaults.get(t.name)):
+            member = image_of(defaults, f.type, value)
             if f.bit is None:
                 data[f.offset : f.offset + f.type.size] = member
             else:
@@ -73,7 +72,7 @@ def _initialise_scalar(frame: Frame, ref: Ref, initial: ScalarInit) -> None:
 
 def _initialise_struct(frame: Frame, ref: Ref, t: StructType, initial: Initial | None) -> None:
     if initial is None and not ref.unaligned:
-        if any(image_of(frame.unit, t, None)):
+        if any(image_of(frame.unit.defaults, t, None)):
             frame.fn.call(frame.unit.initialiser(t), [f"ptr {frame.address(ref)}"])
         return
     initialise_members(frame, ref, t, initial)
@@ -91,13 +90,13 @@ def _initialise_array(frame: Frame, ref: Ref, t: ArrayType, initial: Initial | N
         return
     offset = 0
     for count, value in array_runs(t, initial):
-        if any(image_of(frame.unit, t.element, value)):
+        if any(image_of(frame.unit.defaults, t.element, value)):
             _repeat(frame, ref.member(offset, t), t.element, count, value)
         offset += count * t.element.size
 
 
 def _initialise_scalars(frame: Frame, ref: Ref, t: ArrayType, initial: Initial | None) -> None:
-    data, size = image_of(frame.unit, t, initial), t.element.size
+    data, size = image_of(frame.unit.defaults, t, initial), t.element.size
     first, last = (len(data) - len(data.lstrip(b"\0"))) // size, -(-len(data.rstrip(b"\0")) // size)
     if first >= last:
         return

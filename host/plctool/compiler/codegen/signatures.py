@@ -181,7 +181,7 @@ def _closed_listed(closed: ClosedBlocks) -> str:
 def _inputs_of_all_calls(program: TypedProgram) -> tuple[HandedInputs, Counter[Pou], list[Pou]]:
     """For each function block the inputs that every call gives, none for those that only the class decides about; how
     many calls there are; and all units."""
-    extra = (pou for pou in (program.startup, program.shutdown) if pou is not None)
+    extra = (pou for pou in (program.startup, program.startup_of_new, program.shutdown) if pou is not None)
     reached = dict.fromkeys([*program.pous, *program.programs.values(), *extra])  # and perhaps some that never run
     given: HandedInputs = {}
     calls: Counter[Pou] = Counter()

@@ -6,6 +6,7 @@ from bisect import bisect_right
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from zlib import crc32
 
 from plctool.compiler.base.garbage import no_collection
 from plctool.compiler.base.nesting import room_for_nesting
@@ -15,10 +16,12 @@ from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.stack import CallGraph, Frames
 from plctool.compiler.image.io_configuration import assign_tasks, configuration_of, io_document
+from plctool.compiler.image.online_change import check_facts, facts_of, steps_of
 from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.compiler.syntax.library import is_standard
 from plctool.compiler.typed.kept import kept_parts, kept_variables
 from plctool.compiler.typed.nodes import External, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
+from plctool.compiler.typed.online_change import OnlineChange
 from plctool.core import lib
 from plctool.debug.frames import INSTANCE
 from plctool.debug.symbols import CodeUnit, KeptName, SymbolTable, symbol_path
@@ -32,11 +35,13 @@ from plctool.image.file import (
     ApplicationInfo,
     ExternalFunction,
     Image,
+    ImageChange,
     ImageEvent,
     ImagePart,
     ImageTask,
     build_image,
     image_crc,
+    packed_steps,
 )
 from plctool.image.limits import Need, largest, needs_of_image, of_area
 from plctool.image.targets import Machine, Target
@@ -59,6 +64,7 @@ class BuildResult:
     dumps: list[str] = field(default_factory=list)
     warnings: list[Diagnostic] = field(default_factory=list)
     rendered_warnings: list[str] = field(default_factory=list)
+    change: OnlineChange | None = None
 
     @property
     def crc(self) -> int:
@@ -71,20 +77,28 @@ class BuildResult:
 
 
 def build_program(
-    program: TypedProgram, options: Options, info: ApplicationInfo | None = None, *, keeps: bool = True
+    program: TypedProgram,
+    options: Options,
+    info: ApplicationInfo | None = None,
+    *,
+    keeps: bool = True,
+    change: OnlineChange | None = None,
 ) -> BuildResult:
-    """Compiles a checked program. `keeps`: whether RETAIN and PERSISTENT variables outlive a start. Raises UsageError
-    when the target cannot run it."""
+    """Compiles a checked program. `keeps`: whether RETAIN and PERSISTENT variables outlive a start. `change`: how it
+    takes the place of the program that runs; what is in the way is added to it. Raises UsageError when the target
+    cannot run it."""
     with no_collection():
-        return _build(program, options, info or ApplicationInfo(), keeps)
+        return _build(program, options, info or ApplicationInfo(), keeps, change)
 
 
-def _build(program: TypedProgram, options: Options, info: ApplicationInfo, keeps: bool) -> BuildResult:
+def _build(
+    program: TypedProgram, options: Options, info: ApplicationInfo, keeps: bool, change: OnlineChange | None
+) -> BuildResult:
     target = options.target
     with room_for_nesting():
         lowered = lower(program, options)
     objects = emit_objects(lowered.parts, options)
-    linked = link(objects, target, _roots(lowered), lowered.imports)
+    linked = link(objects, target, lowered.entries, lowered.imports)
     symbols = _symbols(program, lowered, linked, target, info.project, steps=options.steps)
     kept = kept_parts(v for v in program.globals if keeps and v.area is Area.RETAIN)
     code, io = linked.code, None
@@ -95,9 +109,18 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo, keeps
         io = (len(code), len(configuration))
         code += configuration
         symbols.io = io_document(program, program.io)
+    tasks = [_task(task, _entry(linked, name, target)) for task, name in zip(program.tasks, lowered.tasks, strict=True)]
+    device_id = int(getattr(lib, target.device_id))
+    symbols.online = facts_of(tasks, device_id, 0 if io is None else crc32(code[io[0] :]))
+    changes = None
+    if change is not None:
+        check_facts(change, symbols.online, target.name)
+        code += bytes(-len(code) % _CODE_ALIGN)
+        changes = _image_change(program, lowered, linked, target, change, len(code))
+        code += packed_steps(changes)
     symbols.kept = [KeptName(part.name, part.type, part.persistent, part.size) for part in kept]
     image = Image(
-        device_id=int(getattr(lib, target.device_id)),
+        device_id=device_id,
         code=code,
         areas={area.value: size for area, size in program.area_sizes.items() if area is not Area.CODE},
         functions={number: _entry(linked, name, target) for number, name in lowered.functions.items()},
@@ -105,9 +128,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo, keeps
             ExternalFunction(e.name, e.signature, e.version, slot * target.pointer_size)
             for slot, e in enumerate(linked.imports)
         ],
-        tasks=[
-            _task(task, _entry(linked, name, target)) for task, name in zip(program.tasks, lowered.tasks, strict=True)
-        ],
+        tasks=tasks,
         info=info,
         events=[
             ImageEvent(event.event, event.name, _entry(linked, name, target))
@@ -115,13 +136,22 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo, keeps
         ],
         kept=kept_variables(kept),
         io=io,
+        change=changes,
     )
     built = build_image(image)
     symbols.image_crc = image_crc(built)
     sizes = code_sizes(symbols, len(linked.code))
     needs = _needs(program, lowered, linked, image, len(built), sizes, options)
     symbols.stack = needs["stack"]
-    return BuildResult(built, symbols, sizes, needs)
+    return BuildResult(built, symbols, sizes, needs, change=change)
+
+
+def _image_change(
+    program: TypedProgram, lowered: Lowered, linked: Linked, target: Target, change: OnlineChange, place: int
+) -> ImageChange:
+    transient = {(pou.instance, v.offset) for pou, vs in lowered.transient.items() if pou.instance for v in vs}
+    init = _entry(linked, lowered.change_init, target) if lowered.change_init else None
+    return ImageChange(change.previous.crc, init, place, tuple(steps_of(change, program.defaults, transient)))
 
 
 def _needs(
@@ -141,7 +171,7 @@ def _needs(
             needs[name] = replace(needs[name], parts=largest(parts))
     for name in ("code", "image"):
         needs[name] = replace(needs[name], parts=tuple(sizes.items()))
-    roots = [linked.symbols[name].offset for name in _roots(lowered)]
+    roots = [linked.symbols[name].offset for name in lowered.entries]
     # A stub takes what its C function takes.
     of_c = {offset: _stack_of(external, options) for offset, external in linked.stubs.items()}
     stubs: Frames = {offset: (0, size) for offset, size in of_c.items() if size is not None}
@@ -168,11 +198,6 @@ def _stack_of(external: External, options: Options) -> int | None:
     if options.firmware is not None:
         size = options.firmware.of_function(external.signature, with_pointers=known is not None)
     return known.stack(options.target.machine) if size is None and known is not None else size
-
-
-def _roots(lowered: Lowered) -> list[str]:
-    """The functions that the runtime calls."""
-    return [*lowered.tasks, *lowered.functions.values(), *lowered.events]
 
 
 def _entry(linked: Linked, name: str, target: Target) -> int:

@@ -88,8 +88,8 @@ def plan_images(program: TypedProgram, diagnostics: Diagnostics) -> None:
 
 
 def _outside_of_tasks(program: TypedProgram) -> list[Pou]:
-    events = [function.pou for function in program.events]
-    return events if program.startup is None else [program.startup, *events]
+    startups = [pou for pou in (program.startup, program.startup_of_new) if pou is not None]
+    return [*startups, *(function.pou for function in program.events)]
 
 
 def task_ranges(program: TypedProgram) -> list[dict[Area, set[tuple[int, int]]]]:

@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterable
 
 from plctool.compiler.semantics.conversions import elementary
 from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.stable_places import StablePlaces
 from plctool.compiler.semantics.symbols import Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.compiler.typed.nodes import Initial, Pos, Storage, Variable
+from plctool.compiler.typed.online_change import Previous
 from plctool.iec.addresses import Address, ModuleAddress, parse_address, parse_module_address
 from plctool.iec.areas import Area
 from plctool.iec.types import BOOL, Type, align_up, base_of
@@ -22,9 +24,11 @@ from plctool.iec.types import BOOL, Type, align_up, base_of
 
 
 class Allocation:
-    """The variables that live in the areas, and their offsets there."""
+    """The variables that live in the areas, and their offsets there. `previous`: the program that they shall replace
+    while it runs."""
 
-    def __init__(self) -> None:
+    def __init__(self, previous: Previous | None = None) -> None:
+        self.stable = None if previous is None else StablePlaces(previous)
         self.sizes: dict[Area, int] = {area: 0 for area in Area if area is not Area.CODE}
         self.variables: list[Variable] = []
         self.once_placed: list[Callable[[], None]] = []  # called when all offsets are known
@@ -36,6 +40,8 @@ class Allocation:
     def place(self) -> None:
         """Gives each variable without an address the next offset in its area. Inputs and outputs get theirs after
         that (`io_channels.py`)."""
+        if self.stable is not None:
+            self.stable.place(self.variables)
         for variable in self.variables:
             t, area = variable.type, variable.area
             if variable.offset < 0 and area not in (Area.INPUT, Area.OUTPUT):

@@ -104,6 +104,25 @@ def construct(world: World) -> tuple[Pou | None, Pou | None]:
     return start if start.body else None, end if end.body else None
 
 
+def construct_new(world: World) -> Pou | None:
+    """Makes the routine that begins the life of those instances which the program that runs does not have."""
+    stable = world.allocation.stable
+    if stable is None:
+        return None
+    start = Pou("FB_Init of new variables", PouKind.FUNCTION, Pos("", 1, 1))
+    builder = Construction(world, start, Const(1, BOOL, start.pos))
+    pools = {pool.elements for pool in world.pools.values()}
+    for variable in world.allocation.variables:
+        if variable not in pools and (stable.is_new(variable) or variable.constant):
+            start.body += builder.new_variable(variable)
+        elif stable.has_fresh_parts(variable) and builder.new_variable(variable):
+            stable.problem(f"{variable.name}: what is new in {variable.type} has a calculated initial value or FB_Init")
+    if not start.body:
+        return None
+    world.pous.append(start)
+    return start
+
+
 def _kept_function() -> Pou:
     """The function of the runtime that tells whether a value in some memory was put back (CmpIecAbi.h)."""
     pos = Pos("", 1, 1)
@@ -131,6 +150,10 @@ class Construction:
         keep = variable.keep if variable.area is Area.RETAIN else None
         path = variable.name if variable.storage is Storage.AREA else f"{self._pou.name}.{variable.name}"
         return self.place(whole(variable, variable.pos), variable.initial, variable.pos, keep, path)
+
+    def new_variable(self, variable: Variable) -> list[Statement]:
+        """The same of a variable of which nothing is kept."""
+        return self.place(whole(variable, variable.pos), variable.initial, variable.pos, None, variable.name)
 
     def _needs(self, t: Type) -> bool:
         while isinstance(t, ArrayType):

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.compiler.base.internal import note_position
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.construction import construct
+from plctool.compiler.semantics.construction import construct, construct_new
 from plctool.compiler.semantics.declarations.classes import Classes
 from plctool.compiler.semantics.declarations.functions import Functions
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
@@ -32,6 +32,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.compiler.syntax.library import Library
 from plctool.compiler.typed.nodes import Pou, Variable
+from plctool.compiler.typed.online_change import Previous
 
 
 class Program:
@@ -44,14 +45,16 @@ class Program:
         diagnostics: Diagnostics,
         io: IoChannels,
         information: Information = NO_INFORMATION,
+        previous: Previous | None = None,
     ) -> None:
         self.libraries = libraries
         self.startup: Pou | None = None  # calls FB_Init
+        self.startup_of_new: Pou | None = None  # the same of the variables that an online change adds
         self.shutdown: Pou | None = None  # calls FB_Exit
         self.may_recurse = False
         self.trail: Variable | None = None
         self.checked: list[Scope] = []  # of bodies without errors
-        self.world = World(library, diagnostics, io, self._declared_by, information)
+        self.world = World(library, diagnostics, io, self._declared_by, information, previous)
 
     def _declared_by(self, world: World) -> Declarers:
         self.types = TypeDeclarations(world)
@@ -102,6 +105,7 @@ class Program:
             self._check_queue()
         write_pools(world)
         self.startup, self.shutdown = construct(world)
+        self.startup_of_new = construct_new(world)
         self.trail = reserve_trail(world)
         world.pous += world.dispatches.queries.pous()
         self._classes.find_targets(

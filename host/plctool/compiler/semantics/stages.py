@@ -28,11 +28,13 @@ from plctool.compiler.syntax.diagnostics import Diagnostic, Diagnostics
 from plctool.compiler.syntax.library import Library
 from plctool.compiler.syntax.parser import ParsedText
 from plctool.compiler.typed.nodes import TypedProgram
+from plctool.compiler.typed.online_change import OnlineChange, Previous
 
 
 @dataclass(frozen=True)
 class Parsed:
-    """A program as its sources have it. `syntax`: the syntax errors in them."""
+    """A program as its sources have it. `syntax`: the syntax errors in them. `previous`: the program that it shall
+    replace while that runs."""
 
     texts: Sequence[tuple[Source, ParsedText]]
     library: Library
@@ -40,6 +42,7 @@ class Parsed:
     diagnostics: Diagnostics
     syntax: Sequence[Diagnostic] = ()
     information: Information = NO_INFORMATION
+    previous: Previous | None = None
 
     @property
     def broken(self) -> bool:
@@ -101,10 +104,12 @@ class Checked:
 
 @dataclass(frozen=True)
 class Placed:
-    """A program that can be built, if its diagnostics have no errors."""
+    """A program that can be built, if its diagnostics have no errors. `change`: how it takes the place of the previous
+    one."""
 
     checked: Checked
     program: TypedProgram
+    change: OnlineChange | None = None
 
     @property
     def diagnostics(self) -> Diagnostics:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from zlib import crc32
 
 from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.compiler.base.source import Source
@@ -56,6 +57,7 @@ from plctool.compiler.typed.nodes import (
     Variable,
     VarPlace,
 )
+from plctool.compiler.typed.online_change import Previous
 from plctool.iec.types import (
     CLASS_NUMBER,
     UDINT,
@@ -162,6 +164,7 @@ class World:
         io: IoChannels,
         declared_by: Callable[[World], Declarers],
         information: Information = NO_INFORMATION,
+        previous: Previous | None = None,
     ) -> None:
         """`declared_by` makes what declares, for this world; it is called when the world has all else."""
         self.diagnostics = diagnostics
@@ -172,7 +175,8 @@ class World:
         self.coerce = Coercion(self.diagnostics, self._text_of)
         self.calls = CallGraph(self.diagnostics)
         self.dispatches = Dispatches()
-        self.allocation = Allocation()
+        self.previous = previous
+        self.allocation = Allocation(previous)
         self.direct = DirectVariables(self.allocation)
         self.io = io
         self.bodies = BodyQueue()
@@ -273,7 +277,10 @@ class World:
         variable = self._texts.get((constant.value, constant.type))
         if variable is None:
             initial = ScalarInit(constant.value)
-            name = f"text {len(self._texts) + 1}"
+            number = crc32(f"{constant.type}:{constant.value}".encode(errors="surrogatepass"))
+            name = f"text {number:08X}"  # of its content, so that an online change finds it again
+            while any(known.name == name for known in self._texts.values()):
+                name += "'"
             variable = Variable(name, constant.type, Storage.AREA, constant.pos, initial=initial, constant=True)
             self._texts[constant.value, constant.type] = variable
             self.allocation.add(variable)

@@ -11,6 +11,7 @@ from pathlib import Path
 from plctool.compiler.base.level import Level
 from plctool.compiler.sources.program_files import ProgramFiles
 from plctool.compiler.syntax.warnings import ALL_WARNINGS, WarningOptions, warning_options
+from plctool.debug.symbols import SymbolTable
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class BuildRequest:
     `firmware`: the ELF file of any board's firmware, which says the same. Without `limits` the program may need more
     than any device has. `dialect`: iec, codesys or twincat, where systems disagree about what a program means; None:
     that of the files. `no_pass`: passes of the code generator that are left out; `dump_after`: the pass whose result is
-    kept."""
+    kept. `base`: the program whose place it shall take while that runs."""
 
     files: ProgramFiles
     target: str | None = None
@@ -35,6 +36,7 @@ class BuildRequest:
     dialect: str | None = None
     no_pass: tuple[str, ...] = ()
     dump_after: str | None = None
+    base: SymbolTable | None = None
 
 
 def request_of(files: ProgramFiles) -> BuildRequest:

@@ -711,6 +711,7 @@ class TypedProgram:
     accesses: list[Variable] = field(default_factory=list)  # VAR_ACCESS: other names of parts of globals
     constants: dict[str, Const] = field(default_factory=dict)  # that have no memory, by full name
     startup: Pou | None = None  # (init_retains : BOOL): what is called when the variables have their initial values
+    startup_of_new: Pou | None = None  # the same of the variables that an online change adds
     shutdown: Pou | None = None  # what is called when the application ends, or its variables are initialised
     events: list[EventFunction] = field(default_factory=list)
     externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not

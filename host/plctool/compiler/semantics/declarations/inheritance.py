@@ -5,7 +5,9 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from functools import cached_property
+from itertools import count
 
 from plctool.compiler.semantics.conversions import same_type
 from plctool.compiler.semantics.instances import INITIALISERS
@@ -64,7 +66,8 @@ class Hierarchy:
                 todo += reversed(self._derived.get(symbol, []))
             if len(family) > 1 or any(s.decl.interfaces for s in family):
                 numbers.update(zip(family, range(len(numbers) + 1, len(numbers) + 1 + len(family)), strict=True))
-        return numbers
+        previous = self._world.previous
+        return numbers if previous is None else _as_before(numbers, previous.classes)
 
     def circle(self, symbol: PouSymbol) -> str:
         """`A extends B extends A`"""
@@ -73,6 +76,14 @@ class Hierarchy:
             names.append(at.decl.name)
             at = self.base_of(at)
         return " extends ".join([*names, at.decl.name if at is not None else "?"])
+
+
+def _as_before(classes: Iterable[PouSymbol], before: Mapping[str, int]) -> dict[PouSymbol, int]:
+    """The numbers that classes have in the program that runs, whose instances stay; new ones get others."""
+    had = {name.casefold(): number for name, number in before.items()}
+    unused = count(max(had.values(), default=0) + 1)
+    keys = {symbol: symbol.decl.full_name.casefold() for symbol in classes}
+    return {symbol: had[key] if key in had else next(unused) for symbol, key in keys.items()}
 
 
 # ---- overriding, abstract methods, interfaces ----
