@@ -32,6 +32,8 @@ RTS_UI32 AppDownloadOffset(void); /* bytes received so far; an aborted transfer 
 bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc);
 bool AppDownloadIsOpen(void);
 RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal);
+/* The same for an online change (AppChange.h), with ONLINE_CHANGE: the application goes on in the new image, or as it was. */
+RTS_RESULT AppDownloadChange(APP_REFUSAL *refusal);
 void AppDownloadAbort(void);
 
 #endif

@@ -33,6 +33,11 @@ void IecTaskRunOnce(void);
 RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
 
 #ifndef RTS_CFFI
+#if ONLINE_CHANGE
+/* As IecCycleExchange; traps of a debugger are taken out before, and put in again as those of the image that is there then. */
+RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange);
+#endif
+
 /* With BP_MAX: called before tasks are started, and when they are to be stopped, before their cycles are waited for. */
 typedef struct {
     void (*will_start)(void);

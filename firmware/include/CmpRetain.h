@@ -54,6 +54,11 @@ void RetainSettle(bool failed);
 /* Saves what counts when it is not what was saved last, or always; no task runs. ERR_DEVICE flash fault. */
 RTS_RESULT RetainSave(bool always);
 
+/* An online change: the variables stay where they are, and from now on the table, checked, is this one, and records have
+ * this tag. No task is in its cycle. RetainSaveExchanged saves what they were then. */
+void RetainExchange(const RETAIN_TABLE *table, RTS_UI32 tag);
+RTS_RESULT RetainSaveExchanged(void);
+
 /* From now on the record numbered `until`, or the newest before it, is kept in flash, whatever is saved. It is that of
  * the previous application, as long as the device may go back to it. */
 void RetainKeep(RTS_UI32 until);

@@ -246,6 +246,7 @@ enum {
     TAG_CDL_REASON = 0x05,
     TAG_CDL_PACKED = 0x06,
     TAG_CDL_UNPACKS = 0x07,
+    TAG_CDL_CHANGES = 0x08,
 };
 
 /* Task information (own). */

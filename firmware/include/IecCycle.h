@@ -101,6 +101,24 @@ bool IecCycleMayRun(void);
  * from CYCLE_RECORD of this task. */
 void IecTaskGetTimes(RTS_UI32 task, RTS_UI32 *cycle_ns, RTS_UI32 *late_ns);
 
+#if ONLINE_CHANGE
+/* ---- for CmpIecTask ---- */
+
+/* What an online change does. `begin` runs in a moment in which no task is in its cycle; then `init`, if there is one, before
+ * any begins: false when it failed, and has undone `begin`. */
+typedef struct {
+    void (*begin)(void *arg);
+    bool (*init)(void *arg);
+    void *arg;
+} CYCLE_EXCHANGE;
+
+/* ERR_OK, ERR_FAILED: init did, ERR_TIMEOUT: a cycle takes too long, and nothing was done. From main. */
+RTS_RESULT IecCycleExchange(const CYCLE_EXCHANGE *exchange);
+
+/* Other code for the same tasks, within `begin`. `prototype`: where it is, and its imports. */
+void IecCycleSetCode(const IEC_CONTEXT *prototype);
+#endif
+
 #if BP_MAX > 0
 /* ---- for CmpAppBP ---- */
 

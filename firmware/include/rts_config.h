@@ -292,6 +292,17 @@
 #define OPERATION_CONTROL 0
 #endif
 
+/* 1: a program may take the place of the one that runs between two cycles (AppChange.h). Where tasks run beside main it
+ * needs BP_MAX. 0: no flash for it. */
+#ifndef ONLINE_CHANGE
+#define ONLINE_CHANGE 0
+#endif
+
+/* How long an online change waits for a cycle to end, in which no other one begins [ms]. */
+#ifndef ONLINE_CHANGE_WAIT_MS
+#define ONLINE_CHANGE_WAIT_MS 200
+#endif
+
 /* Messages that a program may add to the log at once (IecLog.h), and how long it then waits for each further one [ms]. It
  * needs HAS_IecLog in cmp_list.c. 0: no flash for it, and a program that does is refused. */
 #ifndef IEC_LOG_BURST

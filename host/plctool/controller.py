@@ -140,6 +140,16 @@ class FlashResult:
 
 
 @dataclass(frozen=True)
+class ChangeResult:
+    """What an online change has done. `released`: the variables that were forced, and are removed."""
+
+    bytes: int
+    seconds: float
+    state: AppState
+    released: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
 class OtherTool:
     """Another tool of this machine that uses the same line: how its user called it, and its process number."""
 
@@ -233,6 +243,51 @@ class Controller(ABC):
         if now.image_crc != crc:
             raise went_down()
         return FlashResult(len(data), seconds, skipped, now.state, persistent)
+
+    def change(
+        self,
+        image: Path | str | bytes,
+        *,
+        unchecked: bool = False,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+    ) -> ChangeResult:
+        """Replaces the application by an image that was built with it as base, between two cycles: variables that both
+        have keep their values. What is forced of removed variables is not forced any more. `unchecked`: the image is
+        not checked here; the controller checks it anyway.
+
+        Raises UsageError for an image that was not built to replace what runs, DeviceError when the controller refuses
+        it. The application goes on as it was then.
+        """
+        data = image if isinstance(image, bytes) else read_program(Path(image))
+        with self._alone("changing the program"):
+            if not isinstance(image, bytes):
+                _keep_symbols(Path(image), image_crc(data))
+            status = self._status_before(data)
+            if not unchecked:
+                _check_base(data, status.image_crc)
+            released = self._release_removed(status.image_crc, image_crc(data))
+            begin = self._now()
+            self._change(data, lambda done: progress(done, len(data)))
+            seconds = self._now() - begin
+            now = self.raw_status()
+            if now.image_crc != image_crc(data):
+                raise went_down()
+        return ChangeResult(len(data), seconds, now.state, released)
+
+    def _release_removed(self, before: int, after: int) -> list[str]:
+        """Ends the force of variables that the new program does not have; returns their names."""
+        with suppress(UsageError, DeviceError):
+            had, has = (self._tables.get(crc) or find_symbols(crc) for crc in (before, after))
+            removed = [s for name, s in had.variables.items() if name not in has.variables]
+            places = [place for place in self._read_forces().places if any(place.overlaps(s) for s in removed)]
+            if places:
+                self._unforce(had, places)
+            return list(name_forced(places, list(had.variables.values())))
+        return []
+
+    @abstractmethod
+    def _change(self, data: bytes, progress: Callable[[int], None]) -> None:
+        """Sends an image for an online change, which is done when it returns."""
 
     def _status_before(self, data: bytes) -> Status:
         """The status before a download of this image."""
@@ -748,6 +803,19 @@ class Controller(ABC):
 
 def _recipe(recipe: Recipe | Path | str) -> Recipe:
     return recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))
+
+
+def _check_base(data: bytes, running: int) -> None:
+    """Raises UsageError for an image that cannot replace the program with the CRC `running`."""
+    change = parse_image(data).change
+    if change is None:
+        raise UsageError("This image replaces no program that runs; build it with --base OLD.cdl.", "no-base")
+    if running not in (change.base, image_crc(data)):
+        raise UsageError(
+            f"This image replaces the program with CRC {change.base:08X}, and {running:08X} runs; "
+            "build it again with that as --base.",
+            "other-base",
+        )
 
 
 def _forcible(symbol: Symbol) -> Symbol:

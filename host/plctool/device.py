@@ -292,6 +292,10 @@ class Plc(Controller):
         prepared, self._prepared = self._prepared, None
         services.download(self._session, data, restart, progress, prepared, start=start)
 
+    def _change(self, data: bytes, progress: Callable[[int], None]) -> None:
+        prepared, self._prepared = self._prepared, None
+        services.download(self._session, data, False, progress, prepared, change=True)
+
     def _status_before(self, data: bytes) -> Status:
         status, self._prepared = services.prepare_download(self._session, data)
         return status

@@ -183,13 +183,20 @@ class Simulator(Controller):
 
     def _download(self, data: bytes, start: bool, restart: bool, progress: Callable[[int], None]) -> None:
         self._check_allowed(lib.OPERATION_DOWNLOAD, "download")
+        self._send(data, self._lib.AppDownloadEnd, "download", progress)
+
+    def _change(self, data: bytes, progress: Callable[[int], None]) -> None:
+        self._check_allowed(lib.OPERATION_ONLINE_CHANGE, "online change")
+        self._send(data, self._lib.AppDownloadChange, "online change", progress)
+
+    def _send(self, data: bytes, end: Callable[[Any], int], action: str, progress: Callable[[int], None]) -> None:
         self._add_events(data)
         _check(self._lib.AppDownloadBegin(len(data), image_crc(data)), "The image is refused")
         _check(self._lib.AppDownloadWrite(0, data, len(data)), "The image cannot be stored")
         refusal = self._ffi.new("APP_REFUSAL *")
         with self._not_debugged(), self._functions.while_running():
-            result = self._lib.AppDownloadEnd(refusal)
-        l7.check_result(result, "download", self._ffi.string(refusal.text).decode("latin-1") if result else "")
+            result = end(refusal)
+        l7.check_result(result, action, self._ffi.string(refusal.text).decode("latin-1") if result else "")
         progress(len(data))
 
     def _add_events(self, image: bytes) -> None:

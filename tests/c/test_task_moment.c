@@ -8,6 +8,7 @@
  * at once and fills a part of the area with one number per cycle: a copy taken within a cycle would hold two.
  */
 #define _GNU_SOURCE
+#define ONLINE_CHANGE 0 /* it needs more than the fakes below */
 #include <pthread.h>
 #include <time.h>
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from itertools import pairwise
 from pathlib import Path
 from random import Random
 
 import pytest
+
+sys.path.append(str(Path(__file__).parents[1]))
+
 from online_programs import Source, built, edited, random_source
 
 from plctool.debug.symbols import SymbolTable

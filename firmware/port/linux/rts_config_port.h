@@ -34,6 +34,7 @@
 #define SRV_NETWORKS 8
 #define FORCE_MAX 128
 #define OPERATION_CONTROL 1
+#define ONLINE_CHANGE 1
 #define IEC_LOG_BURST 32
 #define IEC_EVENTS 1
 #define SETTINGS 1

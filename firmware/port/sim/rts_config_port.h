@@ -31,6 +31,9 @@
 #define SRV_OTHER_CLIENTS 1
 #define FORCE_MAX 128
 #define OPERATION_CONTROL 1
+#ifndef ONLINE_CHANGE /* not in the C tests that fake what it needs */
+#define ONLINE_CHANGE 1
+#endif
 #define IEC_LOG_BURST 16
 #define IEC_EVENTS 1
 #define SETTINGS 1

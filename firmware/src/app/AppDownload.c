@@ -9,6 +9,7 @@
 #include "AppDownload.h"
 
 #include "AppBoot.h"
+#include "AppChange.h"
 #include "AppCommit.h"
 #include "AppEvents.h"
 #include "AppLife.h"
@@ -181,7 +182,9 @@ static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
     return result;
 }
 
-static RTS_RESULT finish_download(APP_REFUSAL *refusal)
+typedef RTS_RESULT (*TAKE_OVER)(const APP_IMAGE *image, APP_REFUSAL *refusal);
+
+static RTS_RESULT finish_download(TAKE_OVER take, APP_REFUSAL *refusal)
 {
     APP_IMAGE image;
     RTS_RESULT result;
@@ -196,7 +199,7 @@ static RTS_RESULT finish_download(APP_REFUSAL *refusal)
     if (SysFileClose(download.slot) != ERR_OK)
         return APP_REFUSE(refusal, ERR_DEVICE, "The flash cannot be written.");
     result = AppLoaderCheck(download.slot, download.size, download.crc, &image, refusal);
-    return result == ERR_OK ? take_over(&image, refusal) : result;
+    return result == ERR_OK ? take(&image, refusal) : result;
 }
 
 RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
@@ -205,10 +208,25 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
 
     refusal->text[0] = '\0';
     AppHandlePendingException();
-    result = finish_download(refusal);
+    result = finish_download(take_over, refusal);
     if (result == ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application loaded, CRC %X", (unsigned)download.crc);
     else
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Download refused: %s", refusal->text);
     return result;
 }
+
+#if ONLINE_CHANGE
+RTS_RESULT AppDownloadChange(APP_REFUSAL *refusal)
+{
+    RTS_RESULT result;
+
+    refusal->text[0] = '\0';
+    result = finish_download(AppChange, refusal);
+    if (result == ERR_OK)
+        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Online change, CRC %X", (unsigned)download.crc);
+    else
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Online change refused: %s", refusal->text);
+    return result;
+}
+#endif

@@ -52,6 +52,10 @@ void AppEventTellBoot(RTS_UI32 event)
 static const char *what_is_denied(RTS_UI32 event)
 {
     switch (event) {
+#if ONLINE_CHANGE
+    case EVT_PrepareOnlineChange:
+        return "Online change";
+#endif
     case EVT_PrepareDownload:
         return "Download";
     case EVT_DenyLoadBootproject:

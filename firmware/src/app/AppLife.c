@@ -23,6 +23,7 @@
 #include "CmpLog.h"
 #include "CmpRetain.h"
 #include "CyclePhases.h"
+#include "IecCycle.h"
 #include "SysExcept.h"
 #include "SysFileFlash.h"
 #include "SysFlash.h"
@@ -181,6 +182,45 @@ static bool run_function(RTS_UI32 function, bool init_retains)
     record_exception(&raised);
     return false;
 }
+
+#if ONLINE_CHANGE
+static void call_entry(void *arg)
+{
+    APP_CALL_ENTRY((IEC_ENTRY)(((uintptr_t)app.code + *(const RTS_UI32 *)arg) | APP_ENTRY_MODE_BIT), &app.context);
+}
+
+bool AppRunInit(RTS_UI32 offset, RTS_UI32 *code)
+{
+    RTS_EXCEPTION exception = {RTSEXCPT_NOEXCEPTION, 0};
+    bool ended = IecTaskRunGuarded(call_entry, &offset, &exception);
+
+    *code = exception.code;
+    return ended;
+}
+
+const APP_TABLES *AppGetTables(void)
+{
+    return &app.tables;
+}
+
+void AppExchange(const APP_IMAGE *image, const RTS_UI8 *code, const APP_TABLES *tables)
+{
+    app.image = *image;
+    app.tables = *tables;
+    app.code = code;
+    app.context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)code;
+    SysExceptCodeRange(code, image->code.size);
+    IecCycleSetCode(&app.context);
+    RetainExchange(&app.image.kept, image->crc);
+}
+
+void AppBeginProof(void)
+{
+    app.run_since_ms = SysTimeGetMs();
+    if (app.state == AS_RUN)
+        (void)AppCommitSetState(app.image.file, SLOT_STARTED);
+}
+#endif
 
 /* ---- load and unload ---- */
 

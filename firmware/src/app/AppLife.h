@@ -46,6 +46,22 @@ RTS_RESULT AppInitialise(void);
 /* The same for one that has them, after its own code for the end. Cold: also for its retain variables. */
 RTS_RESULT AppReinitialise(bool cold);
 
+#if ONLINE_CHANGE
+/* The records of the tasks of the loaded application, and its imports. */
+const APP_TABLES *AppGetTables(void);
+
+/* A checked image with its code mapped at `code` takes the place of the loaded one, with the same tasks and areas. No task is
+ * in its cycle. */
+void AppExchange(const APP_IMAGE *image, const RTS_UI8 *code, const APP_TABLES *tables);
+
+/* Runs the code at an offset with the context of the application, like an initialisation; false when it failed, with the
+ * exception in *code. */
+bool AppRunInit(RTS_UI32 offset, RTS_UI32 *exception);
+
+/* The loaded application is another one since now: it has to prove itself. */
+void AppBeginProof(void);
+#endif
+
 /* Starts the loaded application, initialised before if it was not yet. ERR_EXCEPTION: that failed. */
 RTS_RESULT AppStart(void);
 

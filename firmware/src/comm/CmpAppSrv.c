@@ -503,11 +503,20 @@ static RTS_RESULT begin(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *block)
     return AppDownloadBegin(block->total, block->crc);
 }
 
+#if ONLINE_CHANGE
+static bool is_change(const DOWNLOAD_BLOCK *block)
+{
+    return (block->flags & DLF_CHANGE) != 0;
+}
+#else
+#define is_change(block) false
+#endif
+
 static RTS_RESULT take_block(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *block, APP_REFUSAL *refusal)
 {
     RTS_RESULT result = ERR_OK;
 
-    if (OperationMay(OPERATION_DOWNLOAD) != ERR_OK)
+    if (OperationMay(is_change(block) ? OPERATION_ONLINE_CHANGE : OPERATION_DOWNLOAD) != ERR_OK)
         return APP_REFUSE(refusal, ERR_OPERATION_DENIED,
                           "The running program forbids it (PlcOperationControlInstance).");
     if (is_anothers(client))
@@ -527,8 +536,13 @@ static RTS_RESULT take_block(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *bl
  * status, also why there was none. */
 static RTS_RESULT install(const DOWNLOAD_BLOCK *block, APP_REFUSAL *refusal)
 {
-    RTS_RESULT result = AppDownloadEnd(refusal);
+    RTS_RESULT result;
 
+#if ONLINE_CHANGE
+    if (is_change(block))
+        return AppDownloadChange(refusal);
+#endif
+    result = AppDownloadEnd(refusal);
     if (result == ERR_OK && (block->flags & DLF_START) != 0)
         (void)AppStartApplication();
     return result;
@@ -567,6 +581,10 @@ static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
 #if APP_UNPACK_SIZE > 0
     if (block.size == 0) /* a question */
         BTagWrite32(reply, TAG_CDL_UNPACKS, APP_UNPACK_SIZE);
+#endif
+#if ONLINE_CHANGE
+    if (block.size == 0)
+        BTagWrite32(reply, TAG_CDL_CHANGES, 1);
 #endif
     if (APP_REFUSAL_TEXT_SIZE > 1 && result != ERR_OK && refusal.text[0] != '\0')
         BTagWriteText(reply, TAG_CDL_REASON, refusal.text, BTagGetRoom(reply) - REASON_OVERHEAD);

@@ -67,6 +67,25 @@ RTS_NOINLINE void IecTaskStopAll(void)
     IecCycleCallOff();
 }
 
+#if ONLINE_CHANGE
+RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange)
+{
+    RTS_RESULT result;
+    bool runs = IecCycleMayRun();
+
+#if BP_MAX > 0
+    if (watcher != NULL && runs)
+        watcher->stop();
+#endif
+    result = IecCycleExchange(exchange);
+#if BP_MAX > 0
+    if (watcher != NULL && runs)
+        watcher->will_start();
+#endif
+    return result;
+}
+#endif
+
 static void run_each_once(RTS_UI32 priority, bool by_event)
 {
     RTS_UI32 i;

@@ -238,6 +238,25 @@ RTS_RESULT RetainSave(bool always)
     return save_copy();
 }
 
+#if ONLINE_CHANGE
+void RetainExchange(const RETAIN_TABLE *table, RTS_UI32 tag)
+{
+    if (!HAS_RETAIN)
+        return;
+    kept.table = table;
+    kept.settled = table->size > 0;
+    kept.saved_valid = false;
+    kept.asked = false;
+    retain.tag = tag;
+    take_copy();
+}
+
+RTS_RESULT RetainSaveExchanged(void)
+{
+    return HAS_RETAIN && kept.settled ? save_copy() : (RTS_RESULT)ERR_OK;
+}
+#endif
+
 void RetainSettle(bool failed)
 {
     if (!HAS_RETAIN || (failed && !is_of_application_before()))

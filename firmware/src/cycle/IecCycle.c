@@ -18,6 +18,7 @@
 #include "SettingValues.h"
 #include "SysAtomic.h"
 #include "SysDebug.h"
+#include "SysLock.h"
 #include "SysTime.h"
 #include "rts_config.h"
 
@@ -319,6 +320,18 @@ static void run_phases_after(TASK *task, RTS_I64 due_ns)
     }
 }
 
+/* True if main has held the tasks after this one was let begin its cycle, and before that showed. */
+#if ONLINE_CHANGE && !RTS_ONE_CORE && BP_HOLDS_TASKS
+static RTS_NOINLINE bool wait_for_turn(TASK *task, RTS_I64 due_ns);
+
+static RTS_INLINE bool is_held(const TASK *task)
+{
+    return SysAtomicLoad(&tasks.running) == TASKS_HELD && SysAtomicLoad(&tasks.not_held) != index_of(task);
+}
+#else
+#define is_held(task) false
+#endif
+
 /* Not inlined, because the compiler then computes the place of the task in the list again for each field. */
 static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
 {
@@ -329,6 +342,12 @@ static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
 
     set_time(task, start_ns - tasks.time_zero);
     guard_begin(&task->guard, start_ns);
+#if ONLINE_CHANGE && !RTS_ONE_CORE && BP_HOLDS_TASKS
+    if (is_held(task)) {
+        guard_end(&task->guard);
+        return wait_for_turn(task, due_ns);
+    }
+#endif
     if (task->has_phases)
         run_phases_before(task);
     if (!SysExceptTry(run_entry, task, &exception))
@@ -470,6 +489,10 @@ static RTS_NOINLINE bool wait_for_turn(TASK *task, RTS_I64 due_ns)
 #define run_if_not_stopped(task, due_ns) false
 #endif
 
+#if ONLINE_CHANGE && !RTS_ONE_CORE
+RTS_STATIC_ASSERT(BP_MAX > 0, set_BP_MAX_or_no_ONLINE_CHANGE_where_tasks_run_beside_main);
+#endif
+
 bool IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 {
     TASK *task = &tasks.list[index];
@@ -480,6 +503,91 @@ bool IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
         return SysAtomicLoad(&tasks.running) == TASKS_RUN ? run_cycle(task, due_ns) : run_if_not_stopped(task, due_ns);
     return SysAtomicLoad(&tasks.running) ? run_cycle(task, due_ns) : false;
 }
+
+/* ---- an online change ---- */
+
+#if ONLINE_CHANGE
+
+/* Tasks that interrupt main have ended when it runs, and so have those that it calls. */
+enum { TASKS_RUN_BESIDE_MAIN = !RTS_ONE_CORE && BP_HOLDS_TASKS };
+
+#if BP_MAX > 0
+#define NO_TASK 0xFFFFFFFFu
+
+static bool hold_all(void)
+{
+    RTS_UI32 since_ms = SysTimeGetMs();
+    bool busy;
+
+    for (;;) {
+        IecCycleHold(NO_TASK);
+        (void)IecTaskGetActivity(&busy);
+        if (!busy && SysAtomicLoad(&tasks.running) != TASKS_RUN) /* a debugger's task that ends releases all */
+            return true;
+        if (SysTimeGetMs() - since_ms > ONLINE_CHANGE_WAIT_MS)
+            break;
+        SysTimePause();
+    }
+    IecCycleRelease();
+    return false;
+}
+#define release_all() IecCycleRelease()
+#else
+#define hold_all() true
+#define release_all() ((void)0)
+#endif
+
+/* On one core tasks only begin later, unless there is something to initialise: that runs like a task, so due cycles are
+ * left out. */
+static bool exchange_all(const CYCLE_EXCHANGE *exchange)
+{
+    RTS_UI32 running = tasks.running;
+    RTS_UI32 lock = TASKS_RUN_BESIDE_MAIN ? 0 : SysLockEnter();
+    bool done = true;
+
+    exchange->begin(exchange->arg);
+    if (!TASKS_RUN_BESIDE_MAIN && exchange->init != NULL)
+        SysAtomicStore(&tasks.running, TASKS_STOP);
+    if (!TASKS_RUN_BESIDE_MAIN)
+        SysLockLeave(lock);
+    if (exchange->init != NULL)
+        done = exchange->init(exchange->arg);
+    if (!TASKS_RUN_BESIDE_MAIN && exchange->init != NULL)
+        SysAtomicStore(&tasks.running, running);
+    return done;
+}
+
+RTS_RESULT IecCycleExchange(const CYCLE_EXCHANGE *exchange)
+{
+    bool done;
+
+    if (TASKS_RUN_BESIDE_MAIN && !hold_all())
+        return ERR_TIMEOUT;
+    done = exchange_all(exchange);
+    IecCycleCallOff();
+    if (TASKS_RUN_BESIDE_MAIN)
+        release_all();
+    return done ? ERR_OK : ERR_FAILED;
+}
+
+void IecCycleSetCode(const IEC_CONTEXT *prototype)
+{
+    RTS_UI32 i;
+    RTS_UI32 area;
+
+    for (i = 0; i < tasks.count; i++) {
+        TASK *task = &tasks.list[i];
+        uintptr_t entry = (uintptr_t)prototype->area[APP_AREA_CODE] + task->record->entry_offset;
+        for (area = 0; area < APP_AREA_COUNT; area++)
+            task->context.area[area] = prototype->area[area];
+        task->context.imports = prototype->imports;
+        task->has_copies = AppImageSetContext(i, &task->context);
+        task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
+    }
+    IecCycleFindPhases();
+}
+
+#endif
 
 /* ---- all tasks ---- */
 

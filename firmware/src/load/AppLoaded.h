@@ -35,6 +35,9 @@ typedef struct {
 #if IO_MAX_CONNECTORS > 0
     CDL_SEGMENT io; /* the I/O configuration, in the code; size 0: none */
 #endif
+#if ONLINE_CHANGE
+    CDL_CHANGE change; /* not checked; size 0 and base 0: it cannot take the place of another one */
+#endif
 #if APP_IMAGE_SIZE > 0
     TASK_IMAGE task_image[APP_MAX_TASKS];
 #endif

@@ -403,10 +403,11 @@ _BLOCK_ALIGN = 16  # flash is written best in whole program units
 @dataclass(frozen=True)
 class Prepared:
     """What a device has said before a download: the `arrived` bytes of this image that it has, and how many bytes of it
-    a packed block may be; 0: it cannot unpack."""
+    a packed block may be; 0: it cannot unpack. `changes`: whether its firmware knows online changes."""
 
     arrived: int
     unpacks: int
+    changes: bool = False
 
 
 def prepare_download(session: Session, image: bytes) -> tuple[Status, Prepared]:
@@ -423,9 +424,8 @@ def _question(image: bytes) -> Request:
 
 
 def _prepared(answer: bintag.Tags) -> Prepared:
-    return Prepared(
-        _arrived(answer), 0 if answer.find(lib.TAG_CDL_UNPACKS) is None else answer.u32(lib.TAG_CDL_UNPACKS)
-    )
+    unpacks = 0 if answer.find(lib.TAG_CDL_UNPACKS) is None else answer.u32(lib.TAG_CDL_UNPACKS)
+    return Prepared(_arrived(answer), unpacks, answer.find(lib.TAG_CDL_CHANGES) is not None)
 
 
 def _position(image: bytes, flags: int, offset: int) -> bintag.Tag:
@@ -446,16 +446,18 @@ def download(
     prepared: Prepared | None = None,
     *,
     start: bool = False,
+    change: bool = False,
 ) -> None:
     """Sends an image; the device checks it and makes it its application, stopped. With `start` the device also starts
-    it, unless its firmware is older than `DLF_START`: the status shows that.
+    it, unless its firmware is older than `DLF_START`: the status shows that. `change`: it takes the place of the one
+    that runs, between two cycles.
 
     Continues an aborted transfer of the same image, also automatically after the channel was lost; `restart`
     begins at the first byte in any case. `progress` is called with the bytes that have arrived. Raises DeviceError with
     the device's reason when it refuses the image; its old application is untouched then. `prepared`: what
     `prepare_download` has just found.
     """
-    transfer = _Transfer(session, image, start, progress)
+    transfer = _Transfer(session, image, start, change, progress)
     tries = 0
     while True:
         arrived = transfer.arrived
@@ -487,10 +489,12 @@ class _Transfer:
     """One image on its way. `arrived` is the number of bytes the device has confirmed; `sent_all`: since the channel
     was opened, all blocks have been sent."""
 
-    def __init__(self, session: Session, image: bytes, start: bool, progress: Callable[[int], None]) -> None:
+    def __init__(
+        self, session: Session, image: bytes, start: bool, change: bool, progress: Callable[[int], None]
+    ) -> None:
         self.arrived = 0
         self.sent_all = False
-        self._flags = lib.DLF_START if start else 0
+        self._flags = lib.DLF_CHANGE if change else lib.DLF_START if start else 0
         self._session = session
         self._image = image
         self._progress = progress
@@ -501,6 +505,8 @@ class _Transfer:
         if prepared is None:
             question = _question(self._image)
             prepared = _prepared(self._session.call(question.group, question.service, question.tags))
+        if self._flags & lib.DLF_CHANGE and not prepared.changes:
+            raise DeviceError("The firmware of this device knows no online change; download the program.", "no-change")
         self._unpacks = prepared.unpacks
         self._take(prepared.arrived)
         return self.arrived
