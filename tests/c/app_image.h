@@ -56,6 +56,7 @@ typedef struct {
     CDL_IMAGE images[2 * APP_MAX_TASKS]; /* what the tasks use of inputs and outputs */
     RTS_UI32 image_count;                /* 0: no blob */
     IO_CONFIG_PLACE io;                  /* size 0: no blob */
+    CDL_CHANGE change;                   /* base 0: no blob */
     const char *info[5];
 } APP_SPEC;
 
@@ -377,6 +378,8 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
         append_blob(image, CDL_BLOB_IMAGES, spec->images, spec->image_count * (RTS_UI32)sizeof(CDL_IMAGE));
     if (spec->io.size != 0)
         append_blob(image, CDL_BLOB_IO, &spec->io, sizeof spec->io);
+    if (spec->change.base != 0)
+        append_blob(image, CDL_BLOB_CHANGE, &spec->change, sizeof spec->change);
     h.blob = end_segment(image, h.blob.offset);
     pad(image, APP_CODE_ALIGN);
     h.code.offset = image->size;
@@ -435,8 +438,8 @@ static inline void build_counter(APP_BYTES *image, RTS_UI32 step)
 
 /* ---- talking to the runtime ---- */
 
-/* Downloads the first `size` bytes of an image in blocks, as if they were all of it. */
-static inline RTS_RESULT download_part(const APP_BYTES *image, RTS_UI32 size, APP_REFUSAL *refusal)
+/* Sends the first `size` bytes of an image in blocks, as if they were all of it. */
+static inline RTS_RESULT send_part(const APP_BYTES *image, RTS_UI32 size)
 {
     enum { BLOCK = 200 };
     RTS_RESULT result = AppDownloadBegin(size, image_crc(image));
@@ -444,6 +447,14 @@ static inline RTS_RESULT download_part(const APP_BYTES *image, RTS_UI32 size, AP
 
     for (done = 0; result == ERR_OK && done < size; done += BLOCK)
         result = AppDownloadWrite(done, image->bytes + done, size - done < BLOCK ? size - done : BLOCK);
+    return result;
+}
+
+/* Downloads the first `size` bytes of an image. */
+static inline RTS_RESULT download_part(const APP_BYTES *image, RTS_UI32 size, APP_REFUSAL *refusal)
+{
+    RTS_RESULT result = send_part(image, size);
+
     return result == ERR_OK ? AppDownloadEnd(refusal) : result;
 }
 

@@ -1,0 +1,297 @@
+/*
+ * test_app_change.c - online changes: power cuts and faults at every flash operation, what is refused, the parts of a step.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A device runs application 1 (proven), whose variables have values by now. Application 2 takes its place while it runs, goes
+ * on, proves itself, is stopped and started again.
+ */
+#include "app_image.h"
+#include "test.h"
+
+enum { NEW_OFFSET = 32, NEW_VALUE = 0x1234 };
+
+static APP_BYTES images[4]; /* [step]; 0 unused */
+static RTS_UI32 cuts;
+
+static void emit_step(APP_SPEC *spec, RTS_UI8 kind, RTS_UI8 area, RTS_UI32 to, RTS_UI32 size)
+{
+    CDL_CHANGE_STEP step = {to, size, 0, kind, area, area, 0};
+
+    emit(spec, (const char *)&step, sizeof step);
+}
+
+/* The counter that counts by `step`, in place of another one; a new variable gets NEW_VALUE. */
+static void spec_change(APP_SPEC *spec, RTS_UI32 step, const APP_BYTES *base)
+{
+    spec_counter(spec, step);
+    while (spec->code_size % 4 != 0)
+        emit_ret(spec);
+    spec->change = (CDL_CHANGE){image_crc(base), CDL_CHANGE_NO_INIT, here(spec), 0};
+    emit_step(spec, CDL_CHANGE_CLEAR, APP_AREA_DATA, NEW_OFFSET, 8);
+    emit_step(spec, CDL_CHANGE_PUT, APP_AREA_DATA, NEW_OFFSET, 2);
+    emit_u32(spec, NEW_VALUE);
+    spec->change.size = here(spec) - spec->change.offset;
+}
+
+static RTS_RESULT change_to(const APP_BYTES *image)
+{
+    APP_REFUSAL refusal;
+    RTS_RESULT result = send_part(image, image->size);
+
+    return result == ERR_OK ? AppDownloadChange(&refusal) : result;
+}
+
+static void prepare(RTS_UI32 program_size, RTS_UI8 erased, RTS_UI32 sector_size)
+{
+    CHECK_EQUAL(SimFlashConfigure(32 * 1024, sector_size, program_size, erased), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(download(&images[1]), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(6000)), ERR_OK);
+    SimStop();
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
+}
+
+static void start_again(void)
+{
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(500)), ERR_OK);
+}
+
+static RTS_RESULT story_result;
+
+static RTS_RESULT try_story(void)
+{
+    RTS_RESULT result = change_to(&images[2]);
+
+    if (result == ERR_OK)
+        result = SimAdvance(ms(8000));
+    if (result == ERR_OK)
+        result = AppStopApplication();
+    return result == ERR_OK ? AppStartApplication() : result;
+}
+
+static void story(void *unused)
+{
+    RTS_UNUSED(unused);
+    story_result = try_story();
+}
+
+static void variables_go_on_in_the_new_code(void)
+{
+    RTS_UI32 counter;
+
+    prepare(8, 0xFF, 512);
+    start_again();
+    counter = read_u32(APP_AREA_DATA, COUNTER_OFFSET);
+    CHECK_EQUAL(change_to(&images[2]), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), counter);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1); /* set by the initialisation of the old one only */
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, NEW_OFFSET), NEW_VALUE);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), counter + 20);
+}
+
+/* One of both runs, whole, with the values that its retain variables had: not older than a save, and never initial ones. */
+static RTS_UI32 check_whole(void)
+{
+    RTS_UI32 step = read_u32(APP_AREA_DATA, STEP_OFFSET);
+    RTS_UI32 retain = read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET);
+    APP_STATUS status;
+
+    AppGetStatus(&status);
+    CHECK_EQUAL(status.state, AS_RUN);
+    CHECK(step == 1 || step == 2);
+    CHECK_EQUAL(status.image_crc, image_crc(&images[step == 2 ? 2 : 1]));
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET), retain);
+    CHECK(retain >= 650);
+    return step;
+}
+
+static void sweep(RTS_UI32 program_size, RTS_UI8 erased, RTS_UI32 sector_size)
+{
+    RTS_UI32 operations;
+    RTS_UI32 mode;
+    RTS_UI32 k;
+
+    prepare(program_size, erased, sector_size);
+    start_again();
+    operations = SimFlashOps();
+    CHECK(SimCall(story, NULL) == ERR_OK);
+    CHECK_EQUAL(story_result, ERR_OK);
+    operations = SimFlashOps() - operations;
+    for (mode = SIM_CUT_BEFORE; mode <= SIM_CUT_TORN; mode++) {
+        RTS_UI32 last = 1;
+        RTS_UI32 changes = 0;
+        for (k = 1; k <= operations; k++, cuts++) {
+            RTS_UI32 step;
+            start_again();
+            SimFlashCut(k, mode);
+            CHECK(SimCall(story, NULL) == SIM_POWER_CUT);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            step = check_whole();
+            changes += step != last;
+            last = step;
+            CHECK_EQUAL(SimFlashViolations(), 0);
+        }
+        CHECK_EQUAL(changes, 1); /* one operation commits */
+        CHECK_EQUAL(last, 2);
+    }
+}
+
+static void every_cut_leaves_the_old_or_the_new_application(void)
+{
+    sweep(1, 0xFF, 512);
+    sweep(8, 0x00, 512);
+    sweep(16, 0xFF, 1024);
+    printf("     %u cuts\n", (unsigned)cuts);
+}
+
+static void a_fault_at_any_operation_leaves_one_of_both_running(void)
+{
+    RTS_UI32 k;
+
+    prepare(8, 0xFF, 512);
+    for (k = 1; k < 60; k++) {
+        RTS_UI32 counter;
+        RTS_RESULT result;
+        start_again();
+        counter = read_u32(APP_AREA_DATA, COUNTER_OFFSET);
+        SimFlashCut(k, SIM_FAULT);
+        result = change_to(&images[2]);
+        CHECK_EQUAL(app_state(), AS_RUN);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), counter);
+        SimFlashCut(0, 0);
+        CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), counter + (result == ERR_OK ? 20u : 10u));
+        CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(check_whole(), (result == ERR_OK ? 2u : 1u));
+    }
+}
+
+static RTS_RESULT try_spec(const APP_SPEC *spec)
+{
+    APP_BYTES image;
+
+    build_image(&image, spec);
+    start_again();
+    return change_to(&image);
+}
+
+static void what_does_not_fit_what_runs_is_refused(void)
+{
+    APP_SPEC good;
+    APP_SPEC spec;
+
+    prepare(8, 0xFF, 512);
+    spec_change(&good, 2, &images[1]);
+    CHECK_EQUAL(try_spec(&good), ERR_OK);
+    spec = good;
+    spec.change.base++;
+    CHECK_EQUAL(try_spec(&spec), ERR_ID_MISMATCH);
+    spec = good;
+    spec.tasks[0].interval_us++;
+    CHECK_EQUAL(try_spec(&spec), ERR_NOT_SUPPORTED);
+    spec = good;
+    add_task(&spec, "Other", KIND_CYCLIC, 10000, 0);
+    CHECK_EQUAL(try_spec(&spec), ERR_NOT_SUPPORTED);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(check_whole(), 1);
+}
+
+static void each_number_of_the_list_is_checked(void)
+{
+    static const RTS_UI32 wrong[] = {0x7FFFFFFC, 0xFFFFFFFC, 0xFFFFFFFF};
+    APP_SPEC good;
+    APP_SPEC spec;
+    CDL_CHANGE_STEP *step;
+    RTS_SIZE i;
+
+    prepare(8, 0xFF, 512);
+    spec_change(&good, 2, &images[1]);
+    for (i = 0; i < RTS_COUNT(wrong); i++) {
+        spec = good;
+        spec.change.offset = wrong[i];
+        CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+        spec = good;
+        spec.change.size = wrong[i];
+        CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+        spec = good;
+        spec.change.init = wrong[i] - 1;
+        CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+        spec = good;
+        step = (CDL_CHANGE_STEP *)(void *)(spec.code + spec.change.offset);
+        step->to = wrong[i];
+        CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+        spec = good;
+        step->size = wrong[i];
+        CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+        spec = good;
+        step->kind = CDL_CHANGE_MOVE;
+        step->from = wrong[i];
+        CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+    }
+    spec = good;
+    step->area = APP_AREA_CODE;
+    CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+    spec = good;
+    spec.change.size -= 4; /* a step ends within its data */
+    CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+    spec = good;
+    step->kind = CDL_CHANGE_MOVE;
+    step->from_area = APP_AREA_CODE;
+    CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(check_whole(), 1);
+}
+
+static void without_a_program_that_runs_there_is_no_change(void)
+{
+    CHECK_EQUAL(SimFlashConfigure(32 * 1024, 512, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(change_to(&images[2]), ERR_INVALID_STATE);
+    CHECK_EQUAL(app_state(), AS_NONE);
+}
+
+/* It goes to the slot of the one before the last, like a download. */
+static void many_changes_in_a_row_go_on(void)
+{
+    APP_BYTES next[2];
+    APP_SPEC spec;
+    RTS_UI32 round;
+    RTS_UI32 counter;
+
+    prepare(8, 0xFF, 512);
+    start_again();
+    next[1] = images[1];
+    for (round = 0; round < 200; round++) {
+        spec_change(&spec, 1 + round % 3, &next[(round + 1) % 2]);
+        build_image(&next[round % 2], &spec);
+        counter = read_u32(APP_AREA_DATA, COUNTER_OFFSET);
+        CHECK_EQUAL(change_to(&next[round % 2]), ERR_OK);
+        CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), counter + 10 * (1 + round % 3));
+    }
+    CHECK_EQUAL(SimFlashViolations(), 0);
+}
+
+int main(void)
+{
+    APP_SPEC spec;
+
+    NEEDS_X86_64;
+    build_counter(&images[1], 1);
+    spec_change(&spec, 2, &images[1]);
+    build_image(&images[2], &spec);
+    RUN(variables_go_on_in_the_new_code);
+    RUN(every_cut_leaves_the_old_or_the_new_application);
+    RUN(a_fault_at_any_operation_leaves_one_of_both_running);
+    RUN(what_does_not_fit_what_runs_is_refused);
+    RUN(each_number_of_the_list_is_checked);
+    RUN(without_a_program_that_runs_there_is_no_change);
+    RUN(many_changes_in_a_row_go_on);
+    return test_result();
+}
