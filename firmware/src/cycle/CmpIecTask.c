@@ -71,15 +71,15 @@ RTS_NOINLINE void IecTaskStopAll(void)
 RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange)
 {
     RTS_RESULT result;
-    bool runs = IecCycleMayRun();
-
 #if BP_MAX > 0
-    if (watcher != NULL && runs)
+    bool watched = watcher != NULL && IecCycleMayRun();
+
+    if (watched)
         watcher->stop();
 #endif
     result = IecCycleExchange(exchange);
 #if BP_MAX > 0
-    if (watcher != NULL && runs)
+    if (watched)
         watcher->will_start();
 #endif
     return result;
