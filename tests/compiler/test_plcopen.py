@@ -198,7 +198,7 @@ def test_a_block_may_extend_one_and_implement_an_interface(tmp_path: Path) -> No
 
 
 def test_a_diagram_that_is_not_read_is_named_and_the_rest_is_checked(tmp_path: Path) -> None:
-    drawn = pou("Drawn", "<CFC><block/></CFC>", variables("outputVars", "q:BOOL"), "functionBlock")
+    drawn = pou("Drawn", "<CFC><vendorElement localId='1'/></CFC>", variables("outputVars", "q:BOOL"), "functionBlock")
     listed = pou("Listed", "<IL><xhtml>\nADD a</xhtml></IL>", "", "functionBlock")
     main = pou("Main", st("d();\nb := d.q;\nb := d.r;"), variables("localVars", "d:Drawn", "b:BOOL"))
     found = errors(tmp_path, project(drawn + listed + main))

@@ -336,7 +336,8 @@ def test_an_export_without_positions_is_executed_in_the_order_of_the_file(tmp_pa
 @pytest.mark.parametrize(
     ("elements", "why"),
     [
-        ((f'<jump label="x" localId="2">{at(0)}{lines("1")}</jump>',), "it has a jump"),
+        ((f'<jump label="a b" localId="2">{at(0)}{lines("1")}</jump>',), "the name of a label is missing"),
+        ((f'<jump label="x" storage="set" localId="2">{at(0)}{lines("1")}</jump>',), 'storage="set" has no'),
         ((coil(2, "a"),), "a part of it is connected to nothing"),
         ((coil(2, "a", "77"),), "a line comes from element 77, which does not exist"),
         ((contact(2, "a", "3"), contact(3, "a", "2"), coil(4, "a", "3")), "it has a loop without a function block"),

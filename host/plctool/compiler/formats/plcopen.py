@@ -24,7 +24,6 @@ from plctool.compiler.formats.xml_tree import Element, XmlError, read_xml
 
 _KEYWORDS = {"function": "FUNCTION", "functionblock": "FUNCTION_BLOCK", "program": "PROGRAM", "interface": "INTERFACE"}
 _MODIFIERS = ("Abstract", "Final", "Internal", "Private", "Protected", "Public")
-_DIAGRAMS = ("FBD", "LD", "SFC", "CFC")
 _NAMESPACE = re.compile(r"plcopen\.org/xml/tc6|iec61131-10", re.IGNORECASE)
 HEAD = 4096  # bytes in which the name space of a project stands
 
@@ -278,14 +277,12 @@ _REFUSED = "the diagram {} cannot be compiled: {}"
 def _translate(written: Element, unit: Unit, body: Body) -> None:
     if written.tag == "ST":
         body.parts += written.every_chunk()
-    elif written.tag in ("FBD", "LD"):
-        Network(written, unit, body).translate()
+    elif written.tag in ("FBD", "LD", "CFC"):
+        Network(written, unit, body, free=written.tag == "CFC").translate()
     elif written.tag == "SFC":
         Chart(written, unit, body).translate()
     elif written.tag == "IL":
         instruction_list.translate(written.every_chunk(), body)
-    elif written.tag in _DIAGRAMS and (written.children or written.text):
-        raise NotTranslatedError(written.at, "only ST, IL, SFC, LD and FBD are read; write or export it as one of them")
 
 
 def plain_text(element: Element) -> list[Chunk]:

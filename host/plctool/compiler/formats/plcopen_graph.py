@@ -1,8 +1,10 @@
-"""PLCopen XML: networks of Function Block Diagram and Ladder Diagram, written as statements.
+"""PLCopen XML: networks of Function Block Diagram, Ladder Diagram and Continuous Function Chart, written as statements.
 
 The order is that of OpenPLC Editor and Beremiz: elements with an execution number first; then coils and output
 variables from top to bottom, each with all that it needs; then the blocks that nothing needed. An export without
-positions (CODESYS, TwinCAT) is taken in the order of the file. A function is computed once, into a variable.
+positions (CODESYS, TwinCAT) is taken in the order of the file. A function is computed once, into a variable. With jumps
+or labels, what is connected is a network, and the networks run from top to bottom. In a chart of CODESYS (CFC) all
+numbers hold: what an element needs of a later one is the value of the cycle before.
 
 What has no such order, or needs a type that is not known here, is refused, never guessed.
 
@@ -21,10 +23,16 @@ from plctool.compiler.formats.xml_tree import Element
 _SIMPLE = re.compile(r"[\w.#%\[\]^$:']+")
 _SAME_ROW = 10  # units of the editor by which elements of one row may differ
 _SINKS = frozenset(("outVariable", "inOutVariable", "coil", "return"))
-_REFUSED = {"jump": "a jump", "label": "a label", "error": "an error block"}
+_WAYS = frozenset(("jump", "label"))
+_EXECUTED = _SINKS | _WAYS | {"block"}
+_RAILS = frozenset(("leftPowerRail", "rightPowerRail"))
+_REFUSED = {"error": "an error block"}
+_CALLS = frozenset(("", "operator", "function", "functionblock", "program"))  # call types of a CFC
+_LABEL = re.compile(r"[^\W\d]\w*")
 _MODIFIERS = {"negated": ("true",), "edge": ("rising", "falling"), "storage": ("set", "reset")}
 _MODIFIED = {
-    "contact": ("negated", "edge"), "coil": ("negated", "edge", "storage"), "return": (),
+    "contact": ("negated", "edge"), "coil": ("negated", "edge", "storage"),
+    "return": (), "jump": ("negated",), "label": (),
     "inVariable": ("negated", "edge"), "outVariable": ("negated", "edge", "storage"),
     "inOutVariable": ("negatedIn", "negatedOut"),
     "inputVariables": ("negated", "edge"), "outputVariables": ("negated", "edge"), "inOutVariables": (),
@@ -36,10 +44,12 @@ _TRIGGERS = {"rising": "R_TRIG", "falling": "F_TRIG"}
 
 
 class Network:
-    """The networks of one body. `inline`: they are one expression, so nothing in them may need a statement."""
+    """The networks of one body. `inline`: they are one expression, so nothing in them may need a statement. `free`: it
+    is a CFC."""
 
-    def __init__(self, element: Element, unit: Unit, body: Body, *, inline: bool = False) -> None:
+    def __init__(self, element: Element, unit: Unit, body: Body, *, inline: bool = False, free: bool = False) -> None:
         self._inline = inline
+        self._free = free
         self._unit = unit
         self._body = body
         self._root = element
@@ -61,6 +71,8 @@ class Network:
         for element in self._order:
             if element.tag in _REFUSED:
                 raise NotTranslatedError(element.at, f"it has {_REFUSED[element.tag]}")
+            if self._free and (element.tag == "vendorElement" or _call_type(element) not in _CALLS):
+                raise NotTranslatedError(element.at, f"it has a {_call_type(element) or 'special element'}")
             _check_modifiers(element)
         for element in self._in_order():
             self._execute(element)
@@ -68,6 +80,9 @@ class Network:
     def expression(self, name: str) -> str:
         """Returns the value that goes to the coil or output variable with this name, or to the only one. Raises
         NotTranslatedError if the value is not one expression."""
+        for element in self._order:
+            if element.tag in _WAYS:
+                self._needs_statement(element, f"a {element.tag}")
         sinks = [e for e in self._order if e.tag in ("coil", "outVariable")]
         chosen = [e for e in sinks if _target(e).casefold() == name.casefold()] or sinks
         if len(chosen) != 1:
@@ -82,23 +97,75 @@ class Network:
         if self._inline:
             raise NotTranslatedError(element.at, f"its condition has {what}; compute it before, in a variable")
 
+    def _number(self, element: Element) -> int:
+        """The execution number, from 1; 0 for none."""
+        text = element.get("executionOrderId")
+        number = int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else -1
+        return number + 1 if self._free else max(number, 0)
+
     def _in_order(self) -> list[Element]:
-        numbered = sorted((e for e in self._order if _number(e) > 0), key=_number)
-        rest = [e for e in self._order if _number(e) <= 0 and (e.tag in _SINKS or e.tag == "block")]
+        ways = [e for e in self._order if e.tag in _WAYS]
+        if all(self._number(e) > 0 for e in ways):
+            return self._ordered(self._order)
+        return [e for network in self._networks() for e in self._ordered(network)]
+
+    def _ordered(self, elements: list[Element]) -> list[Element]:
+        """The elements that are executed, in order: those with numbers, sinks, blocks, jumps."""
+        numbered = sorted((e for e in elements if self._number(e) > 0), key=self._number)
+        rest = [e for e in elements if self._number(e) <= 0 and e.tag in _EXECUTED]
         if len({_position(e) for e in rest}) > 1:
             rest.sort(key=cmp_to_key(_by_position))
             rest.sort(key=lambda e: e.tag == "block")
+        rest.sort(key=lambda e: e.tag == "jump")
         return [*numbered, *rest]
 
+    def _networks(self) -> list[list[Element]]:
+        """The elements that are connected to each other, but for power rails, from top to bottom."""
+        of: dict[str, list[Element]] = {key: [e] for key, e in self._elements.items()}
+        named: dict[str, str] = {}
+        for key, element in self._elements.items():
+            others = [c.get("refLocalId") for c in element.every("connection")]
+            if element.tag in ("connector", "continuation") and element.get("name"):
+                others.append(named.setdefault(element.get("name"), key))
+            for other in others:
+                if other in of and self._elements[other].tag not in _RAILS and of[other] is not of[key]:
+                    of[other] += of[key]
+                    of.update(dict.fromkeys([e.get("localId") for e in of[key]], of[other]))
+        places = {id(e): number for number, e in enumerate(self._order)}
+        networks = list({id(found): sorted(found, key=lambda e: places[id(e)]) for found in of.values()}.values())
+        networks.sort(key=lambda network: places[id(network[0])])
+        executed = [[e for e in network if e.tag in _EXECUTED] for network in networks]
+        if len({_position(e) for network in executed for e in network}) > 1:
+            networks.sort(
+                key=lambda network: min((_position(e) for e in network if e.tag in _EXECUTED), default=(0, 0))
+            )
+        return networks
+
     def _execute(self, element: Element) -> None:
+        self._now = self._number(element) if self._free else 0
         if element.tag == "block":
             self._called(element)
         elif element.tag == "return":
             self._body.line(f"IF {self._power(element)} THEN RETURN; END_IF;", element.at)
+        elif element.tag in _WAYS:
+            self._lead(element)
         elif element.tag == "coil":
             self._assign(element, _target(element), self._power(element))
         elif element.tag in _SINKS and (value := self.point(element.child("connectionPointIn"))) is not None:
             self._assign(element, _target(element), value)
+
+    def _lead(self, element: Element) -> None:
+        """A label or a jump."""
+        name = element.get("label")
+        if not _LABEL.fullmatch(name):
+            raise NotTranslatedError(element.at, f"the name of a label is missing or not a name: {name!r}")
+        if element.tag == "label":
+            self._body.line(f"{name}:", element.at)
+            return
+        value = self.point(element.child("connectionPointIn")) or "TRUE"
+        value = _negated(value) if _is(element, "negated") else value
+        jump = f"JMP {name};"
+        self._body.line(jump if value == "TRUE" else f"IF {value} THEN {jump} END_IF;", element.at)
 
     def _assign(self, element: Element, target: str, value: str) -> None:
         if _is(element, "negatedIn" if element.tag == "inOutVariable" else "negated"):
@@ -154,7 +221,7 @@ class Network:
         """The value that what only passes it on gets."""
         if element.tag == "contact":
             return self._contact(element)
-        if element.tag == "coil":
+        if element.tag in ("coil", "connector"):
             return self._power(element)
         if element.tag == "continuation":
             for other in self._order:
@@ -197,26 +264,28 @@ class Network:
             if block.get("localId") not in self._done and _input(block, "EN") is not None:
                 raise NotTranslatedError(block.at, "its ENO is needed before it is executed")
             value = self._done.get(f"{block.get('localId')}.EN", "TRUE")
-        elif block.get("instanceName"):
-            value = f"{block.get('instanceName')}.{formal}"
+        elif _instance(block):
+            value = f"{_instance(block)}.{formal}"
         else:
-            value = self._done[block.get("localId")]
+            value = self._done.get(block.get("localId"), _result(block))
         return value if output is None else self._modified(output, value)
 
     def _called(self, block: Element, *, wanted: bool = False) -> None:
         """Sees to it that a block is executed before its outputs are read."""
-        key, number = block.get("localId"), _number(block)
+        key, number = block.get("localId"), self._number(block)
         if key in self._done:
             return
         if key in self._busy or 0 < self._now < number:
-            if block.get("instanceName"):
+            if _instance(block):
                 return  # its outputs of the cycle before
+            if self._free and self._is_kept(block):
+                return
             why = "it has a loop without a function block" if key in self._busy else f"number {number} is needed before"
             raise NotTranslatedError(block.at, why)
         named = _named_outputs(block)
         self._busy.add(key)
         before, self._now = self._now, number or self._now
-        if block.get("instanceName"):
+        if _instance(block):
             self._call_instance(block, key)
         elif wanted or named or number or self._may_act(block.get("typeName")):
             self._call_function(block, key)
@@ -224,6 +293,14 @@ class Network:
         self._now = before
         for output, target in named:
             self._body.line(f"{target} := {self._output(block, output.get('formalParameter'))};", output.at)
+
+    def _is_kept(self, block: Element) -> bool:
+        """Whether the result of a function is there in the next cycle. Notes that it is needed then."""
+        own = self._unit.blocks.get(block.get("typeName").casefold())
+        spec = self._types.of_function(block) if own is None else own.get("", "")
+        if spec and self._unit.keeps:
+            self._body.variables[_result(block)] = (spec, block.at)
+        return bool(spec) and self._unit.keeps
 
     def _may_act(self, name: str) -> bool:
         """Whether a function is called even if nothing reads its result."""
@@ -248,9 +325,9 @@ class Network:
         return enable, found
 
     def _call_instance(self, block: Element, key: str) -> None:
-        self._needs_statement(block, f"the function block {block.get('instanceName')}")
+        self._needs_statement(block, f"the function block {_instance(block)}")
         enable, inputs = self._inputs(block, key)
-        call = f"{block.get('instanceName')}({', '.join(f'{n} := {v}' for n, v in inputs)});"
+        call = f"{_instance(block)}({', '.join(f'{n} := {v}' for n, v in inputs)});"
         self._done[key] = ""
         self._body.line(f"IF {enable} THEN {call} END_IF;" if enable else call, block.at)
 
@@ -279,7 +356,7 @@ class Network:
             self._done[key] = "FALSE"
             return
         later = self._reads(block)
-        if not spec and (enable or later + len(named) > 1 or (later and _number(block))):
+        if not spec and (enable or later + len(named) > 1 or (later and self._number(block))):
             needs = self._types.undeclared(block)
             raise NotTranslatedError(block.at, f"the type of the result of {name} is not known", needs)
         if not spec:
@@ -287,7 +364,7 @@ class Network:
             if not later and not named and self._may_act(name):
                 self._body.line(f"{call};", block.at)
             return
-        result = f"_TMP_{name.rpartition('.')[2]}{key}_OUT"
+        result = _result(block)
         self._body.variables[result] = (spec, block.at)
         if enable and name.upper() in COMPARISONS and not _has_output(block, "ENO"):
             call, enable = f"{enable} AND {_operand(call)}", ""  # in a rung, as a contact
@@ -332,6 +409,21 @@ def _parameters(block: Element, which: str) -> list[Element]:
     return [v for part in block.all(which) for v in part.all("variable")]
 
 
+def _result(block: Element) -> str:
+    """The variable with the result of a function."""
+    return f"_TMP_{block.get('typeName').rpartition('.')[2]}{block.get('localId')}_OUT"
+
+
+def _call_type(block: Element) -> str:
+    """What a block of a CFC is; "" if that is not said."""
+    return next((data.text.lower() for data in block.child_data("cfccalltype")), "")
+
+
+def _instance(block: Element) -> str:
+    """The instance that a block calls, or the program; "" for a function."""
+    return block.get("instanceName") or (block.get("typeName") if _call_type(block) == "program" else "")
+
+
 def _named_outputs(block: Element) -> list[tuple[Element, str]]:
     """Those that name the variable they go to."""
     points = [(v, v.child("connectionPointOut", "expression")) for v in _parameters(block, "outputVariables")]
@@ -361,11 +453,6 @@ def _input(block: Element, name: str) -> Element | None:
     """What is connected to an input, and where."""
     found = next((v for v in _parameters(block, "inputVariables") if v.get("formalParameter").upper() == name), None)
     return None if found is None else next(found.every("connection"), None)
-
-
-def _number(element: Element) -> int:
-    text = element.get("executionOrderId")
-    return int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else 0
 
 
 def _position(element: Element) -> tuple[float, float]:

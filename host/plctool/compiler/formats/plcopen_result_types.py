@@ -53,6 +53,7 @@ class ResultTypes:
     def __init__(self, unit: Unit, elements: dict[str, Element]) -> None:
         self._unit = unit
         self._elements = elements
+        self._busy: list[Element] = []
 
     def of_function(self, block: Element, depth: int = 0) -> str:
         """The type of the result of a function of the standard library."""
@@ -63,7 +64,9 @@ class ResultTypes:
             return ""
         inputs = [v for part in block.all("inputVariables") for v in part.all("variable")]
         inputs = [v for v in inputs if v.get("formalParameter").upper() != "EN"]
+        self._busy.append(block)
         given = [self._of_input(v, depth + 1) for v in inputs[name in _CHOOSERS :]]
+        self._busy.pop()
         known = [v for v in given if v is not None]
         if name in _OF_FIRST:
             return self._of_first(name, known)
@@ -156,7 +159,7 @@ class ResultTypes:
             return None
         return self._of_connection(connections[0], depth) if len(connections) == 1 else "BOOL"
 
-    def _of_connection(self, connection: Element, depth: int) -> str | Untyped:
+    def _of_connection(self, connection: Element, depth: int) -> str | Untyped | None:
         element = self._elements.get(connection.get("refLocalId"))
         if element is None:
             return ""
@@ -164,8 +167,12 @@ class ResultTypes:
             return "BOOL"
         if element.tag in ("inVariable", "inOutVariable"):
             return self._of_expression((element.child("expression") or element).text)
+        if element.tag == "connector":
+            return self._of_input(element, depth + 1) if depth <= 100 else ""
         if element.tag != "block":
             return ""
+        if any(busy is element for busy in self._busy):
+            return None  # it feeds itself
         formal, kind = connection.get("formalParameter").casefold(), element.get("typeName")
         if formal == "eno":
             return "BOOL"
