@@ -24,11 +24,11 @@ def diagram(item: Item) -> str:
     left = [*item.of("VAR_INPUT"), *item.of("VAR_IN_OUT")]
     right = [("", item.result)] if item.result else []
     right += [(v.name, v.type) for v in item.of("VAR_OUTPUT")]
-    inner = max([_width(item.name), *(_width(v.name) for v in left), *(_width(name) for name, _ in right)])
-    both = max((_width(v.name) for v in left), default=0) + max((_width(name) for name, _ in right), default=0)
+    inner = max([width_of(item.name), *(width_of(v.name) for v in left), *(width_of(name) for name, _ in right)])
+    both = max((width_of(v.name) for v in left), default=0) + max((width_of(name) for name, _ in right), default=0)
     box = max(inner, both) + 4 * _PAD
-    before = max((_width(_cut(v.type)) for v in left), default=0)
-    after = max((_width(_cut(type_)) for _, type_ in right), default=0)
+    before = max((width_of(_cut(v.type)) for v in left), default=0)
+    after = max((width_of(_cut(type_)) for _, type_ in right), default=0)
     x = before + _WIRE + _PAD
     height = _ROW * (max(len(left), len(right)) + 1) + _PAD
     width = x + box + _WIRE + _PAD + after
@@ -37,7 +37,7 @@ def diagram(item: Item) -> str:
         f'viewBox="0 0 {width:.0f} {height + 2}" role="img" aria-label="{escape(_spoken(item), quote=True)}" '
         'font-family="monospace" font-size="12" fill="currentColor" stroke="none">',
         f'<rect x="{x:.0f}" y="1" width="{box:.0f}" height="{height}" fill="none" stroke="currentColor"/>',
-        _text(x + box / 2, _ROW - 6, item.name, "middle", 'font-weight="bold"'),
+        text_at(x + box / 2, _ROW - 6, item.name, "middle", 'font-weight="bold"'),
     ]
     for row, variable in enumerate(left, 1):
         parts += _input(variable, x, row)
@@ -46,7 +46,8 @@ def diagram(item: Item) -> str:
     return "\n".join([*parts, "</svg>"])
 
 
-def _width(text: str) -> float:
+def width_of(text: str) -> float:
+    """Returns the width of a text, pixels."""
     return len(text) * _CHARACTER
 
 
@@ -60,7 +61,8 @@ def _spoken(item: Item) -> str:
     return "; ".join([item.name, *said])
 
 
-def _text(x: float, y: float, text: str, anchor: str, more: str = "") -> str:
+def text_at(x: float, y: float, text: str, anchor: str, more: str = "") -> str:
+    """Returns a text of a picture."""
     return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" {more}>{escape(text)}</text>'
 
 
@@ -69,8 +71,8 @@ def _input(variable: Variable, x: float, row: int) -> list[str]:
     ends = "" if variable.section == "VAR_INPUT" else ' stroke-dasharray="4 2"'  # an in-out is read and written
     return [
         f'<path d="M{x - _WIRE:.0f} {y:.0f}H{x:.0f}" stroke="currentColor"{ends}/>',
-        _text(x - _WIRE - 4, y + 4, _cut(variable.type), "end", 'opacity="0.7"'),
-        _text(x + _PAD, y + 4, variable.name, "start"),
+        text_at(x - _WIRE - 4, y + 4, _cut(variable.type), "end", 'opacity="0.7"'),
+        text_at(x + _PAD, y + 4, variable.name, "start"),
     ]
 
 
@@ -78,6 +80,6 @@ def _output(name: str, type_: str, x: float, row: int) -> list[str]:
     y = row * _ROW + _ROW / 2
     return [
         f'<path d="M{x:.0f} {y:.0f}H{x + _WIRE:.0f}" stroke="currentColor"/>',
-        _text(x + _WIRE + 4, y + 4, _cut(type_), "start", 'opacity="0.7"'),
-        _text(x - _PAD, y + 4, name, "end"),
+        text_at(x + _WIRE + 4, y + 4, _cut(type_), "start", 'opacity="0.7"'),
+        text_at(x - _PAD, y + 4, name, "end"),
     ]

@@ -25,7 +25,7 @@ _SAME_ROW = 10  # units of the editor by which elements of one row may differ
 _SINKS = frozenset(("outVariable", "inOutVariable", "coil", "return"))
 _WAYS = frozenset(("jump", "label"))
 _EXECUTED = _SINKS | _WAYS | {"block"}
-_RAILS = frozenset(("leftPowerRail", "rightPowerRail"))
+RAILS = frozenset(("leftPowerRail", "rightPowerRail"))
 _REFUSED = {"error": "an error block"}
 _CALLS = frozenset(("", "operator", "function", "functionblock", "program"))  # call types of a CFC
 _LABEL = re.compile(r"[^\W\d]\w*")
@@ -107,7 +107,7 @@ class Network:
         ways = [e for e in self._order if e.tag in _WAYS]
         if all(self._number(e) > 0 for e in ways):
             return self._ordered(self._order)
-        return [e for network in self._networks() for e in self._ordered(network)]
+        return [e for network in networks(self._order) for e in self._ordered(network)]
 
     def _ordered(self, elements: list[Element]) -> list[Element]:
         """The elements that are executed, in order: those with numbers, sinks, blocks, jumps."""
@@ -118,28 +118,6 @@ class Network:
             rest.sort(key=lambda e: e.tag == "block")
         rest.sort(key=lambda e: e.tag == "jump")
         return [*numbered, *rest]
-
-    def _networks(self) -> list[list[Element]]:
-        """The elements that are connected to each other, but for power rails, from top to bottom."""
-        of: dict[str, list[Element]] = {key: [e] for key, e in self._elements.items()}
-        named: dict[str, str] = {}
-        for key, element in self._elements.items():
-            others = [c.get("refLocalId") for c in element.every("connection")]
-            if element.tag in ("connector", "continuation") and element.get("name"):
-                others.append(named.setdefault(element.get("name"), key))
-            for other in others:
-                if other in of and self._elements[other].tag not in _RAILS and of[other] is not of[key]:
-                    of[other] += of[key]
-                    of.update(dict.fromkeys([e.get("localId") for e in of[key]], of[other]))
-        places = {id(e): number for number, e in enumerate(self._order)}
-        networks = list({id(found): sorted(found, key=lambda e: places[id(e)]) for found in of.values()}.values())
-        networks.sort(key=lambda network: places[id(network[0])])
-        executed = [[e for e in network if e.tag in _EXECUTED] for network in networks]
-        if len({_position(e) for network in executed for e in network}) > 1:
-            networks.sort(
-                key=lambda network: min((_position(e) for e in network if e.tag in _EXECUTED), default=(0, 0))
-            )
-        return networks
 
     def _execute(self, element: Element) -> None:
         self._now = self._number(element) if self._free else 0
@@ -398,6 +376,31 @@ class Network:
                 elif passes:
                     count = 2  # there are two ways to it
         return count
+
+
+def networks(order: list[Element]) -> list[list[Element]]:
+    """Returns the elements that are connected to each other, but for power rails, from top to bottom."""
+    elements = {e.get("localId"): e for e in order}
+    of: dict[str, list[Element]] = {key: [e] for key, e in elements.items()}
+    named: dict[str, str] = {}
+    for key, element in elements.items():
+        others = [c.get("refLocalId") for c in element.every("connection")]
+        if element.tag in ("connector", "continuation") and element.get("name"):
+            others.append(named.setdefault(element.get("name"), key))
+        for other in others:
+            if (
+                RAILS.isdisjoint((element.tag, elements.get(other, element).tag))
+                and of.get(other, of[key]) is not of[key]
+            ):
+                of[other] += of[key]
+                of.update(dict.fromkeys([e.get("localId") for e in of[key]], of[other]))
+    places = {id(e): number for number, e in enumerate(order)}
+    found = list({id(network): sorted(network, key=lambda e: places[id(e)]) for network in of.values()}.values())
+    found.sort(key=lambda network: places[id(network[0])])
+    executed = [[_position(e) for e in network if e.tag in _EXECUTED] for network in found]
+    if len({position for network in executed for position in network}) > 1:
+        found.sort(key=lambda network: min((_position(e) for e in network if e.tag in _EXECUTED), default=(0, 0)))
+    return found
 
 
 def _target(sink: Element) -> str:
