@@ -10,6 +10,7 @@ from plctool.errors import DeviceError
 
 if TYPE_CHECKING:
     from plctool.controller import Controller, ExceptionInfo, PlcStatus
+    from plctool.debug.alarms import Alarm
     from plctool.link.services import LogEntry
 
 Document = dict[str, Any]
@@ -38,6 +39,24 @@ def status_document(status: PlcStatus) -> Document:
 def exception_document(exception: ExceptionInfo) -> Document:
     """For machines."""
     return {**vars(exception), "calls": [vars(call) for call in exception.calls]}
+
+
+def alarm_document(alarm: Alarm) -> Document:
+    """For machines. `since`, `age_s`: None if unknown."""
+    return {
+        "name": alarm.name,
+        "state": alarm.state,
+        "class": alarm.class_name,
+        "priority": alarm.priority,
+        "text": alarm.text,
+        "since": None if alarm.since is None else alarm.since.isoformat(" ", "milliseconds"),
+        "age_s": None if alarm.age_s is None else round(alarm.age_s, 3),
+    }
+
+
+def alarms(plc: Controller, *, all: bool = False) -> Document:
+    """The alarms that are active or wait for an acknowledgement, or all."""
+    return {"alarms": [alarm_document(alarm) for alarm in plc.alarms(all=all)]}
 
 
 def tasks(plc: Controller) -> Document:

@@ -15,11 +15,13 @@ VAR
     n : DINT; tanks : ARRAY[1..2] OF Tank; lamp : BOOL; mode : Mode := Automatic; text : STRING := '<b>bold</b>';
     alarms : ARRAY[1..3] OF BOOL := [FALSE, TRUE, FALSE]; manual : REAL := 10.0; wanted : INT := 50; hidden : INT := 1;
     start_now : BOOL; starts : DINT; edge : R_TRIG; auto : BOOL; recipe : INT;
+    fire : ALARM := (Text := '<b>Fire</b>');
 END_VAR
 n := n + 1;
 edge(CLK := start_now);
 IF edge.Q THEN starts := starts + 1; END_IF
 lamp := auto;
+fire(Condition := auto);
 END_PROGRAM
 CONFIGURATION Config RESOURCE Res ON PLC
     TASK Fast(INTERVAL := T#10ms, PRIORITY := 1);
@@ -99,8 +101,26 @@ places = [
     { variable = "Main.text", x = 25, y = 50 },
     { variable = "Main.lamp", x = 75, y = 50, kind = "lamp" },
 ]
+
+[[element]]
+kind = "alarms"
+text = "All alarms"
 """
-KINDS = ("value", "bar", "lamp", "press", "toggle", "set", "slider", "setpoint", "choice", "trend", "list", "picture")
+KINDS = (
+    "value",
+    "bar",
+    "lamp",
+    "press",
+    "toggle",
+    "set",
+    "slider",
+    "setpoint",
+    "choice",
+    "trend",
+    "list",
+    "picture",
+    "alarms",
+)
 """A name for each element, in this order."""
 HEAD = 'title = "Plant <b>1</b>"\noperate = {operate}\n'
 PICTURE = (

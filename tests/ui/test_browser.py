@@ -171,9 +171,14 @@ def test_an_exception_is_shown_in_its_source(shown: Shown) -> None:
     shown.eventually(lambda: shown.by_id("state").text == "Running")
 
 
-@pytest.mark.parametrize("view", ["tasks", "log", "io"])
+@pytest.mark.parametrize("view", ["tasks", "log", "alarms", "io"])
 def test_each_view_shows_what_it_has(shown: Shown, view: str) -> None:
-    words = {"tasks": "Fast", "log": "Application", "io": "The program has no inputs and outputs but memory."}
+    words = {
+        "tasks": "Fast",
+        "log": "Application",
+        "alarms": "The program has no instances of ALARM",
+        "io": "The program has no inputs and outputs but memory.",
+    }
     shown.by_id(f"tab-{view}").click()
     shown.eventually(lambda: words[view] in shown.by_id(view).text)
 
@@ -182,7 +187,7 @@ def test_nothing_is_wider_than_a_phone(shown: Shown) -> None:
     phone = {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
     shown.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
     try:
-        for view in ("tasks", "log", "io", "variables"):
+        for view in ("tasks", "log", "alarms", "io", "variables"):
             shown.by_id(f"tab-{view}").click()
             shown.eventually(lambda: shown.driver.execute_script("return document.documentElement.scrollWidth <= 360"))
     finally:

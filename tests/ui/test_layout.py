@@ -51,7 +51,7 @@ def test_each_kind_of_element_is_read(folder: Path, table: SymbolTable) -> None:
     assert (value["variable"], value["unit"], value["decimals"]) == ("Main.tanks[1].level", "%", 1)
     assert value["colours"] == ({"condition": "above", "value": 40, "colour": "red"},)
     assert document["elements"][KINDS.index("choice")]["choices"] == ("Off", "Automatic", "Manual")
-    assert [element.operates for element in page.elements] == [False] * 3 + [True] * 6 + [False] * 3
+    assert [element.operates for element in page.elements] == [False] * 3 + [True] * 6 + [False] * 3 + [True]
 
 
 def test_an_array_in_a_row_stands_for_its_elements(folder: Path, table: SymbolTable) -> None:

@@ -66,6 +66,20 @@ def test_an_element_writes_its_variable(operator: Browser, kind: str, text: str,
     operator.until(lambda b: b.values[name][0] == value)
 
 
+def test_alarms_of_the_page_are_shown_and_acknowledged(operator: Browser) -> None:
+    operator.ask("show", names=NAMES, views=["alarms"])
+    assert operate(operator, "toggle", "TRUE") == ""
+    operator.until(lambda b: b.topics.get("alarms"))
+    (alarm,) = operator.topics["alarms"]
+    assert (alarm["name"], alarm["state"], alarm["text"]) == ("Main.fire", "UNACKNOWLEDGED", "<b>Fire</b>")
+    assert alarm["since"]
+    assert "no alarm Main.auto" in operate(operator, "alarms", "Main.auto")
+    assert operate(operator, "alarms", "Main.fire") == ""
+    operator.until(lambda b: b.topics["alarms"][0]["state"] == "ACKNOWLEDGED")
+    assert operate(operator, "toggle", "FALSE") == ""
+    operator.until(lambda b: b.topics["alarms"] == [])
+
+
 @pytest.mark.parametrize("kind", ["value", "bar", "lamp", "trend", "list", "picture"])
 def test_an_element_that_only_shows_writes_nothing(operator: Browser, kind: str) -> None:
     assert operate(operator, kind, "1") == "This element only shows; page.toml does not let it operate."
@@ -110,6 +124,8 @@ def test_an_element_that_does_not_exist_is_refused(operator: Browser, number: ob
         ("search", {"text": "hidden"}),
         ("show", {"names": ["Main.hidden"], "views": []}),
         ("show", {"names": [], "views": ["log"]}),
+        ("show", {"names": [], "views": ["alarms", "log"]}),
+        ("acknowledge", {"name": "Main.fire"}),
     ],
 )
 def test_what_the_page_does_not_lay_out_is_refused(operator: Browser, verb: str, fields: dict[str, object]) -> None:

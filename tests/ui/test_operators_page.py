@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from chromium import chromium, needs_chromium
-from conftest import Page
+from conftest import Browser, Page
 from operators import KINDS, make_folder
 from selenium import webdriver
 from selenium.webdriver.common.action_chains import ActionChains
@@ -173,6 +173,16 @@ def test_a_list_shows_only_what_is_true(shown: Shown) -> None:
     assert not shown.part("list", ".none").is_displayed()
 
 
+def test_an_alarm_is_shown_and_acknowledged(shown: Shown) -> None:
+    assert shown.text("alarms", "h2") == "All alarms"
+    shown.part("toggle", "button").click()
+    eventually(lambda: "<b>Fire</b>\nactive, new" in shown.text("alarms", "ul"))
+    shown.part("alarms", "button").click()
+    eventually(lambda: shown.text("alarms", "ul") == "<b>Fire</b>\nactive")
+    shown.part("toggle", "button").click()
+    eventually(lambda: shown.text("alarms", ".none") == "None")
+
+
 def test_a_picture_has_its_values_at_their_places(shown: Shown) -> None:
     eventually(lambda: shown.run("return arguments[0].naturalWidth", shown.part("picture", "img")) > 0)
     middle = """
@@ -207,6 +217,22 @@ def test_a_page_that_only_views_has_no_controls_to_use(driver: webdriver.Chrome,
         controls = shown.driver.find_elements(By.CSS_SELECTOR, "main button, main input, main select")
         assert len(controls) >= 6
         assert not [control for control in controls if control.is_enabled()]
+    driver.get("about:blank")
+    assert page.end() == 0
+
+
+def test_the_page_of_all_variables_has_a_view_of_alarms(driver: webdriver.Chrome, plant: Path) -> None:
+    page = Page(plant, "--sim", "plant.cdl")
+    browser = Browser(page)
+    driver.get(page.url)
+    eventually(lambda: driver.find_element(By.ID, "state").text == "Running")
+    driver.find_element(By.ID, "tab-alarms").click()
+    eventually(lambda: "No alarms." in driver.find_element(By.ID, "alarms").text)
+    with browser.socket:
+        browser.ask("write", name="Main.auto", text="TRUE")
+    eventually(lambda: "Main.fire" in driver.find_element(By.ID, "alarms").text)
+    driver.find_element(By.CSS_SELECTOR, "#alarms button").click()
+    eventually(lambda: "active error" in driver.find_element(By.ID, "alarms").text)
     driver.get("about:blank")
     assert page.end() == 0
 

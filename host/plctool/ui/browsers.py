@@ -151,7 +151,7 @@ class Browser:
             raise UsageError("Only an operators' page has elements; start 'plctool ui' with --page.", "bad-message")
         return await self._do(lambda plc: _OPERATIONS[request.verb](plc, **fields))
 
-    async def _do(self, job: Callable[[Controller], None]) -> None:
+    async def _do(self, job: Callable[[Controller], object]) -> None:
         await asyncio.wrap_future(self._hub.live.do(job))
         self._hub.changed()  # and what it has changed is read at once
 
@@ -160,9 +160,10 @@ class Browser:
         fields = request.fields
         if request.verb == "operate":
             return await self._operate(page, fields["element"], fields["text"])
-        if request.verb != "show" or fields["views"] or not page.names.issuperset(fields["names"]):
+        shows = request.verb == "show" and page.views.issuperset(fields["views"])
+        if not shows or not page.names.issuperset(fields["names"]):
             raise UsageError(ONLY_SHOWS, "not-operated")
-        return self._show(set(fields["names"]), set())
+        return self._show(set(fields["names"]), set(fields["views"]))
 
     async def _operate(self, page: OperatorPage, element: int, text: str) -> None:
         if page.holds(element, text):
@@ -199,11 +200,12 @@ def _force(plc: Controller, name: str, text: str) -> None:
     plc.force({name: plc.symbols().resolve(name).parse(text)})
 
 
-_OPERATIONS: dict[str, Callable[..., None]] = {
+_OPERATIONS: dict[str, Callable[..., object]] = {
     "write": _write,
     "force": _force,
     "unforce": lambda plc, name: plc.unforce([name]),
     "unforce_all": lambda plc: plc.unforce(),
+    "acknowledge": lambda plc, name: plc.acknowledge([name]),
     "start": lambda plc: plc.start(),
     "stop": lambda plc: plc.stop(),
     "reset": lambda plc: plc.reset("warm"),

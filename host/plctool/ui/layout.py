@@ -27,6 +27,7 @@ from plctool.files import Pos, check_inside, read_regular, read_utf8
 from plctool.io.tables import Table, each
 from plctool.ui.messages import MAX_TEXT
 
+ALARMS = "alarms"  # the kind of element, and the view that it shows
 COLOURS = ("green", "red", "yellow", "blue", "grey")
 PICTURES = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".svg": "image/svg+xml"}
 MAX_ELEMENTS = 100
@@ -144,7 +145,7 @@ class _Reader:
         if kind is None:
             list(table.items())  # what else the table may have depends on its kind
             return None
-        wide = kind in ("trend", "list", "picture")
+        wide = kind in ("trend", "list", "picture", ALARMS)
         width = table.number("width", 1, self._columns, min(_WIDE if wide else 1, self._columns))
         found: dict[str, Any] = _KINDS[kind](self, table)
         text = _words_of(table, "text") or ""
@@ -188,6 +189,9 @@ class _Reader:
 
     def _list(self, table: Table) -> dict[str, Any]:
         return {"only_true": table.flag("only_true"), "items": _several(table, "rows", _row)}
+
+    def _alarms(self, table: Table) -> dict[str, Any]:
+        return {"items": (), **self._right(table)}
 
     def _picture(self, table: Table) -> dict[str, Any]:
         name = table.text("file", required="plant.svg")
@@ -240,6 +244,7 @@ _KINDS: dict[str, Callable[[_Reader, Table], dict[str, Any]]] = {
     "trend": _Reader._trend,
     "list": _Reader._list,
     "picture": _Reader._picture,
+    ALARMS: _Reader._alarms,
 }
 
 

@@ -12,11 +12,12 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 from plctool.controller import Controller
-from plctool.controller_documents import Document, log, program_document, status_document, tasks
+from plctool.controller_documents import Document, alarms, log, program_document, status_document, tasks
 from plctool.debug.symbols import SymbolTable
 from plctool.debug.variables import Symbol
 from plctool.device import Plc
@@ -32,6 +33,7 @@ RETRY = 1.0  # until a lost controller is looked for again [s]
 SYMBOLS_RETRY = 5.0  # until symbols are looked for again [s]: it may take a file from the controller
 LOG_SHOWN = 300  # newest entries
 _FOREVER = 3600.0
+_STEADY = timedelta(seconds=2)  # between two readings of the same time
 
 Publish = Callable[[str, Any], None]
 Job = Callable[[Controller], Any]
@@ -80,6 +82,7 @@ class Live:
         self._due = _Due()
         self._table: SymbolTable | None = None
         self._known: dict[str, Symbol | str] = {}  # what was resolved in this table, or why not
+        self._since: dict[str, datetime] = {}  # of alarms
         self._program: tuple[str | None, Document | None] = (None, None)  # by CRC
 
     # ---- for other threads ----
@@ -238,6 +241,7 @@ class Live:
         views: dict[str, Callable[[], Any]] = {
             "tasks": lambda: tasks(plc)["tasks"],
             "log": lambda: log(plc)["entries"][-LOG_SHOWN:],
+            "alarms": lambda: self._alarms(plc),
             "io": lambda: self._io(plc),
         }
         for view in wanted.views & set(views):
@@ -249,6 +253,22 @@ class Live:
         with suppress(UsageError, DeviceError):
             return {"name": plc.symbols().project, "version": ""}
         return None
+
+    def _alarms(self, plc: Controller) -> list[Document]:
+        """The alarms, each with a time of day: that of this machine, if the program does not know any."""
+        found: list[Document] = alarms(plc)["alarms"]
+        for alarm in found:
+            age = alarm.pop("age_s")
+            if age is not None:
+                alarm["since"] = self._steady(alarm["name"], datetime.now() - timedelta(seconds=age))
+        return found
+
+    def _steady(self, name: str, at: datetime) -> str:
+        """The time at which an alarm came into its state, the same in each reading though these are not as exact."""
+        known = self._since.get(name)
+        if known is None or abs(known - at) > _STEADY:
+            self._since[name] = known = at
+        return known.isoformat(" ", "seconds")
 
     def _io(self, plc: Controller) -> Document:
         """The devices of a controller, and the channels that the symbols name."""
@@ -315,5 +335,5 @@ def _or_message(read: Callable[[], Any]) -> Any:
     """What was read, or why not: a device may be built without it."""
     try:
         return read()
-    except DeviceError as error:
+    except (DeviceError, UsageError) as error:
         return {"message": error.message}

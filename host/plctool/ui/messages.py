@@ -14,7 +14,7 @@ from plctool.errors import UsageError
 MAX_MESSAGE = 64 << 10  # bytes
 MAX_NAMES = 400  # variables that a browser shows at once
 MAX_TEXT = 1000  # characters of a name, a value or a search
-VIEWS = ("tasks", "log", "io")
+VIEWS = ("tasks", "log", "alarms", "io")
 _LAST_START = 1 << 31
 
 _FIELDS: dict[str, tuple[str, ...]] = {
@@ -28,6 +28,7 @@ _FIELDS: dict[str, tuple[str, ...]] = {
     "start": (),
     "stop": (),
     "reset": (),
+    "acknowledge": ("name",),
     "operate": ("element", "text"),
 }
 

@@ -12,13 +12,14 @@ from itertools import islice
 from typing import Any
 
 from plctool.controller import Controller
+from plctool.debug.alarms import alarms_in
 from plctool.debug.symbols import SymbolTable
 from plctool.debug.variables import Symbol
 from plctool.errors import UsageError
 from plctool.files import Pos
 from plctool.iec.types import BOOL, ArrayType
 from plctool.io.mistakes import Mistake
-from plctool.ui.layout import MAX_TRENDS, Element, Item, Layout, Picture
+from plctool.ui.layout import ALARMS, MAX_TRENDS, Element, Item, Layout, Picture
 from plctool.ui.live import shown_symbol
 from plctool.ui.messages import MAX_NAMES
 from plctool.ui.variables import choices_of, is_number
@@ -41,6 +42,11 @@ class OperatorPage:
         """All variables that are shown."""
         return frozenset(item.variable for element in self.elements for item in element.items)
 
+    @property
+    def views(self) -> frozenset[str]:
+        """The views that are shown: that of the alarms."""
+        return frozenset(element.kind for element in self.elements if element.kind == ALARMS)
+
     def picture(self, number: int) -> Picture | None:
         """Returns the picture of an element."""
         return self.elements[number].picture if number < len(self.elements) else None
@@ -60,8 +66,12 @@ class OperatorPage:
     # ---- operation ----
 
     def operate(self, plc: Controller, number: int, text: str) -> None:
-        """Writes what the operator has chosen. Raises UsageError for what the page does not let operate."""
+        """Writes what the operator has chosen, or acknowledges the alarm of this name. Raises UsageError for what the
+        page does not let operate."""
         element = self._operated(number)
+        if element.kind == ALARMS:
+            plc.acknowledge([text])
+            return
         name = element.items[0].variable
         symbol = plc.symbols().resolve(name)
         value = symbol.parse(text)
@@ -122,6 +132,8 @@ class _Binder:
 
     def bound(self, number: int, element: Element) -> Element:
         """Returns the element with the arrays of its rows as their elements."""
+        if element.kind == ALARMS and not alarms_in(self._table):
+            self.mistakes.append(Mistake(element.pos, "the program has no alarms: declare instances of ALARM"))
         items: list[Item] = []
         for item in element.items:
             for one in self._expanded(element, item):

@@ -14,11 +14,12 @@ from plctool.cli.connections import connect
 from plctool.cli.documents import Document
 from plctool.cli.output import EXIT_OK
 from plctool.cli.parser import Parser
+from plctool.controller_documents import alarms
 from plctool.errors import DeviceError
 from plctool.printable import one_line
 
 if TYPE_CHECKING:
-    from plctool.debug.alarms import Alarm, AlarmEvent
+    from plctool.debug.alarms import AlarmEvent
     from plctool.device import Plc
 
 _TAKEN_S = 5.0  # longest wait for the program to take an acknowledgement
@@ -50,8 +51,8 @@ def _alarms(args: argparse.Namespace) -> int:
             return output.show(args, {"events": events}, lambda d: "\n".join(map(_event_text, d["events"])) or "none")
         if args.ack:
             return output.show(args, _acknowledge(plc, args.ack), _acknowledged_text)
-        alarms = [_alarm(alarm) for alarm in plc.alarms(all=args.all)]
-    return output.show(args, {"alarms": alarms}, _alarms_text)
+        document = alarms(plc, all=args.all)
+    return output.show(args, document, _alarms_text)
 
 
 def _acknowledge(plc: Plc, names: list[str]) -> Document:
@@ -88,18 +89,6 @@ def _follow(args: argparse.Namespace, plc: Plc) -> int:
             seen = history.count
             time.sleep(args.interval)
     return EXIT_OK
-
-
-def _alarm(alarm: Alarm) -> dict[str, Any]:
-    return {
-        "name": alarm.name,
-        "state": alarm.state,
-        "class": alarm.class_name,
-        "priority": alarm.priority,
-        "text": alarm.text,
-        "since": None if alarm.since is None else alarm.since.isoformat(" ", "milliseconds"),
-        "age_s": None if alarm.age_s is None else round(alarm.age_s, 3),
-    }
 
 
 def _alarms_text(document: Document) -> str:

@@ -1,17 +1,18 @@
-// The elements of an operators' page. Each is {node, update(values)}; `values` has [text, forced, number, error] by name.
+// The elements of an operators' page. Each is {node, update(values)}, that of alarms also has showAlarms(alarms); `values` has [text, forced, number, error] by name.
 
 import { element, setText } from "./dom.js";
 import { Plot } from "./plot.js";
+import { alarmButton, alarmState } from "./views.js";
 
 const UNQUOTED = /^[A-Za-z0-9_]+#(?=[A-Za-z_])/; // the type before the name of an enumeration's value
 const LEAST_PRESS_MS = 300; // so that a slow task sees a short press
 const DRAG_MS = 100; // between two values of a slider that is moved
 
-const CONTROLS = ["button", "slider", "setpoint"];
-const SEVERAL = ["trend", "list", "picture"];
+const CONTROLS = ["button", "slider", "setpoint", "alarms"];
+const SEVERAL = ["trend", "list", "picture", "alarms"];
 const MAKE = {
   value: makeValue, bar: makeBar, lamp: makeLamp, button: makeButton, slider: makeSlider, setpoint: makeSetpoint,
-  trend: makeTrend, list: makeList, picture: makePicture,
+  trend: makeTrend, list: makeList, picture: makePicture, alarms: makeAlarms,
 };
 
 // Returns an element. `operate(number, text)` returns a promise; its error is a sentence for the operator.
@@ -26,14 +27,14 @@ export function makeElement(description, number, operate) {
   const error = element("p", "error");
   error.setAttribute("role", "alert");
   const send = (text) => operate(number, text).then(() => setText(error, ""), (reason) => setText(error, reason.message));
-  const { content, update } = MAKE[description.kind]({ ...description, number }, send);
+  const { content, update, showAlarms } = MAKE[description.kind]({ ...description, number }, send);
   node.append(...content);
   if (CONTROLS.includes(description.kind)) node.append(error);
   for (const control of node.querySelectorAll("button, input, select")) {
     control.disabled = !description.operates;
     if (control.tagName !== "BUTTON") control.setAttribute("aria-label", title.textContent);
   }
-  return { node, update };
+  return { node, update, showAlarms };
 }
 
 // ---- values ----
@@ -261,6 +262,25 @@ function makeList({ items, only_true: onlyTrue }) {
     empty.hidden = rows.some((row) => !row.node.hidden);
   };
   return { content: [element("ul", "rows-of", ...rows.map((row) => row.node)), empty], update };
+}
+
+// The alarms that are active or wait, with a button for each that waits.
+function makeAlarms({ operates }, send) {
+  const list = element("ul", "rows-of");
+  const empty = element("p", "none", "–");
+  const row = (alarm) => {
+    const node = element("li", "", element("span", "label", alarm.text || alarm.name), element("span", "state-of", alarmState(alarm.state)));
+    node.title = alarm.name;
+    paint(node, alarm.priority === 1 ? "red" : alarm.priority === 2 ? "yellow" : "blue");
+    if (operates) node.append(alarmButton(alarm, send));
+    return node;
+  };
+  const showAlarms = (alarms) => {
+    list.replaceChildren(...(alarms.message ? [] : alarms.map(row)));
+    empty.hidden = list.childElementCount > 0;
+    setText(empty, alarms.message || "None");
+  };
+  return { content: [list, empty], update: () => {}, showAlarms };
 }
 
 function makePicture({ items, text, number }) {

@@ -5,9 +5,9 @@ import { AskDialog, EditDialog } from "./dialogs.js";
 import { byId, element, setText } from "./dom.js";
 import { MAX_PLOTTED, Plot } from "./plot.js";
 import { Tree } from "./tree.js";
-import { exceptionView, ioView, logView, tasksView } from "./views.js";
+import { alarmsView, exceptionView, ioView, logView, tasksView } from "./views.js";
 
-const VIEWS = ["variables", "tasks", "log", "io"];
+const VIEWS = ["variables", "tasks", "log", "alarms", "io"];
 const SEARCH_MS = 150;
 const STATES = { run: "Running", stop: "Stopped", exception: "Exception", none: "No program", "stop on breakpoint": "Halted" };
 
@@ -34,6 +34,7 @@ function onNews(topic, content) {
     link: showLink, status: showStatus, symbols: showSymbols, reading: showReading, values: showValues,
     tasks: (tasks) => fill("tasks", tasksView(tasks)),
     log: (entries) => fill("log", logView(entries)),
+    alarms: (alarms) => fill("alarms", alarmsView(alarms, (name) => connection.ask("acknowledge", { name }))),
     io: showIo,
   };
   takes[topic]?.(content);

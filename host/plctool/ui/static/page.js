@@ -8,6 +8,7 @@ const STATES = { run: "Running", stop: "Stopped", exception: "Exception", none: 
 
 let elements = [];
 let names = [];
+let views = [];
 let link = { connected: false };
 let state = "";
 let asked = "";
@@ -15,7 +16,7 @@ let asked = "";
 const connection = new Connection(onNews, onConnection);
 
 function onNews(topic, content) {
-  const takes = { page: showPage, link: showLink, status: showStatus, symbols: showSymbols, reading: showReading, values: showValues };
+  const takes = { page: showPage, link: showLink, status: showStatus, symbols: showSymbols, reading: showReading, values: showValues, alarms: showAlarms };
   takes[topic]?.(content);
 }
 
@@ -34,6 +35,7 @@ function showPage(page) {
   byId("elements").style.setProperty("--columns", page.columns);
   elements = page.elements.map((description, number) => makeElement(description, number, operate));
   byId("elements").replaceChildren(...elements.map((one) => one.node));
+  views = page.elements.some((one) => one.kind === "alarms") ? ["alarms"] : [];
   names = [...new Set(page.elements.flatMap((one) => one.items.map((item) => item.variable)))];
   show();
 }
@@ -79,11 +81,15 @@ function showValues(values) {
   for (const one of elements) one.update(values);
 }
 
+function showAlarms(alarms) {
+  for (const one of elements) one.showAlarms?.(alarms);
+}
+
 // ---- what is asked for ----
 
 // Tells plctool which values are seen now.
 function show() {
-  const wanted = { names: document.hidden ? [] : names, views: [] };
+  const wanted = document.hidden ? { names: [], views: [] } : { names, views };
   const text = JSON.stringify(wanted);
   if (text === asked) return;
   asked = text;

@@ -39,6 +39,29 @@ export function logView(entries) {
   return [table(["Time", "Kind", "Component", "Message"], rows)];
 }
 
+const WORDS = { UNACKNOWLEDGED: "active, new", ACKNOWLEDGED: "active", RETURNED: "gone, new" };
+
+// Returns the words for a state of an alarm.
+export const alarmState = (state) => WORDS[state] ?? state;
+
+// Returns a button that acknowledges an alarm, or nothing if the alarm does not wait for that.
+export function alarmButton({ name, state }, acknowledge) {
+  if (state !== "UNACKNOWLEDGED" && state !== "RETURNED") return "";
+  const button = element("button", "acknowledge", "Acknowledge");
+  button.ariaLabel = `Acknowledge ${name}`;
+  button.onclick = () => acknowledge(name).catch((reason) => { button.title = reason.message; });
+  return button;
+}
+
+// `acknowledge(name)` returns a promise.
+export function alarmsView(alarms, acknowledge) {
+  if (alarms.message) return [note(alarms.message)];
+  if (!alarms.length) return [note("No alarms.")];
+  const kind = (a) => element("span", `chip ${a.priority === 1 ? "error" : a.priority === 2 ? "warning" : "info"}`, a.class);
+  const rows = alarms.map((a) => [alarmState(a.state), kind(a), a.since ?? "", a.name, a.text, alarmButton(a, acknowledge)]);
+  return [table(["State", "Class", "Since", "Alarm", "Text", ""], rows)];
+}
+
 // `value(name)` returns the element that shows a variable.
 export function ioView(io, value) {
   if (io.message) return [note(io.message)];
