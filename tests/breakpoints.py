@@ -89,6 +89,8 @@ def values(found: Halt, call: int = 0) -> dict[str, str]:
 class Breaking:
     """The fixture `plc` is a controller that runs PROGRAM."""
 
+    target = ""  # what programs are built for; "" for this machine
+
     def test_a_task_halts_at_a_line_with_its_calls_and_variables(self, plc: Controller) -> None:
         debugger = plc.breakpoints
         debugger.set(FILE, 15)
@@ -270,7 +272,7 @@ class Breaking:
     def test_a_program_without_debugging_information_halts_by_line(self, plc: Controller, tmp_path: Path) -> None:
         folder = tmp_path / "optimised"
         folder.mkdir()
-        plc.flash(build(folder, level=2, debug=False))
+        plc.flash(build(folder, level=2, debug=False, target=self.target))
         debugger = plc.breakpoints
         debugger.set(FILE, 30)
         assert halt(debugger).calls[0].line == 30
@@ -281,7 +283,7 @@ class Breaking:
     ) -> None:
         folder = tmp_path / f"level{level}"
         folder.mkdir()
-        plc.flash(build(folder, level=level, debug=level == 0))
+        plc.flash(build(folder, level=level, debug=level == 0, target=self.target))
         debugger = plc.breakpoints
         room = debugger._target.status().room
         for offset in sorted(debugger.statements.stops)[:room]:

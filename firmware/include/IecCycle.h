@@ -131,6 +131,10 @@ void IecCycleHold(RTS_UI32 task);
 void IecCycleRelease(void);
 /* The cycle of the task that calls it stood still for so long: statistics and watchdog do not count that. */
 void IecCycleStoodStill(RTS_UI32 task, RTS_I64 ns);
+#if !SYS_DEBUG_WAITS
+/* Runs the rest of the cycle that is halted. From main, while the others are held. */
+void IecCycleResume(RTS_UI32 task);
+#endif
 #endif
 
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the

@@ -10,6 +10,7 @@
 
 #include "CmpErrors.h"
 #include "CmpStd.h"
+#include "SysExcept.h"
 
 /* Where IEC code stopped. */
 typedef struct {
@@ -27,7 +28,11 @@ typedef enum {
     SYS_DEBUG_LEAVE, /* it ends with the exception; of a trap with RTSEXCPT_ILLEGAL_INSTRUCTION */
     SYS_DEBUG_GO,    /* the instruction at the address is executed (again) */
     SYS_DEBUG_PASS,  /* the same, and the handler is called again after it */
+    SYS_DEBUG_HALT, /* SYS_DEBUG_WAITS 0: SysExceptTry returns with SYS_DEBUG_HALTED; the code keeps registers and stack */
 } SYS_DEBUG_ACTION;
+
+/* RTS_EXCEPTION.code of a task that is halted, and SYS_DEBUG_STOP.code when it is to go on. */
+#define SYS_DEBUG_HALTED 0xFFFFFFFFu
 
 /* Called in the context of the task, from the handler of its trap or fault; may wait (SysDebugWait). */
 typedef SYS_DEBUG_ACTION (*PF_SYS_DEBUG)(const SYS_DEBUG_STOP *stop);
@@ -44,6 +49,11 @@ RTS_RESULT SysDebugWriteTrap(uintptr_t address, RTS_UI32 *original);
 void SysDebugRestore(uintptr_t address, RTS_UI32 original);
 /* True if the instruction there is a trap. */
 bool SysDebugIsTrap(uintptr_t address);
+
+#if !SYS_DEBUG_WAITS
+/* SysExceptTry for the rest of what is halted, after the handler was asked again. From main, while tasks are held. */
+bool SysDebugResume(RTS_EXCEPTION *exception);
+#endif
 
 /* False in main, which serves the debugger. */
 bool SysDebugMayWait(void);

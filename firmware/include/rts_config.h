@@ -357,6 +357,12 @@
 #define BP_HOLDS_TASKS 1
 #endif
 
+/* 0: the context of a task cannot wait in a handler, since tasks interrupt main. A halted task leaves its context, and main
+ * runs the rest of its cycle (SysDebugResume). */
+#ifndef SYS_DEBUG_WAITS
+#define SYS_DEBUG_WAITS 1
+#endif
+
 /* A debugger that asks nothing for so long is gone: its breakpoints end, and what is halted goes on [ms]. 0: never. */
 #ifndef BP_ALIVE_MS
 #define BP_ALIVE_MS 5000

@@ -53,6 +53,11 @@ static struct {
     RTS_UI32 state;                      /* BP_RUNS, BP_HALTED; atomic */
     RTS_UI32 serial;
     SYS_DEBUG_STOP stop;
+#if !SYS_DEBUG_WAITS
+    bool left;     /* the halted task has left its context: main runs the rest of its cycle */
+    bool releases; /* and then the other tasks go on */
+    RTS_I64 since_ns;
+#endif
 } bp;
 
 static uintptr_t address_of(RTS_UI32 offset)
@@ -270,6 +275,8 @@ static bool become_owner(RTS_UI32 task)
         owner = SysAtomicLoad(&bp.owner);
         if (owner == task + 1 || (owner == 0 && SysAtomicReplace(&bp.owner, 0, task + 1)))
             return true;
+        if (!SYS_DEBUG_WAITS)
+            return false;
         SysDebugWait(&bp.owner, owner);
     }
     return false;
@@ -282,17 +289,27 @@ static void give_up_owner(void)
     SysDebugWake(&bp.owner);
 }
 
-static void halt(const SYS_DEBUG_STOP *stop, RTS_UI32 task)
+/* False when there is no debugger any more, or another task is halted. */
+static bool begin_halt(const SYS_DEBUG_STOP *stop, RTS_UI32 task)
+{
+    if (!become_owner(task))
+        return false;
+    bp.stop = *stop;
+    bp.serial++;
+    IecCycleHold(task);
+    SysAtomicStore(&bp.state, BP_HALTED);
+    return true;
+}
+
+#if SYS_DEBUG_WAITS
+static bool halt(const SYS_DEBUG_STOP *stop, RTS_UI32 task)
 {
     RTS_I64 since_ns = SysTimeGetNs();
     RTS_UI32 serial;
 
-    if (!become_owner(task))
-        return;
-    bp.stop = *stop;
-    serial = ++bp.serial;
-    IecCycleHold(task);
-    SysAtomicStore(&bp.state, BP_HALTED);
+    if (!begin_halt(stop, task))
+        return false;
+    serial = bp.serial;
     if (!bp.active || !SysAtomicLoad(&bp.attached)) /* it ended just now */
         SysAtomicStore(&bp.state, BP_RUNS);
     while (SysAtomicLoad(&bp.state) == BP_HALTED && bp.serial == serial) /* not another one already */
@@ -300,7 +317,20 @@ static void halt(const SYS_DEBUG_STOP *stop, RTS_UI32 task)
     IecCycleStoodStill(task, SysTimeGetNs() - since_ns);
     if (!bp.active || !SysAtomicLoad(&bp.attached))
         give_up_owner();
+    return false;
 }
+#else
+/* True: the task is to leave its context. */
+static bool halt(const SYS_DEBUG_STOP *stop, RTS_UI32 task)
+{
+    if (!begin_halt(stop, task))
+        return false;
+    bp.since_ns = SysTimeGetNs();
+    bp.left = true;
+    bp.releases = false;
+    return true;
+}
+#endif
 
 /* The trap of the instruction that was executed is put in again, unless it was removed meanwhile. */
 static void put_back(RTS_UI32 task)
@@ -339,8 +369,8 @@ static SYS_DEBUG_ACTION trapped(const SYS_DEBUG_STOP *stop, RTS_UI32 task, bool 
     SysLockLeave(lock);
     if (!is_ours) /* a trap of the compiler, or one that was taken out meanwhile */
         return SysDebugIsTrap(stop->address) ? SYS_DEBUG_LEAVE : SYS_DEBUG_GO;
-    if (halts)
-        halt(stop, task);
+    if (halts && halt(stop, task))
+        return SYS_DEBUG_HALT;
     return pass(offset, task);
 }
 
@@ -355,11 +385,11 @@ static SYS_DEBUG_ACTION on_stop(const SYS_DEBUG_STOP *stop)
         put_back(task);
         return SYS_DEBUG_GO;
     }
+    if (!SYS_DEBUG_WAITS && stop->code == SYS_DEBUG_HALTED)
+        return bp.stop.code == RTSEXCPT_BREAKPOINT ? pass(SysExceptCodeOffset(stop->address), task) : SYS_DEBUG_LEAVE;
     if (stop->code == RTSEXCPT_BREAKPOINT)
         return trapped(stop, task, may_halt);
-    if (may_halt)
-        halt(stop, task);
-    return SYS_DEBUG_LEAVE;
+    return may_halt && halt(stop, task) ? SYS_DEBUG_HALT : SYS_DEBUG_LEAVE;
 }
 
 /* ---- in main ---- */
@@ -369,6 +399,34 @@ static void go(void)
     SysAtomicStore(&bp.state, BP_RUNS);
     SysDebugWake(&bp.state);
 }
+
+/* The other tasks go on, too. */
+static void release(void)
+{
+#if !SYS_DEBUG_WAITS
+    if (bp.left) {
+        bp.releases = true;
+        return;
+    }
+#endif
+    give_up_owner();
+}
+
+#if !SYS_DEBUG_WAITS
+/* Runs the rest of the cycle of a task that goes on, to its end or the next halt. */
+static void run_rest(void)
+{
+    if (!bp.left || SysAtomicLoad(&bp.state) == BP_HALTED)
+        return;
+    bp.left = false;
+    IecCycleStoodStill(bp.owner - 1, SysTimeGetNs() - bp.since_ns);
+    IecCycleResume(bp.owner - 1);
+    if (bp.releases && !bp.left)
+        give_up_owner();
+}
+#else
+#define run_rest() ((void)0)
+#endif
 
 bool AppBpIsHalted(void)
 {
@@ -417,7 +475,7 @@ void AppBpDetach(void)
     SysAtomicStore(&bp.attached, 0);
     AppBpClearAll();
     go();
-    give_up_owner();
+    release();
 }
 
 void AppBpAlive(void)
@@ -542,7 +600,7 @@ RTS_RESULT AppBpGo(RTS_UI32 how)
     bp.step_task = bp.owner - 1;
     SysAtomicStore(&bp.state, BP_RUNS);
     if (how == BP_GO || (how == BP_STEP_OUT && waits_for_event(bp.step_task)))
-        give_up_owner();
+        release();
     SysDebugWake(&bp.state);
     return ERR_OK;
 }
@@ -552,7 +610,7 @@ RTS_RESULT AppBpPause(void)
     if (!bp.attached || AppBpIsHalted())
         return ERR_INVALID_STATE;
     bp.step_task = NO_TASK;
-    give_up_owner(); /* a step that does not end, such as one that waits for an event */
+    release(); /* a step that does not end, such as one that waits for an event */
     return ERR_OK;
 }
 
@@ -608,6 +666,7 @@ static void tasks_stop(void)
     SysLockLeave(lock);
     go();
     SysDebugWake(&bp.owner);
+    run_rest();
 }
 
 static void tasks_will_start(void)
@@ -645,8 +704,10 @@ RTS_RESULT CmpAppBP_Hook(CMP_HOOK hook)
         reset();
         IecTaskSetWatcher(&watcher);
     }
-    if (hook == CH_COMM_CYCLE)
+    if (hook == CH_COMM_CYCLE) {
         check_alive();
+        run_rest();
+    }
     if (hook == CH_EXIT_TASKS || hook == CH_EXIT)
         AppBpDetach();
     return ERR_OK;

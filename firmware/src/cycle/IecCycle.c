@@ -228,7 +228,7 @@ static void count_lateness(TASK *task, RTS_UI32 late)
 #define count_lateness(task, late)
 #endif
 
-static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
+static RTS_INLINE void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
 {
     RTS_UI32 elapsed = saturate(elapsed_ns);
     RTS_UI32 late = saturate(late_ns);
@@ -255,7 +255,7 @@ static RTS_I64 used_ns(const TASK *task)
 }
 
 /* Both rules of manual 3.4: too many cycles in a row that are too long, or one that is far too long. */
-static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
+static RTS_INLINE bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
 {
     if (task->watchdog_ns == 0)
         return false;
@@ -294,7 +294,7 @@ static void run_phases_before(TASK *task)
         CyclePhasesRun(CYCLE_BEFORE_CODE, index_of(task), &task->context);
 }
 
-static void record(TASK *task, RTS_I64 due_ns)
+static RTS_INLINE void record(TASK *task, RTS_I64 due_ns)
 {
     if (cycle_phases[CYCLE_RECORD] == NULL)
         return;
@@ -306,7 +306,7 @@ static void record(TASK *task, RTS_I64 due_ns)
     CyclePhasesRun(CYCLE_RECORD, index_of(task), &task->context);
 }
 
-static void run_phases_after(TASK *task, RTS_I64 due_ns)
+static RTS_INLINE void run_phases_after(TASK *task, RTS_I64 due_ns)
 {
     bool has_phases = CyclePhasesExist();
 
@@ -318,6 +318,30 @@ static void run_phases_after(TASK *task, RTS_I64 due_ns)
         CyclePhasesRun(CYCLE_OUTPUTS, index_of(task), &task->context);
         record(task, due_ns);
     }
+}
+
+/* After its code. */
+static RTS_INLINE bool finish_cycle(TASK *task, RTS_I64 start_ns, RTS_I64 due_ns, RTS_I64 used_before_ns)
+{
+    RTS_I64 elapsed_ns;
+
+    if (task->has_phases)
+        run_phases_after(task, due_ns);
+    elapsed_ns = SysTimeGetNs() - (BP_MAX > 0 && SYS_DEBUG_WAITS ? task->guard.start_ns : start_ns);
+    account(task, start_ns - due_ns, elapsed_ns);
+    if (watchdog_expired(task, SCHED_PROCESSOR_TIME ? used_ns(task) - used_before_ns : elapsed_ns))
+        return end_with_exception(task, RTSEXCPT_WATCHDOG, 0);
+    guard_end(&task->guard);
+    SchedNoteEvents();
+    return true;
+}
+
+/* A halted one is still in its cycle. */
+static bool end_code(TASK *task, const RTS_EXCEPTION *exception)
+{
+    if (!SYS_DEBUG_WAITS && exception->code == SYS_DEBUG_HALTED)
+        return true;
+    return end_with_exception(task, exception->code, exception->address);
 }
 
 /* True if main has held the tasks after this one was let begin its cycle, and before that showed. */
@@ -338,7 +362,6 @@ static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
     RTS_I64 start_ns = SysTimeGetNs();
     RTS_I64 used_before_ns = used_ns(task);
     RTS_EXCEPTION exception;
-    RTS_I64 elapsed_ns;
 
     set_time(task, start_ns - tasks.time_zero);
     guard_begin(&task->guard, start_ns);
@@ -351,16 +374,8 @@ static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
     if (task->has_phases)
         run_phases_before(task);
     if (!SysExceptTry(run_entry, task, &exception))
-        return end_with_exception(task, exception.code, exception.address);
-    if (task->has_phases)
-        run_phases_after(task, due_ns);
-    elapsed_ns = SysTimeGetNs() - (BP_MAX > 0 ? task->guard.start_ns : start_ns);
-    account(task, start_ns - due_ns, elapsed_ns);
-    if (watchdog_expired(task, SCHED_PROCESSOR_TIME ? used_ns(task) - used_before_ns : elapsed_ns))
-        return end_with_exception(task, RTSEXCPT_WATCHDOG, 0);
-    guard_end(&task->guard);
-    SchedNoteEvents();
-    return true;
+        return end_code(task, &exception);
+    return finish_cycle(task, start_ns, due_ns, used_before_ns);
 }
 
 /* ---- a moment between all cycles ---- */
@@ -472,6 +487,7 @@ void IecCycleStoodStill(RTS_UI32 task, RTS_I64 ns)
     tasks.list[task].guard.start_ns += ns;
 }
 
+#if SYS_DEBUG_WAITS
 /* Not in main, which has to serve the debugger. What waited is due when the wait ends. */
 static RTS_NOINLINE bool wait_for_turn(TASK *task, RTS_I64 due_ns)
 {
@@ -484,6 +500,28 @@ static RTS_NOINLINE bool wait_for_turn(TASK *task, RTS_I64 due_ns)
     }
     return SysAtomicLoad(&tasks.running) != TASKS_STOP ? run_cycle(task, was_held ? SysTimeGetNs() : due_ns) : false;
 }
+#else
+/* What is due while tasks are held is left out. */
+static RTS_NOINLINE bool wait_for_turn(TASK *task, RTS_I64 due_ns)
+{
+    bool is_halted = (task->guard.phase & 1) != 0;
+
+    if (SysAtomicLoad(&tasks.running) == TASKS_STOP)
+        return false;
+    return is_halted || SysAtomicLoad(&tasks.not_held) != index_of(task) ? true : run_cycle(task, due_ns);
+}
+
+void IecCycleResume(RTS_UI32 index)
+{
+    TASK *task = &tasks.list[index];
+    RTS_EXCEPTION exception;
+
+    if (!SysDebugResume(&exception))
+        (void)end_code(task, &exception);
+    else
+        (void)finish_cycle(task, task->guard.start_ns, task->guard.start_ns, 0);
+}
+#endif
 #define run_if_not_stopped(task, due_ns) wait_for_turn(task, due_ns)
 #else
 #define run_if_not_stopped(task, due_ns) false

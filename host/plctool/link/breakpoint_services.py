@@ -30,15 +30,17 @@ def _do(session: Session, service: int, action: str, *tags: bintag.Tag) -> binta
     reply = _call(session, service, *tags)
     result = reply.u16(lib.TAG_SERVICE_RESULT)
     if result == lib.ERR_NOT_SUPPORTED:
-        raise not_supported()
+        raise not_supported("it runs programs in place from flash. Build its firmware with CodeInRam.c")
     l7.check_result(result, action)
     return reply
 
 
-def not_supported() -> DeviceError:
+def not_supported(reason: str) -> DeviceError:
     """The error of a controller without traps."""
     return DeviceError(
-        "Breakpoints are not supported on this device; debug the program in the simulator.", "no-breakpoints"
+        f"Breakpoints are not supported on this device: {reason} (docs/debugging.md), or debug the program in the "
+        "simulator.",
+        "no-breakpoints",
     )
 
 
@@ -49,7 +51,8 @@ def _explained() -> Iterator[None]:
     except DeviceError as error:
         if error.result not in (lib.ERR_L7_UNKNOWNCMDGROUP, lib.ERR_L7_UNKNOWNCMD):
             raise
-        raise not_supported() from None
+        reason = "its firmware has none. Build it with BP_MAX and HAS_CmpAppBP"
+        raise not_supported(reason) from None
 
 
 def attach(session: Session, *, keep: bool) -> None:

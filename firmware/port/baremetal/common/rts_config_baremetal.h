@@ -10,6 +10,8 @@
 
 #define RTS_ONE_CORE 1
 
+#define SYS_DEBUG_WAITS 0
+
 /* startup.c clears all variables, and whatever ends the runtime is a reset. */
 #define RTS_STARTS_ONCE 1
 

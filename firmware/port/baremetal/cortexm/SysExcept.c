@@ -34,7 +34,11 @@
 #include "SysExcept.h"
 
 #include "BareMetal.h"
+#include "SysDebug.h"
+#include "ThumbStep.h"
 #include "rts_config.h"
+
+#include <string.h>
 
 enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_PSP = 4, EXC_RETURN_BASIC = 16 };
 enum { XPSR_THUMB = 1 << 24, XPSR_ALIGNED = 1 << 9 };
@@ -409,8 +413,260 @@ static uintptr_t address_of(RTS_UI32 cfsr, RTS_UI32 code, const FRAME *frame, co
     return frame->pc;
 }
 
-__attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_return)
+/* ---- the debugger ---- */
+
+#if BP_MAX > 0
+
+enum { SAVED = 8 }; /* registers r4 to r11, which FaultHandler saves and loads again */
+
+/*
+ * A halted task leaves its Try as by an exception. Its stack stays: no cycle starts before main has run the rest of this
+ * one, in a Try of its own that goes on with these registers. A step is one instruction with interrupts masked, so that no
+ * other task executes the code meanwhile.
+ */
+static struct {
+    PF_SYS_DEBUG handler;
+    SYS_DEBUG_STOP stop; /* of the halted task */
+    FRAME *frame;
+    FRAME *first;
+    RTS_UI32 exc_return;
+    RTS_UI32 saved[SAVED];
+#ifdef __ARM_FP
+    RTS_UI32 fpu[16];
+#endif
+    bool steps;
+    bool ends_at_own; /* at a trap that is nothing but the end of the step */
+    uintptr_t next;
+    RTS_UI32 original;
+    RTS_UI32 flags;
+} debug;
+
+static RTS_UI32 leave_try(RTS_UI32 code, RTS_UI32 address, uintptr_t stack, uintptr_t link);
+
+void SysDebugSetHandler(PF_SYS_DEBUG handler)
 {
+    debug.handler = handler;
+}
+
+bool ThumbMayRead(uintptr_t address, RTS_UI32 size)
+{
+    const TRY *try = state.top - 1;
+    return address - stack_slot(try) <= RTS_IEC_STACK_SIZE - size ||
+           (SysExceptIsCode(address) && SysExceptIsCode(address + size - 1));
+}
+
+static RTS_UI32 frame_size(RTS_UI32 exc_return)
+{
+    enum { FPU_SIZE = 18 * 4 };
+    return sizeof(FRAME) + (exc_return & EXC_RETURN_BASIC ? 0 : FPU_SIZE);
+}
+
+static void get_registers(THUMB_REGISTERS *at, const FRAME *frame, RTS_UI32 exc_return, const RTS_UI32 *saved)
+{
+    memcpy(at->r, frame, 4 * sizeof at->r[0]);
+    memcpy(at->r + 4, saved, SAVED * sizeof at->r[0]);
+    at->r[12] = frame->r12;
+    at->r[13] = stack_before(frame, exc_return);
+    at->r[14] = frame->lr;
+    at->r[15] = frame->pc;
+    at->flags = frame->xpsr;
+}
+
+/* The frame moves with the stack pointer: that of code that goes on is right above it. */
+static void put_registers(const THUMB_REGISTERS *at, FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved)
+{
+    RTS_UI32 size = frame_size(exc_return);
+    RTS_UI32 below = at->r[13] - size;
+    FRAME *moved = (FRAME *)(uintptr_t)(below & ~7u);
+
+    memmove(moved, frame, size);
+    memcpy(moved, at->r, 4 * sizeof at->r[0]);
+    memcpy(saved, at->r + 4, SAVED * sizeof at->r[0]);
+    moved->r12 = at->r[12];
+    moved->lr = at->r[14];
+    moved->pc = at->r[15] & ~1u;
+    moved->xpsr = (at->flags & ~(RTS_UI32)(XPSR_ALIGNED | XPSR_THUMB)) | (at->r[15] & 1 ? XPSR_THUMB : 0) |
+                  (below & 4 ? XPSR_ALIGNED : 0);
+    set_process_stack(moved);
+}
+
+static void tell_debugger(const SYS_DEBUG_STOP *stop, RTS_UI32 code)
+{
+    SYS_DEBUG_STOP other = *stop;
+    other.code = code;
+    (void)debug.handler(&other);
+}
+
+static void begin_step(FRAME *frame)
+{
+    debug.flags = frame->xpsr;
+    debug.next = frame->pc + ThumbSize(*(const RTS_UI16 *)(uintptr_t)frame->pc);
+    debug.ends_at_own = !SysDebugIsTrap(debug.next);
+    if (debug.ends_at_own)
+        (void)SysDebugWriteTrap(debug.next, &debug.original);
+    frame->xpsr = ThumbAlone(frame->xpsr);
+    debug.steps = true;
+    (void)CpuMask();
+}
+
+/* True if that is all the trap was there for. */
+static bool end_step(FRAME *frame)
+{
+    debug.steps = false;
+    if (debug.ends_at_own)
+        SysDebugRestore(debug.next, debug.original);
+    if (frame->pc != debug.next)
+        return false;
+    frame->xpsr = ThumbAfter(debug.flags, frame->xpsr);
+    return debug.ends_at_own;
+}
+
+/* The handler of the trap has taken it out. */
+static RTS_UI32 pass(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved, const SYS_DEBUG_STOP *stop)
+{
+    THUMB_REGISTERS at;
+    THUMB_STEP done;
+
+    get_registers(&at, frame, exc_return, saved);
+    done = ThumbStep(&at);
+    if (done == THUMB_STRAIGHT) {
+        begin_step(frame);
+        return exc_return;
+    }
+    tell_debugger(stop, RTSEXCPT_NOEXCEPTION);
+    if (done == THUMB_FAULT)
+        return leave_try(RTSEXCPT_ACCESS_VIOLATION, frame->pc, stop->stack, frame->lr);
+    put_registers(&at, frame, exc_return, saved);
+    return exc_return;
+}
+
+static RTS_UI32 halt(FRAME *frame, RTS_UI32 exc_return, const RTS_UI32 *saved, const SYS_DEBUG_STOP *stop)
+{
+    debug.stop = *stop;
+    debug.frame = frame;
+    debug.first = state.top[-1].first;
+    debug.exc_return = exc_return;
+    memcpy(debug.saved, saved, sizeof debug.saved);
+#ifdef __ARM_FP
+    __asm__ volatile("vstm %0, {s16-s31}" ::"r"(debug.fpu) : "memory"); /* the others are in the frame by that */
+#endif
+    return leave_try(SYS_DEBUG_HALTED, frame->pc, 0, 0);
+}
+
+/* 0: the exception leaves the Try. */
+static RTS_UI32 act(SYS_DEBUG_ACTION action, FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved,
+                    const SYS_DEBUG_STOP *stop)
+{
+    switch (action) {
+    case SYS_DEBUG_GO:
+        return exc_return;
+    case SYS_DEBUG_PASS:
+        return pass(frame, exc_return, saved, stop);
+    case SYS_DEBUG_HALT:
+        return halt(frame, exc_return, saved, stop);
+    default:
+        return 0;
+    }
+}
+
+/* Runs in the Try that goes on with what is halted: its trap puts that in its place. */
+__attribute__((naked)) static void resume_halted(void *arg)
+{
+    RTS_UNUSED(arg);
+    __asm__ volatile("udf #0");
+}
+
+static RTS_UI32 resume(RTS_UI32 *saved)
+{
+    TRY *try = state.top - 1;
+    SYS_DEBUG_STOP stop = debug.stop;
+    RTS_UI32 goes_to;
+
+    try->first = debug.first;
+    allow_stack(stack_slot(try));
+    set_process_stack(debug.frame);
+    memcpy(saved, debug.saved, sizeof debug.saved);
+#ifdef __ARM_FP
+    __asm__ volatile("vldm %0, {s16-s31}" ::"r"(debug.fpu) : "memory");
+    drop_fpu_context();
+#endif
+    stop.code = SYS_DEBUG_HALTED;
+    goes_to = act(debug.handler(&stop), debug.frame, debug.exc_return, saved, &stop);
+    if (goes_to == 0)
+        return leave_try(debug.stop.code, debug.stop.address, debug.stop.stack, debug.stop.link);
+    return goes_to;
+}
+
+bool SysDebugResume(RTS_EXCEPTION *exception)
+{
+    FRAME *first = state.tries[0].first;
+    bool ended = SysExceptTry(resume_halted, (void *)(uintptr_t)debug.stop.arg, exception);
+
+    state.tries[0].first = first;
+    return ended;
+}
+
+/* An error that the program or the runtime found, for the debugger. */
+__attribute__((naked, noreturn)) static void raise_to_debugger(RTS_UI32 code, uintptr_t address, const void *stack)
+{
+    RTS_UNUSED(code);
+    RTS_UNUSED(address);
+    RTS_UNUSED(stack);
+    __asm__ volatile("udf #0");
+}
+
+static RTS_UI32 debug_raised(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved, SYS_DEBUG_STOP *stop)
+{
+    stop->code = frame->r0;
+    stop->address = frame->r1;
+    stop->stack = frame->r2;
+    stop->link = 0;
+    if (debug.handler(stop) == SYS_DEBUG_HALT)
+        return halt(frame, exc_return, saved, stop);
+    return leave_try(stop->code, stop->address, stop->stack, 0);
+}
+
+/* Where a fault that the debugger gets is to return to; 0: it leaves the Try. */
+static RTS_UI32 debug_fault(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved, RTS_UI32 code)
+{
+    const TRY *try = state.top - 1;
+    SYS_DEBUG_STOP stop = {.code = code,
+                           .address = frame->pc,
+                           .stack = stack_before(frame, exc_return),
+                           .end = (uintptr_t)(try->first + 1),
+                           .link = frame->lr,
+                           .arg = (const void *)(uintptr_t)try->entered->r1};
+
+    if (debug.handler == NULL)
+        return 0;
+    if (debug.steps) {
+        bool was_all = end_step(frame);
+        tell_debugger(&stop, RTSEXCPT_NOEXCEPTION);
+        if (was_all)
+            return exc_return;
+    }
+    if (frame->pc == ((RTS_UI32)(uintptr_t)resume_halted & ~1u))
+        return resume(saved);
+    if (frame->pc == ((RTS_UI32)(uintptr_t)raise_to_debugger & ~1u))
+        return debug_raised(frame, exc_return, saved, &stop);
+    if (!SysExceptIsCode(frame->pc))
+        return 0;
+    if (code == RTSEXCPT_ILLEGAL_INSTRUCTION && SysDebugIsTrap(frame->pc))
+        stop.code = RTSEXCPT_BREAKPOINT;
+    return act(debug.handler(&stop), frame, exc_return, saved, &stop);
+}
+
+#define SAVE_THE_OTHERS "push {r4-r11}\n\tmov r2, sp\n\t"
+#define LOAD_THE_OTHERS "pop {r4-r11}\n\t"
+#else
+#define debug_fault(frame, exc_return, saved, code) ((void)(saved), 0)
+#define SAVE_THE_OTHERS ""
+#define LOAD_THE_OTHERS ""
+#endif
+
+__attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved)
+{
+    RTS_UI32 goes_to;
     RTS_UI32 cfsr = SCB_CFSR;
     if (!(exc_return & EXC_RETURN_PSP) || state.top == state.tries)
         ResetNow(RESET_FATAL, cfsr & CFSR_STACKING ? 0 : frame->pc);
@@ -424,6 +680,9 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     CpuRestore(0); /* the fault may have been in a place where interrupts are masked */
     if (cfsr & CFSR_STACKING)
         return leave_try(code, address, 0, 0);
+    goes_to = debug_fault(frame, exc_return, saved, code);
+    if (goes_to != 0)
+        return goes_to;
     return leave_try(code, address, stack_before(frame, exc_return), frame->lr);
 }
 
@@ -432,8 +691,8 @@ __attribute__((naked)) void FaultHandler(void);
 void FaultHandler(void)
 {
     __asm__ volatile("tst lr, #4\n\tbne 1f\n\tmrs r0, msp\n\tldr r1, =stack_top\n\tmsr msp, r1\n\tmov r1, lr\n\t"
-                     "b fault_dispatch\n\t.ltorg\n1:");
-    DISPATCH(fault_dispatch);
+                     "b fault_dispatch\n\t.ltorg\n1:\tmrs r0, psp\n\tmov r1, lr\n\t" SAVE_THE_OTHERS
+                     "bl fault_dispatch\n\t" LOAD_THE_OTHERS "bx r0");
 }
 
 __attribute__((used)) static RTS_UI32 nmi_dispatch(FRAME *frame, RTS_UI32 exc_return)
@@ -470,6 +729,10 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
     if (!in_try())
         ResetNow(RESET_FATAL, (RTS_UI32)address);
+#if BP_MAX > 0
+    if (debug.handler != NULL)
+        raise_to_debugger(code, address & ~(uintptr_t)1, stack);
+#endif
     try_raise(code, address & ~(uintptr_t)1, stack, 0);
 }
 

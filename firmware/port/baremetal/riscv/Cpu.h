@@ -104,8 +104,10 @@ typedef struct {
 } FRAME;
 RTS_STATIC_ASSERT(sizeof(FRAME) == 80, frame_is_what_trap_c_says);
 
-/* A fault, or a call of the runtime, in a program. */
+/* A fault, or a call of the runtime, in a program. With BP_MAX calls only. */
 void SysExceptTrap(FRAME *frame, RTS_UI32 cause);
+/* With BP_MAX: a fault. `saved`: s0 to s11, which may be changed. */
+void SysExceptFault(FRAME *frame, RTS_UI32 cause, RTS_UI32 *saved);
 
 /* The clock's interrupt, and that of tasks. */
 void ClockInterrupt(void);

@@ -29,7 +29,11 @@
 #include "SysExcept.h"
 
 #include "BareMetal.h"
+#include "RiscvStep.h"
+#include "SysDebug.h"
 #include "rts_config.h"
+
+#include <string.h>
 
 enum {
     CAUSE_FETCH = 1,
@@ -306,10 +310,182 @@ static uintptr_t address_of(RTS_UI32 cause, RTS_UI32 code, const FRAME *frame)
     return frame->pc;
 }
 
+#if BP_MAX > 0
+
+/* ---- the debugger ---- */
+
+/*
+ * A halted task leaves its Try as by an exception. Its stack stays: no cycle starts before main has run the rest of this
+ * one, in a Try of its own that goes on with these registers. A step is one instruction without interrupts, so that no
+ * other task executes the code meanwhile.
+ */
+static struct {
+    PF_SYS_DEBUG handler;
+    SYS_DEBUG_STOP stop; /* of the halted task */
+    FRAME frame;
+    RTS_UI32 saved[SAVED];
+    uintptr_t slot;
+    bool steps;
+    bool ends_at_own; /* at a trap that is nothing but the end of the step */
+    uintptr_t next;
+    RTS_UI32 original;
+    RTS_UI32 interrupts;
+} debug;
+
+void SysDebugSetHandler(PF_SYS_DEBUG handler)
+{
+    debug.handler = handler;
+}
+
+static void tell_debugger(const SYS_DEBUG_STOP *stop, RTS_UI32 code)
+{
+    SYS_DEBUG_STOP other = *stop;
+    other.code = code;
+    (void)debug.handler(&other);
+}
+
+static void begin_step(const FRAME *frame)
+{
+    debug.next = frame->pc + RiscvSize(frame->pc);
+    debug.ends_at_own = !SysDebugIsTrap(debug.next);
+    if (debug.ends_at_own)
+        (void)SysDebugWriteTrap(debug.next, &debug.original);
+    debug.steps = true;
+    debug.interrupts = CSR_READ("mie");
+    CSR_WRITE("mie", 0);
+}
+
+/* True if that is all the trap was there for. */
+static bool end_step(const FRAME *frame)
+{
+    CSR_WRITE("mie", debug.interrupts);
+    debug.steps = false;
+    if (debug.ends_at_own)
+        SysDebugRestore(debug.next, debug.original);
+    return debug.ends_at_own && frame->pc == debug.next;
+}
+
+/* The handler of the trap has taken it out. */
+static void pass(FRAME *frame, RTS_UI32 *saved, const SYS_DEBUG_STOP *stop)
+{
+    RISCV_STEP done = RiscvStep(frame, saved);
+    if (done == RISCV_STRAIGHT) {
+        begin_step(frame);
+        return;
+    }
+    tell_debugger(stop, RTSEXCPT_NOEXCEPTION);
+    if (done == RISCV_FAULT)
+        leave(RTSEXCPT_ILLEGAL_INSTRUCTION, frame->pc, frame->sp, frame->ra);
+}
+
+__attribute__((noreturn)) static void halt(const FRAME *frame, const RTS_UI32 *saved, const SYS_DEBUG_STOP *stop)
+{
+    debug.stop = *stop;
+    debug.frame = *frame;
+    debug.slot = state.top[-1].slot;
+    memcpy(debug.saved, saved, sizeof debug.saved);
+    leave(SYS_DEBUG_HALTED, frame->pc, 0, 0);
+}
+
+/* False: the exception leaves the Try. */
+static bool act(SYS_DEBUG_ACTION action, FRAME *frame, RTS_UI32 *saved, const SYS_DEBUG_STOP *stop)
+{
+    if (action == SYS_DEBUG_HALT)
+        halt(frame, saved, stop);
+    if (action == SYS_DEBUG_PASS)
+        pass(frame, saved, stop);
+    return action != SYS_DEBUG_LEAVE;
+}
+
+/* Runs in the Try that goes on with what is halted: its trap puts that in its place. */
+__attribute__((naked)) static void resume_halted(void *arg)
+{
+    RTS_UNUSED(arg);
+    __asm__ volatile("ebreak");
+}
+
+static void resume(FRAME *frame, RTS_UI32 *saved)
+{
+    TRY *try = state.top - 1;
+    SYS_DEBUG_STOP stop = debug.stop;
+    try->slot = debug.slot;
+    allow_stack(try->slot);
+    *frame = debug.frame;
+    memcpy(saved, debug.saved, sizeof debug.saved);
+    stop.code = SYS_DEBUG_HALTED;
+    if (!act(debug.handler(&stop), frame, saved, &stop))
+        leave(debug.stop.code, debug.stop.address, debug.stop.stack, debug.stop.link);
+}
+
+bool SysDebugResume(RTS_EXCEPTION *exception)
+{
+    uintptr_t slot = state.tries[0].slot;
+    bool ended = SysExceptTry(resume_halted, (void *)(uintptr_t)debug.stop.arg, exception);
+    state.tries[0].slot = slot;
+    return ended;
+}
+
+/* An error that the program or the runtime found, for the debugger. */
+__attribute__((naked, noreturn)) static void raise_to_debugger(RTS_UI32 code, uintptr_t address, const void *stack)
+{
+    RTS_UNUSED(code);
+    RTS_UNUSED(address);
+    RTS_UNUSED(stack);
+    __asm__ volatile("ebreak");
+}
+
+static void debug_raised(const FRAME *frame, const RTS_UI32 *saved, SYS_DEBUG_STOP *stop)
+{
+    stop->code = frame->a0;
+    stop->address = frame->a1;
+    stop->stack = frame->a2;
+    stop->link = 0;
+    if (debug.handler(stop) == SYS_DEBUG_HALT)
+        halt(frame, saved, stop);
+    leave(stop->code, stop->address, stop->stack, 0);
+}
+
+/* True if the code goes on as the frame says; else the exception leaves the Try. */
+static bool debug_fault(FRAME *frame, RTS_UI32 *saved, RTS_UI32 code)
+{
+    const TRY *try = state.top - 1;
+    SYS_DEBUG_STOP stop = {.code = code,
+                           .address = frame->pc,
+                           .stack = frame->sp,
+                           .end = try->slot + RTS_IEC_STACK_SIZE,
+                           .link = frame->ra,
+                           .arg = try->arg};
+    if (debug.handler == NULL)
+        return false;
+    if (debug.steps) {
+        bool was_all = end_step(frame);
+        tell_debugger(&stop, RTSEXCPT_NOEXCEPTION);
+        if (was_all)
+            return true;
+    }
+    if (frame->pc == (RTS_UI32)(uintptr_t)resume_halted) {
+        resume(frame, saved);
+        return true;
+    }
+    if (frame->pc == (RTS_UI32)(uintptr_t)raise_to_debugger)
+        debug_raised(frame, saved, &stop);
+    return SysExceptIsCode(frame->pc) && act(debug.handler(&stop), frame, saved, &stop);
+}
+
+__attribute__((used)) void SysExceptFault(FRAME *frame, RTS_UI32 cause, RTS_UI32 *saved)
+{
+    TRY *try = state.top - 1;
+    RTS_UI32 code = is_overflow(try, frame, cause) ? RTSEXCPT_STACK_OVERFLOW : code_of(cause);
+    if (!debug_fault(frame, saved, code))
+        leave(code, address_of(cause, code, frame), frame->sp, frame->ra);
+}
+
+#endif
+
 void SysExceptTrap(FRAME *frame, RTS_UI32 cause)
 {
     TRY *try = state.top - 1;
-    if (cause == CAUSE_ECALL_USER || cause == CAUSE_ECALL_MACHINE) {
+    if (BP_MAX > 0 || cause == CAUSE_ECALL_USER || cause == CAUSE_ECALL_MACHINE) {
         call_of_the_runtime(try, frame);
         return;
     }
@@ -329,6 +505,10 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
     if (!in_try())
         ResetNow(RESET_FATAL, (RTS_UI32)address);
+#if BP_MAX > 0
+    if (debug.handler != NULL)
+        raise_to_debugger(code, address & ~(uintptr_t)1, stack);
+#endif
     try_raise(code, address & ~(uintptr_t)1, stack, 0);
 }
 

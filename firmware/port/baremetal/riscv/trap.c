@@ -45,6 +45,21 @@ __attribute__((used)) static void trap_dispatch(FRAME *frame)
         SysExceptTrap(frame, cause);
 }
 
+/* A debugger looks at all registers of a program that met a fault. */
+#if BP_MAX > 0
+#define DISPATCH                                                                                               \
+    "csrr a1, mcause\n\tli t0, 8\n\tbltu a1, t0, 5f\n\tcall trap_dispatch\n\tj 6f\n"                           \
+    "5:\taddi sp, sp, -48\n\tmv a2, sp\n\t"                                                                    \
+    "sw s0, 0(sp)\n\tsw s1, 4(sp)\n\tsw s2, 8(sp)\n\tsw s3, 12(sp)\n\tsw s4, 16(sp)\n\tsw s5, 20(sp)\n\t"      \
+    "sw s6, 24(sp)\n\tsw s7, 28(sp)\n\tsw s8, 32(sp)\n\tsw s9, 36(sp)\n\tsw s10, 40(sp)\n\tsw s11, 44(sp)\n\t" \
+    "call SysExceptFault\n\t"                                                                                  \
+    "lw s0, 0(sp)\n\tlw s1, 4(sp)\n\tlw s2, 8(sp)\n\tlw s3, 12(sp)\n\tlw s4, 16(sp)\n\tlw s5, 20(sp)\n\t"      \
+    "lw s6, 24(sp)\n\tlw s7, 28(sp)\n\tlw s8, 32(sp)\n\tlw s9, 36(sp)\n\tlw s10, 40(sp)\n\tlw s11, 44(sp)\n\t" \
+    "addi sp, sp, 48\n6:\t"
+#else
+#define DISPATCH "call trap_dispatch\n\t"
+#endif
+
 __attribute__((naked, aligned(4))) static void trap_entry(void)
 {
     __asm__ volatile("csrrw sp, mscratch, sp\n\t"
@@ -65,9 +80,7 @@ __attribute__((naked, aligned(4))) static void trap_entry(void)
                      "sw a2, 24(sp)\n\tsw a3, 28(sp)\n\tsw a4, 32(sp)\n\tsw a5, 36(sp)\n\tsw a6, 40(sp)\n\t"
                      "sw a7, 44(sp)\n\tsw t3, 48(sp)\n\tsw t4, 52(sp)\n\tsw t5, 56(sp)\n\tsw t6, 60(sp)\n\t"
                      "csrr t0, mepc\n\tsw t0, 68(sp)\n\tcsrr t0, mstatus\n\tsw t0, 72(sp)\n\t"
-                     "mv a0, sp\n\t"
-                     "call trap_dispatch\n\t"
-                     "lw t0, 68(sp)\n\tcsrw mepc, t0\n\tlw t0, 72(sp)\n\tcsrw mstatus, t0\n\t"
+                     "mv a0, sp\n\t" DISPATCH "lw t0, 68(sp)\n\tcsrw mepc, t0\n\tlw t0, 72(sp)\n\tcsrw mstatus, t0\n\t"
                      "lw ra, 0(sp)\n\tlw t1, 8(sp)\n\tlw t2, 12(sp)\n\tlw a0, 16(sp)\n\tlw a1, 20(sp)\n\t"
                      "lw a2, 24(sp)\n\tlw a3, 28(sp)\n\tlw a4, 32(sp)\n\tlw a5, 36(sp)\n\tlw a6, 40(sp)\n\t"
                      "lw a7, 44(sp)\n\tlw t3, 48(sp)\n\tlw t4, 52(sp)\n\tlw t5, 56(sp)\n\tlw t6, 60(sp)\n\t"

@@ -11,6 +11,9 @@
 #define SETTINGS 0     /* nor for settings */
 #define APP_CALLS 0    /* nor for calls of programs, such as files */
 #define IEC_FILES 0
+/* The full configuration has no room for traces and breakpoints in 64 KiB of RAM. */
+#define TRACE_BUFFER 0
+#define BP_MAX 0
 
 /* A second connection has no room in its 64 KiB. */
 #define COMM_MAX_CLIENTS 1

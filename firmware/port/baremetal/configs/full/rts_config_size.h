@@ -43,6 +43,10 @@
 #ifndef TRACE_BUFFER
 #define TRACE_BUFFER 4096
 #endif
+#ifndef BP_MAX
+#define BP_MAX 16
+#endif
+#define BP_TRAPS (BP_MAX * 16)
 #define FILE_STORE_FILES 8
 #define FILE_STORE_SIZE (BOARD_FLASH_SIZE / 4)
 #ifndef COMM_MAX_CLIENTS
