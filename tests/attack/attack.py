@@ -17,6 +17,7 @@ from pathlib import Path
 from bad_programs import BadPrograms
 from campaign import OUTCOMES, Campaign, Case, Fallen
 from cuts import Calls, Cuts
+from debuggers import Debuggers
 from images import Images
 from kills import Kills
 from records import Records
@@ -24,7 +25,7 @@ from sectors import Sectors
 from simulated import die_with_parent
 from workshop import Workshop, open_workshop
 
-CAMPAIGNS: tuple[type[Campaign], ...] = (Kills, Cuts, Calls, BadPrograms, Images, Records, Sectors)
+CAMPAIGNS: tuple[type[Campaign], ...] = (Kills, Cuts, Calls, BadPrograms, Images, Records, Sectors, Debuggers)
 SHOWN = 10  # failures of a campaign that are printed
 
 

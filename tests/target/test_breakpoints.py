@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import random
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -12,10 +14,12 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 import breakpoints
 from breakpoints import FILE, Breaking
 from environment import TARGET
+from hostile_debugger import act
 
 from plctool.device import Plc
 from plctool.errors import DeviceError
 from plctool.link.connection import Connection
+from plctool.testing.waiting import eventually
 
 
 @pytest.fixture
@@ -31,6 +35,19 @@ def plc(make_board, tmp_path):
 
 class TestBoard(Breaking):
     target = TARGET
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_hostile_debugger_leaves_a_board_that_takes_a_program(plc, tmp_path, seed):
+    chooser = random.Random(seed)
+    for _ in range(40):
+        with suppress(DeviceError):
+            act(plc.breakpoints._target, chooser)
+    plc.end_debugging()
+    assert plc.status().state in ("run", "exception", "stop")
+    plc.flash(breakpoints.build(tmp_path, target=TARGET))
+    eventually(lambda: plc.read("Main.cycles") > 10)
+    assert not any("fault of the runtime" in entry.text for entry in plc.log())
 
 
 def test_a_firmware_without_breakpoints_says_so(make_board, build):
