@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import socket
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from plctool import connect
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.waiting import eventually
 
+FOREIGN = Path(__file__).parents[2] / "editors/vscode/node_modules/@vscode/debugadapter-testsupport"
 DAP = [sys.executable, "-m", "plctool", "dap"]
 
 
@@ -244,6 +246,23 @@ def test_the_command_listens_at_a_port_of_this_machine(source: str) -> None:
             editor.request("disconnect")
         process.terminate()
         process.wait(60)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node: ./bootstrap.sh --node")
+@pytest.mark.skipif(not FOREIGN.exists(), reason="needs packages of npm: npm ci --prefix editors/vscode")
+def test_a_client_of_others_debugs_a_program(source: str) -> None:
+    with subprocess.Popen([*DAP, "--listen", "0"], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        port = process.stdout.readline().split()[-1]
+        command = ["node", str(Path(__file__).with_name("foreign_client.js")), str(FOREIGN), port, source, "15"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+        process.terminate()
+        process.wait(60)
+    assert done.returncode == 0, done.stderr
+    seen = json.loads(done.stdout)
+    assert seen["calls"][:2] == [["Counter", 15], ["Main", 25]]
+    assert (seen["seen"]["Locals"]["twice"], seen["seen"]["Counter"]["step"], seen["value"]) == ("2", "1", "10")
+    assert seen["inside"] == ["Add", 4]
 
 
 def test_messages_are_numbered_json() -> None:
