@@ -20,6 +20,7 @@ SHARED = [
     "IoDrvGpio.h",
     "IoDrvSim.h",
     "IoDrvModbus.h",
+    "IoDrvCanopen.h",
     "IoDrvSysfs.h",
     "CmpIecAbi.h",
     "SysExcept.h",

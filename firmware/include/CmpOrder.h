@@ -48,6 +48,9 @@ X(IoDrvGpio)
 #if HAS_IoDrvModbus
 X(IoDrvModbus)
 #endif
+#if HAS_IoDrvCanopen
+X(IoDrvCanopen)
+#endif
 #if HAS_CmpForce
 X(CmpForce)
 #endif

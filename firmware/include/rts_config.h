@@ -485,6 +485,14 @@
 #define CAN_SEND_FRAMES 8
 #endif
 
+/* CANopen nodes that this device manages (IoDrvCanopen.h), 0: none, and their PDOs. */
+#ifndef CANOPEN_MAX_DEVICES
+#define CANOPEN_MAX_DEVICES 0
+#endif
+#ifndef CANOPEN_MAX_PDOS
+#define CANOPEN_MAX_PDOS (4 * CANOPEN_MAX_DEVICES)
+#endif
+
 /* Packets that may arrive over CAN at a time, from as many tools; each costs a packet of CAN_PACKET_SIZE bytes
  * and 30. */
 #ifndef CAN_RX_SESSIONS

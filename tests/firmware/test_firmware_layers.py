@@ -16,7 +16,7 @@ import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 SOURCE = FIRMWARE / "src"
-FLOORS = ["core", "sys", "modbus", "cycle", "load", "app", "io", "comm"]
+FLOORS = ["core", "sys", "modbus", "canopen", "cycle", "load", "app", "can", "io", "comm"]
 
 # Two sources with the same functions, of which a firmware has one.
 INSTEAD_OF = {"CmpScheduleEmbedded": "CmpScheduleTimer"}

@@ -48,6 +48,8 @@
 #define CAN_FD 1
 #define CAN_BLOCK_SIZE 0 /* the kernel has room */
 #define CAN_MAX_USERS 4
+#define CANOPEN_MAX_DEVICES 127
+#define CANOPEN_MAX_PDOS 1024
 #define CAN_FILTERS 32
 #define CAN_URGENT_FRAMES 64
 #define CAN_MAX_RECEIVERS 16

@@ -3,15 +3,17 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Node 0 is the device, node 1 a test, which hears and sends everything.
+ * Node 0 is the device, node 1 a test, which hears and sends everything, node 2 all CANopen nodes (SimCanopen.h).
  */
 #include "SimCanBus.h"
 
 #include <string.h>
 
+#include "../../src/io/CanopenDriver.h"
 #include "IecCan.h"
 #include "Sim.h"
 #include "SimCan.h"
+#include "SimCanopen.h"
 #include "SysTime.h"
 
 enum { TEST = 1, HEARD = 4096 };
@@ -37,8 +39,25 @@ static void hear(void)
     }
 }
 
+static RTS_I64 next_ns(void)
+{
+    RTS_I64 of_bus = SimCanNext();
+    RTS_I64 of_nodes = SimCanopenGetDueNs();
+
+    return of_bus < of_nodes ? of_bus : of_nodes;
+}
+
+/* Each frame, and what nodes do on it, at its time. */
 static void advance(RTS_I64 now_ns)
 {
+    RTS_I64 next;
+
+    SimCanopenRun(SimCanNow()); /* what a test has changed */
+    while ((next = next_ns()) <= now_ns) {
+        SimCanAdvance(next > SimCanNow() ? next : SimCanNow());
+        SimCanopenRun(SimCanNow());
+        hear();
+    }
     SimCanAdvance(now_ns);
     hear();
 }
@@ -46,7 +65,10 @@ static void advance(RTS_I64 now_ns)
 RTS_I64 SimCanBusGetDueNs(RTS_I64 now_ns)
 {
     advance(now_ns);
-    return IecCanWaits() || SimCanFrames() != sim_bus.frames ? now_ns : SimCanNext();
+    if (IecCanWaits() || SimCanFrames() != sim_bus.frames)
+        return now_ns;
+    RTS_I64 of_manager = IoDrvCanopenGetDueNs(now_ns);
+    return of_manager < next_ns() ? of_manager : next_ns();
 }
 
 RTS_RESULT SimCanPut(const SIM_CAN_FRAME *frame)
@@ -78,6 +100,7 @@ RTS_RESULT SimCanBus_Hook(CMP_HOOK hook)
         memset(&sim_bus, 0, sizeof(sim_bus));
         SimCanReset(CAN_BIT_RATE, 0);
         SimCanStart(TEST);
+        SimCanopenForget();
     }
     if (hook == CH_COMM_CYCLE) {
         advance(SysTimeGetNs());

@@ -18,6 +18,7 @@
 #include "IoDrvSim.h"
 #include "Sim.h"
 #include "SimCanBus.h"
+#include "SimCanopen.h"
 #include "SimWire.h"
 #include "SysTime.h"
 #include "sim_port.h"
@@ -386,6 +387,8 @@ static RTS_RESULT set_place(const IoConfigConnector *connector, const SIM_IO_PLA
     REGION region;
     RTS_RESULT result = find_region(connector, place, &region);
 
+    if (result == ERR_NOT_SUPPORTED)
+        return SimCanopenSet(connector, place, data);
     if (result == ERR_OK && region.memory != NULL)
         IoDrvModbusFollowInputs();
     for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++) {
@@ -404,6 +407,8 @@ static RTS_RESULT get_place(const IoConfigConnector *connector, const SIM_IO_PLA
     REGION region;
     RTS_RESULT result = find_region(connector, place, &region);
 
+    if (result == ERR_NOT_SUPPORTED)
+        return SimCanopenGet(connector, place, data);
     if (result == ERR_OK)
         memset(data, 0, (place->bits + 7) / 8);
     for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++)
@@ -428,7 +433,7 @@ static RTS_RESULT set_fault(const IoConfigConnector *connector, RTS_UI32 fault, 
     if (place.server != NULL)
         return ERR_NO_OBJECT;
     if (place.device == NULL && !is_line(connector))
-        return ERR_NOT_SUPPORTED;
+        return SimCanopenFail(connector, fault, value);
     if (fault - IO_SIM_ABSENT >= IO_SIM_FAULTS || (place.device == NULL && fault != IO_SIM_ABSENT))
         return ERR_NO_OBJECT;
     *fault_of(connector, fault) = value;
@@ -462,12 +467,14 @@ static void forget(EVENT_PARAM *event)
     if (has_values)
         memset(values, 0, sizeof(values));
     has_values = false;
+    SimCanopenForget();
     memset(faults, 0, sizeof(faults));
 }
 
 static void make_devices(EVENT_PARAM *event)
 {
     RTS_UNUSED(event);
+    SimCanopenMake(SysTimeGetNs());
     for (RTS_UI32 i = 0; i < setup()->device_count; i++) {
         const MODBUS_DEVICE *device = &setup()->devices[i];
         for (RTS_UI32 k = 0; k < device->job_count; k++) {

@@ -30,6 +30,7 @@
 #define HAS_CmpBlkDrvSimpleCom 1
 #ifdef SIM_HAS_BUSES
 #define HAS_IoDrvModbus 1
+#define HAS_IoDrvCanopen 1
 #define HAS_CmpCan 1
 #define HAS_IecCan 1
 #define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim) X(SimModbus)

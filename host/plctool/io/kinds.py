@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from plctool.io.canopen.manager import read_canopen
 from plctool.io.gpio import read_gpio
 from plctool.io.local import read_local
 from plctool.io.modbus import read_modbus
@@ -15,6 +16,7 @@ from plctool.io.tables import Table
 Kind = Callable[[Table, Context], list[Connector]]
 
 KINDS: dict[str, Kind] = {
+    "canopen": read_canopen,
     "gpio": read_gpio,
     "iio": read_iio,
     "local": read_local,

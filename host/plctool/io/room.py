@@ -15,7 +15,7 @@ from plctool.image.limits import ROOM, Need
 from plctool.io.configuration import Configuration, ConnectorEntry
 
 GPIO, MODBUS = "IoDrvGpio", "IoDrvModbus"
-DRIVERS = (GPIO, MODBUS, "IoDrvSim", "IoDrvSysfs")
+DRIVERS = (GPIO, MODBUS, "IoDrvCanopen", "IoDrvSim", "IoDrvSysfs")
 """Those of this project, each a component of that name."""
 
 IO_MANAGER = "CmpIoMgrEmbedded"

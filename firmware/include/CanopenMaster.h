@@ -1,0 +1,101 @@
+/*
+ * CanopenMaster.h - brings CANopen nodes into operation, and back after a loss: one state machine for each node.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A node is reset (communication only), identified, configured by its concise DCF, started, and watched by its heartbeat.
+ * What goes wrong is repeated after 0, 1, 2, 4, 8, 8 .. s; other nodes are not disturbed. From main; time is an argument.
+ * Frames are sent by the function of the owner; false: no room, it is called again in the next pass.
+ */
+#ifndef CANOPENMASTER_H
+#define CANOPENMASTER_H
+
+#include "CanopenSdoClient.h"
+
+typedef enum {
+    MASTER_RESET,     /* the command is to be sent */
+    MASTER_BOOTS,     /* waits for its boot-up */
+    MASTER_IDENTIFY,  /* reads 1000h and 1018h */
+    MASTER_CONFIGURE, /* writes its concise DCF */
+    MASTER_START,     /* the command is to be sent */
+    MASTER_STARTS,    /* waits for its heartbeat */
+    MASTER_RUNS,
+    MASTER_WAITS, /* until the next attempt */
+} MASTER_STATE;
+
+/* Letters of CiA 302-2 for why a node did not boot, and others. */
+enum {
+    MASTER_WHY_NONE = 0,
+    MASTER_WHY_SILENT = 'B',        /* no reply to 1000h */
+    MASTER_WHY_TYPE = 'C',          /* another 1000h */
+    MASTER_WHY_VENDOR = 'D',        /* another 1018h:1 */
+    MASTER_WHY_CONFIGURATION = 'J', /* a write was refused */
+    MASTER_WHY_NO_HEARTBEAT = 'K',  /* not started */
+    MASTER_WHY_PRODUCT = 'M',
+    MASTER_WHY_REVISION = 'N',
+    MASTER_WHY_LOST = 'h',      /* its heartbeat is missing */
+    MASTER_WHY_RESTARTED = 'r', /* it has booted by itself */
+    MASTER_WHY_STATE = 's',     /* it has left the operational state */
+    MASTER_WHY_LATE = 'p',      /* a PDO is late */
+    MASTER_WHY_BUS = 'o',       /* bus off */
+};
+
+enum { EXPECTED_TYPE, EXPECTED_VENDOR, EXPECTED_PRODUCT, EXPECTED_REVISION, EXPECTED_COUNT };
+
+/* Counters in the order of CANOPEN_PARAM_BOOTS .. */
+typedef struct {
+    RTS_UI32 boots;
+    RTS_UI32 lost;
+    RTS_UI32 timeouts;
+    RTS_UI32 aborts;
+    RTS_UI32 last_abort;
+    RTS_UI32 emcy;
+    RTS_UI32 last_emcy;
+    RTS_UI32 short_pdos;
+} CANOPEN_COUNTERS;
+
+typedef struct {
+    RTS_UI8 node;
+    RTS_UI32 expected[EXPECTED_COUNT]; /* 0: any */
+    const RTS_UI8 *config;             /* entries of the concise DCF */
+    RTS_UI32 config_size;
+    RTS_UI32 heartbeat_ms; /* its period; 0: it has none */
+    /* Of the master. */
+    MASTER_STATE state;
+    RTS_UI8 why;       /* MASTER_WHY_* of the last failure */
+    RTS_UI8 nmt_state; /* of its last heartbeat */
+    bool repeated;     /* the transfer is the second one */
+    RTS_UI32 failures; /* of attempts and losses */
+    RTS_UI32 step;     /* of MASTER_IDENTIFY; of MASTER_CONFIGURE: the place in `config` */
+    RTS_UI32 since_ms; /* of the state; of MASTER_RUNS the last heartbeat */
+    RTS_UI32 wait_ms;  /* before the next attempt */
+    RTS_UI32 found;    /* what it has instead of what is expected */
+    RTS_UI16 index;    /* whose write was refused */
+    RTS_UI8 sub;
+    SDO_CLIENT sdo;
+    CANOPEN_COUNTERS counters;
+} CANOPEN_NODE;
+
+typedef bool (*PF_CANOPEN_SEND)(void *owner, const CAN_FRAME *frame);
+
+/* A node whose first fields are set begins with its reset. */
+void CanopenNodeBegin(CANOPEN_NODE *node, RTS_UI32 timeout_ms, RTS_UI32 now_ms);
+
+/* A frame of the node: heartbeat, SDO reply or EMCY. */
+void CanopenNodeTake(CANOPEN_NODE *node, const CAN_FRAME *frame, RTS_UI32 now_ms);
+
+void CanopenNodePoll(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_UI32 now_ms);
+
+/* The owner has seen that it is lost. */
+void CanopenNodeLose(CANOPEN_NODE *node, RTS_UI8 why, RTS_UI32 now_ms);
+
+/* How long it is until it has something to do without a frame [ms]; UINT32_MAX: never. */
+RTS_UI32 CanopenNodeGetWaitMs(const CANOPEN_NODE *node, RTS_UI32 now_ms);
+
+/* Sends a command to a node; false: no room. */
+bool CanopenSendNmt(PF_CANOPEN_SEND send, void *owner, RTS_UI8 command, RTS_UI8 node);
+
+/* True if the concise DCF of `size` bytes, a count and entries, is whole. */
+bool CanopenIsConfig(const RTS_UI8 *config, RTS_UI32 size);
+
+#endif

@@ -1,0 +1,457 @@
+/*
+ * SimCanopen.c - the CANopen nodes of the description, on the CAN bus of the simulator.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A node boots, is what the description expects, has the objects that were written to it, and exchanges those PDOs that
+ * were configured: so a configuration that is not written shows. It knows the place of a channel from the description.
+ */
+#include "SimCanopen.h"
+
+#include <string.h>
+
+#include "../../src/io/CanopenDriver.h"
+#include "CmpBytes.h"
+#include "IoDrvSim.h"
+#include "SimCan.h"
+
+#define NEVER INT64_MAX
+#define NS_PER_MS ((RTS_I64)1000000)
+#define BOOT_NS (50 * NS_PER_MS)
+#define REPLY_NS ((RTS_I64)200000)
+
+enum { OBJECTS = 512, OBJECT_SIZE = 8, OFF = 0xFF, TPDO_PARAMETERS = 0x1800, LAST_PDO = 0x1FF, EVENT_TIMER = 5 };
+
+typedef struct {
+    RTS_UI16 index;
+    RTS_UI8 sub;
+    RTS_UI8 size; /* of more bytes the first ones are kept */
+    RTS_UI8 data[OBJECT_SIZE];
+} OBJECT;
+
+typedef struct {
+    RTS_UI8 state; /* NODE_*, OFF */
+    RTS_I64 boot_ns;
+    RTS_I64 heartbeat_ns;
+    RTS_I64 reply_ns;
+    CAN_FRAME reply;
+    OBJECT writing; /* in segments */
+    RTS_UI32 written;
+    RTS_UI32 count;
+    OBJECT objects[OBJECTS];
+    RTS_UI32 faults[IO_SIM_FAULTS];
+} NODE;
+
+static NODE nodes[CANOPEN_MAX_DEVICES];
+
+static struct {
+    RTS_UI8 data[CANOPEN_PDO_SIZE]; /* what the node measures, or has got */
+    bool changed;
+    RTS_I64 event_ns; /* when an input is sent next though nothing changes */
+} pdos[CANOPEN_MAX_PDOS];
+
+static CANOPEN_SETUP *setup(void)
+{
+    return IoDrvCanopenGetSetup();
+}
+
+static CANOPEN_DEVICE *device_of(const NODE *node)
+{
+    return &setup()->devices[node - nodes];
+}
+
+static RTS_UI32 fault_of(const NODE *node, RTS_UI32 id)
+{
+    return node->faults[id - IO_SIM_ABSENT];
+}
+
+#define FOR_EACH_NODE(node) for (NODE *node = nodes; node < nodes + setup()->device_count; node++)
+
+/* ---- objects ---- */
+
+static OBJECT *find_object(NODE *node, RTS_UI32 index, RTS_UI32 sub)
+{
+    for (RTS_UI32 i = 0; i < node->count; i++)
+        if (node->objects[i].index == index && node->objects[i].sub == sub)
+            return &node->objects[i];
+    return NULL;
+}
+
+static RTS_UI32 number_of(NODE *node, RTS_UI32 index, RTS_UI32 sub)
+{
+    const OBJECT *object = find_object(node, index, sub);
+
+    return object != NULL ? BytesGet32(object->data) : 0;
+}
+
+static bool store(NODE *node, const OBJECT *object, RTS_I64 now_ns)
+{
+    OBJECT *place = find_object(node, object->index, object->sub);
+
+    if (place == NULL && node->count == OBJECTS)
+        return false;
+    if (place == NULL)
+        place = &node->objects[node->count++];
+    *place = *object;
+    if (object->index == OBJECT_HEARTBEAT) {
+        RTS_UI32 ms = BytesGet16(object->data);
+        node->heartbeat_ns = ms != 0 ? now_ns + ms * NS_PER_MS : NEVER;
+    }
+    return true;
+}
+
+/* What every node has. */
+static bool read_fixed(const NODE *node, OBJECT *object)
+{
+    const RTS_UI32 *expected = device_of(node)->node.expected;
+    RTS_UI32 other = fault_of(node, IO_SIM_TYPE) != 0;
+
+    object->size = 4;
+    if (object->index == OBJECT_TYPE && object->sub == 0)
+        BytesPut32(object->data, expected[EXPECTED_TYPE] + other);
+    else if (object->index == OBJECT_IDENTITY && object->sub >= 1 && object->sub < EXPECTED_COUNT)
+        BytesPut32(object->data, expected[object->sub]);
+    else
+        return false;
+    return true;
+}
+
+/* The parameters of the TPDO with this identifier, if it was configured; 0: none. */
+static RTS_UI32 find_tpdo(NODE *node, RTS_UI32 cob)
+{
+    for (RTS_UI32 i = 0; i < node->count; i++)
+        if (node->objects[i].index >= TPDO_PARAMETERS && node->objects[i].index <= TPDO_PARAMETERS + LAST_PDO &&
+            node->objects[i].sub == 1 && BytesGet32(node->objects[i].data) == cob)
+            return node->objects[i].index;
+    return 0;
+}
+
+/* ---- frames to the bus ---- */
+
+static void send(RTS_UI32 id, const void *data, RTS_UI32 size)
+{
+    CAN_FRAME frame = {.id = id, .size = (RTS_UI8)size};
+
+    memcpy(frame.data, data, size);
+    (void)SimCanSend(SIM_CANOPEN_NODE, &frame);
+}
+
+static void send_state(const NODE *node)
+{
+    send(CANOPEN_HEARTBEAT + (RTS_UI32)device_of(node)->node.node, &node->state, 1);
+}
+
+static void send_input(NODE *node, RTS_UI32 pdo, RTS_I64 now_ns)
+{
+    const CANOPEN_PDO *described = &setup()->pdos[pdo].pdo;
+    RTS_UI32 parameters = find_tpdo(node, described->cob);
+    RTS_UI32 event_ms = parameters != 0 ? number_of(node, parameters, EVENT_TIMER) : 0;
+
+    pdos[pdo].changed = false;
+    bool is_synchronous = (described->flags & CANOPEN_PDO_SYNC) != 0;
+    pdos[pdo].event_ns = event_ms != 0 && !is_synchronous ? now_ns + event_ms * NS_PER_MS : NEVER;
+    if (parameters != 0)
+        send(described->cob, pdos[pdo].data, described->size);
+}
+
+static void send_inputs(NODE *node, bool of_sync, bool all, RTS_I64 now_ns)
+{
+    const CANOPEN_DEVICE *device = device_of(node);
+    RTS_UI32 first = (RTS_UI32)(device->pdos - setup()->pdos);
+
+    for (RTS_UI32 i = first; i < first + device->pdo_count && node->state == NODE_OPERATIONAL; i++) {
+        RTS_UI32 flags = setup()->pdos[i].pdo.flags;
+        bool is_synchronous = (flags & CANOPEN_PDO_SYNC) != 0;
+        if ((flags & CANOPEN_PDO_OUTPUT) != 0 || is_synchronous != of_sync)
+            continue;
+        if (all || pdos[i].changed || pdos[i].event_ns <= now_ns)
+            send_input(node, i, now_ns);
+    }
+}
+
+/* ---- NMT ---- */
+
+static void power_on(NODE *node, RTS_I64 now_ns)
+{
+    node->state = NODE_BOOTS;
+    node->count = 0;
+    node->boot_ns = now_ns + BOOT_NS;
+    node->heartbeat_ns = node->reply_ns = NEVER;
+}
+
+static void power_off(NODE *node)
+{
+    node->state = OFF;
+    node->boot_ns = node->heartbeat_ns = node->reply_ns = NEVER;
+}
+
+static void command(NODE *node, RTS_UI8 command, RTS_I64 now_ns)
+{
+    if (node->state == OFF || node->state == NODE_BOOTS)
+        return;
+    switch (command) {
+    case NMT_START:
+        node->state = NODE_OPERATIONAL;
+        send_inputs(node, false, true, now_ns);
+        break;
+    case NMT_STOP:
+        node->state = NODE_STOPPED;
+        break;
+    case NMT_PREOPERATIONAL:
+        node->state = NODE_PREOPERATIONAL;
+        break;
+    case NMT_RESET_NODE:
+    case NMT_RESET_COMMUNICATION:
+        power_on(node, now_ns);
+        break;
+    default:
+        break;
+    }
+}
+
+/* ---- SDO ---- */
+
+static void reply(NODE *node, const RTS_UI8 *data, RTS_I64 now_ns)
+{
+    node->reply = (CAN_FRAME){.id = CANOPEN_SDO_REPLY + (RTS_UI32)device_of(node)->node.node, .size = 8};
+    memcpy(node->reply.data, data, 8);
+    node->reply_ns = now_ns + REPLY_NS + fault_of(node, IO_SIM_LATE) * NS_PER_MS;
+}
+
+static void refuse(NODE *node, RTS_UI8 *data, RTS_UI32 code, RTS_I64 now_ns)
+{
+    data[0] = SDO_ABORT;
+    BytesPut32(data + 4, code);
+    reply(node, data, now_ns);
+}
+
+static void serve_read(NODE *node, RTS_UI8 *data, OBJECT *object, RTS_I64 now_ns)
+{
+    const OBJECT *found = find_object(node, object->index, object->sub);
+
+    if (found != NULL)
+        *object = *found;
+    else if (!read_fixed(node, object)) {
+        refuse(node, data, SDO_ABORT_NO_OBJECT, now_ns);
+        return;
+    }
+    RTS_UI32 size = object->size < 4 ? object->size : 4;
+    data[0] = (RTS_UI8)(0x43 | (4 - size) << 2);
+    memset(data + 4, 0, 4);
+    memcpy(data + 4, object->data, size);
+    reply(node, data, now_ns);
+}
+
+static void end_write(NODE *node, RTS_UI8 *data, const OBJECT *object, RTS_UI8 command, RTS_I64 now_ns)
+{
+    if (!store(node, object, now_ns)) {
+        refuse(node, data, SDO_ABORT_MEMORY, now_ns);
+        return;
+    }
+    data[0] = command;
+    memset(data + 4, 0, 4);
+    reply(node, data, now_ns);
+}
+
+static void serve_segment(NODE *node, RTS_UI8 *data, RTS_I64 now_ns)
+{
+    RTS_UI8 toggle = data[0] & SDO_TOGGLE;
+    RTS_UI32 size = 7 - (data[0] >> 1 & 7u);
+
+    for (RTS_UI32 i = 0; i < size && node->written < OBJECT_SIZE; i++)
+        node->writing.data[node->written++] = data[1 + i];
+    node->writing.size = (RTS_UI8)node->written;
+    if ((data[0] & 1) != 0)
+        (void)store(node, &node->writing, now_ns);
+    memset(data, 0, 8);
+    data[0] = SDO_SEGMENT_DONE | toggle;
+    reply(node, data, now_ns);
+}
+
+static void serve(NODE *node, RTS_UI8 *data, RTS_I64 now_ns)
+{
+    OBJECT object = {.index = BytesGet16(data + 1), .sub = data[3]};
+
+    if (data[0] == SDO_ABORT)
+        return;
+    if (fault_of(node, IO_SIM_ANSWERS) != 0) {
+        node->faults[IO_SIM_ANSWERS - IO_SIM_ABSENT]--;
+        refuse(node, data, SDO_ABORT_GENERAL, now_ns);
+    } else if (data[0] == SDO_READ) {
+        serve_read(node, data, &object, now_ns);
+    } else if ((data[0] & SDO_KIND) == 0x20 && (data[0] & 2) != 0) {
+        object.size = (RTS_UI8)(4 - (data[0] >> 2 & 3u));
+        memcpy(object.data, data + 4, object.size);
+        end_write(node, data, &object, SDO_WRITE_DONE, now_ns);
+    } else if ((data[0] & SDO_KIND) == 0x20) {
+        node->writing = object;
+        node->written = 0;
+        data[0] = SDO_WRITE_DONE;
+        reply(node, data, now_ns);
+    } else if ((data[0] & SDO_KIND) == SDO_WRITE_SEGMENT) {
+        serve_segment(node, data, now_ns);
+    } else {
+        refuse(node, data, SDO_ABORT_COMMAND, now_ns);
+    }
+}
+
+/* ---- frames from the bus ---- */
+
+static void take_output(NODE *node, const CAN_FRAME *frame)
+{
+    const CANOPEN_DEVICE *device = device_of(node);
+    RTS_UI32 first = (RTS_UI32)(device->pdos - setup()->pdos);
+
+    for (RTS_UI32 i = first; i < first + device->pdo_count && node->state == NODE_OPERATIONAL; i++) {
+        const CANOPEN_PDO *pdo = &setup()->pdos[i].pdo;
+        if (pdo->cob == frame->id && (pdo->flags & CANOPEN_PDO_OUTPUT) != 0 && frame->size >= pdo->size)
+            memcpy(pdos[i].data, frame->data, pdo->size);
+    }
+}
+
+static void take_of_node(NODE *node, CAN_FRAME *frame, RTS_I64 now_ns)
+{
+    RTS_UI8 number = device_of(node)->node.node;
+    bool can_serve = node->state == NODE_OPERATIONAL || node->state == NODE_PREOPERATIONAL;
+
+    if (frame->id == CANOPEN_NMT && frame->size == 2 && (frame->data[1] == 0 || frame->data[1] == number))
+        command(node, frame->data[0], now_ns);
+    else if (frame->id == CANOPEN_SYNC)
+        send_inputs(node, true, true, now_ns);
+    else if (frame->id == CANOPEN_SDO_REQUEST + (RTS_UI32)number && frame->size == 8 && can_serve)
+        serve(node, frame->data, now_ns);
+    else
+        take_output(node, frame);
+}
+
+static void run_node(NODE *node, RTS_I64 now_ns)
+{
+    if (node->boot_ns <= now_ns) {
+        node->boot_ns = NEVER;
+        send_state(node);
+        node->state = NODE_PREOPERATIONAL;
+    }
+    if (node->reply_ns <= now_ns) {
+        node->reply_ns = NEVER;
+        (void)SimCanSend(SIM_CANOPEN_NODE, &node->reply);
+    }
+    if (node->heartbeat_ns <= now_ns) {
+        node->heartbeat_ns += number_of(node, OBJECT_HEARTBEAT, 0) * NS_PER_MS;
+        send_state(node);
+    }
+    send_inputs(node, false, false, now_ns);
+}
+
+void SimCanopenRun(RTS_I64 now_ns)
+{
+    CAN_FRAME frame;
+
+    while (SimCanReceive(SIM_CANOPEN_NODE, &frame) == ERR_OK)
+        FOR_EACH_NODE (node) {
+            CAN_FRAME own = frame;
+            if (node->state != OFF && (frame.flags & (CAN_FLAG_EXTENDED | CAN_FLAG_REMOTE)) == 0)
+                take_of_node(node, &own, now_ns);
+        }
+    FOR_EACH_NODE (node)
+        run_node(node, now_ns);
+}
+
+static RTS_I64 earlier(RTS_I64 a, RTS_I64 b)
+{
+    return a < b ? a : b;
+}
+
+RTS_I64 SimCanopenGetDueNs(void)
+{
+    RTS_I64 due_ns = NEVER;
+
+    FOR_EACH_NODE (node) {
+        const CANOPEN_DEVICE *device = device_of(node);
+        RTS_UI32 first = (RTS_UI32)(device->pdos - setup()->pdos);
+        due_ns = earlier(due_ns, earlier(node->boot_ns, earlier(node->heartbeat_ns, node->reply_ns)));
+        for (RTS_UI32 i = first; i < first + device->pdo_count && node->state == NODE_OPERATIONAL; i++)
+            due_ns = earlier(due_ns, pdos[i].event_ns);
+    }
+    return due_ns;
+}
+
+/* ---- channels and faults ---- */
+
+/* The PDO of a channel; CANOPEN_MAX_PDOS: none. */
+static RTS_UI32 find_pdo(const IoConfigConnector *connector, const SIM_IO_PLACE *place, RTS_RESULT *result)
+{
+    const CANOPEN_PDO_STATE *state = CanopenFindPdo(setup(), connector, place->parameter);
+
+    *result = state != NULL ? ERR_OK : ERR_NOT_SUPPORTED;
+    if (state != NULL && (place->bits > 8u * state->pdo.size || place->bit > 8u * state->pdo.size - place->bits))
+        *result = ERR_OUT_OF_LIMITS;
+    return state != NULL ? (RTS_UI32)(state - setup()->pdos) : CANOPEN_MAX_PDOS;
+}
+
+RTS_RESULT SimCanopenSet(const IoConfigConnector *connector, const SIM_IO_PLACE *place, const RTS_UI8 *data)
+{
+    RTS_RESULT result;
+    RTS_UI32 pdo = find_pdo(connector, place, &result);
+
+    for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++) {
+        RTS_UI32 at = place->bit + i;
+        RTS_UI8 *byte = &pdos[pdo].data[at / 8];
+        *byte = (RTS_UI8)((*byte & ~(1u << at % 8)) | (data[i / 8] >> i % 8 & 1u) << at % 8);
+        pdos[pdo].changed = true;
+        if ((setup()->pdos[pdo].pdo.flags & (CANOPEN_PDO_SYNC | CANOPEN_PDO_OUTPUT)) == 0)
+            pdos[pdo].event_ns = SimNow(); /* at once */
+    }
+    return result;
+}
+
+RTS_RESULT SimCanopenGet(const IoConfigConnector *connector, const SIM_IO_PLACE *place, RTS_UI8 *data)
+{
+    RTS_RESULT result;
+    RTS_UI32 pdo = find_pdo(connector, place, &result);
+
+    if (result == ERR_OK)
+        memset(data, 0, (place->bits + 7) / 8);
+    for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++) {
+        RTS_UI32 at = place->bit + i;
+        data[i / 8] |= (RTS_UI8)((pdos[pdo].data[at / 8] >> at % 8 & 1u) << i % 8);
+    }
+    return result;
+}
+
+RTS_RESULT SimCanopenFail(const IoConfigConnector *connector, RTS_UI32 fault, RTS_UI32 value)
+{
+    const CANOPEN_DEVICE *device = CanopenFindDevice(setup(), connector);
+
+    if (device == NULL)
+        return ERR_NOT_SUPPORTED;
+    if (fault - IO_SIM_ABSENT >= IO_SIM_FAULTS || fault == IO_SIM_CUT)
+        return ERR_NO_OBJECT;
+    NODE *node = &nodes[device - setup()->devices];
+    node->faults[fault - IO_SIM_ABSENT] = value;
+    if (fault == IO_SIM_ABSENT && value != 0)
+        power_off(node);
+    else if (fault == IO_SIM_ABSENT && node->state == OFF)
+        power_on(node, SimNow());
+    return ERR_OK;
+}
+
+/* ---- configurations ---- */
+
+void SimCanopenForget(void)
+{
+    memset(nodes, 0, sizeof(nodes));
+    memset(pdos, 0, sizeof(pdos));
+    for (RTS_UI32 i = 0; i < CANOPEN_MAX_DEVICES; i++)
+        power_off(&nodes[i]);
+}
+
+void SimCanopenMake(RTS_I64 now_ns)
+{
+    SimCanopenForget();
+    if (setup()->device_count != 0)
+        SimCanStart(SIM_CANOPEN_NODE);
+    FOR_EACH_NODE (node)
+        power_on(node, now_ns);
+    for (RTS_UI32 i = 0; i < CANOPEN_MAX_PDOS; i++)
+        pdos[i].event_ns = NEVER;
+}

@@ -1,0 +1,358 @@
+/*
+ * CanopenMaster.c - brings CANopen nodes into operation, and back after a loss.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CanopenMaster.h"
+
+#include <string.h>
+
+#include "CmpBytes.h"
+
+enum {
+    BOOT_MS = 1000,     /* then it is asked anyway: it may be up already */
+    MAX_WAIT_MS = 8000, /* between two attempts */
+    FIRST_WAIT_MS = 1000,
+    LEAST_GRACE_MS = 50,
+    START_MS = 1000, /* until the first heartbeat of a node that is started, if its period is shorter */
+    AGAIN_MS = 10,   /* after a frame that could not be sent */
+    ENTRY_HEAD = 7,  /* of a concise DCF: index, sub-index, size */
+    COUNT_SIZE = 4,
+    EMCY_MIN = 2,
+};
+
+static const struct {
+    RTS_UI16 index;
+    RTS_UI8 sub;
+    RTS_UI8 why;
+} identity[EXPECTED_COUNT] = {
+    {OBJECT_TYPE, 0, MASTER_WHY_TYPE},
+    {OBJECT_IDENTITY, 1, MASTER_WHY_VENDOR},
+    {OBJECT_IDENTITY, 2, MASTER_WHY_PRODUCT},
+    {OBJECT_IDENTITY, 3, MASTER_WHY_REVISION},
+};
+
+static void enter(CANOPEN_NODE *node, MASTER_STATE state, RTS_UI32 now_ms)
+{
+    node->state = state;
+    node->since_ms = now_ms;
+    node->step = 0;
+    node->repeated = false;
+    node->sdo.state = SDO_IDLE;
+}
+
+void CanopenNodeBegin(CANOPEN_NODE *node, RTS_UI32 timeout_ms, RTS_UI32 now_ms)
+{
+    node->sdo.timeout_ms = timeout_ms;
+    enter(node, MASTER_RESET, now_ms);
+}
+
+/* The next attempt: at once after a loss, then later each time. */
+static void fail(CANOPEN_NODE *node, RTS_UI8 why, RTS_UI32 now_ms)
+{
+    bool ran = node->state == MASTER_RUNS;
+
+    node->counters.lost += ran;
+    node->failures++;
+    node->why = why;
+    if (ran)
+        node->wait_ms = 0;
+    else
+        node->wait_ms = node->wait_ms == 0 ? FIRST_WAIT_MS : 2 * node->wait_ms;
+    if (node->wait_ms > MAX_WAIT_MS)
+        node->wait_ms = MAX_WAIT_MS;
+    enter(node, MASTER_WAITS, now_ms);
+}
+
+void CanopenNodeLose(CANOPEN_NODE *node, RTS_UI8 why, RTS_UI32 now_ms)
+{
+    if (node->state == MASTER_RUNS)
+        fail(node, why, now_ms);
+}
+
+bool CanopenSendNmt(PF_CANOPEN_SEND send, void *owner, RTS_UI8 command, RTS_UI8 node)
+{
+    const CAN_FRAME frame = {.id = CANOPEN_NMT, .size = 2, .data = {command, node}};
+
+    return send(owner, &frame);
+}
+
+/* ---- the concise DCF ---- */
+
+/* The entry at a place: its data; NULL: it is not whole. */
+static const RTS_UI8 *entry_at(const RTS_UI8 *config, RTS_UI32 config_size, RTS_UI32 place, RTS_UI32 *size)
+{
+    if (config_size - place < ENTRY_HEAD)
+        return NULL;
+    *size = BytesGet32(config + place + 3);
+    return *size <= config_size - place - ENTRY_HEAD ? config + place + ENTRY_HEAD : NULL;
+}
+
+bool CanopenIsConfig(const RTS_UI8 *config, RTS_UI32 size)
+{
+    RTS_UI32 place = COUNT_SIZE;
+    RTS_UI32 count = size >= COUNT_SIZE ? BytesGet32(config) : 1;
+    RTS_UI32 bytes;
+
+    if (size < COUNT_SIZE)
+        return false;
+    for (; count > 0 && entry_at(config, size, place, &bytes) != NULL; count--)
+        place += ENTRY_HEAD + bytes;
+    return count == 0 && place == size;
+}
+
+/* ---- steps ---- */
+
+static void identify(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    while (node->step > 0 && node->step < EXPECTED_COUNT && node->expected[node->step] == 0)
+        node->step++;
+    if (node->step == EXPECTED_COUNT) {
+        enter(node, MASTER_CONFIGURE, now_ms);
+        node->step = COUNT_SIZE;
+    } else {
+        SdoClientRead(&node->sdo, node->node, identity[node->step].index, identity[node->step].sub, now_ms);
+    }
+}
+
+static void configure(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    const RTS_UI8 *at = node->config + node->step;
+    RTS_UI32 size;
+    const RTS_UI8 *data =
+        node->step < node->config_size ? entry_at(node->config, node->config_size, node->step, &size) : NULL;
+
+    if (data == NULL)
+        enter(node, MASTER_START, now_ms);
+    else
+        SdoClientWrite(&node->sdo, node->node, BytesGet16(at), at[2], data, size, now_ms);
+}
+
+/* The revision of a device that fits has the same major number. */
+static bool is_expected(const CANOPEN_NODE *node, RTS_UI32 found)
+{
+    RTS_UI32 expected = node->expected[node->step];
+
+    if (node->step == EXPECTED_REVISION)
+        return expected >> 16 == found >> 16;
+    return expected == 0 || expected == found;
+}
+
+static void take_identity(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    RTS_UI32 found = SdoClientGetNumber(&node->sdo);
+
+    if (!is_expected(node, found)) {
+        node->found = found;
+        fail(node, identity[node->step].why, now_ms);
+        return;
+    }
+    node->step++;
+    node->repeated = false;
+    identify(node, now_ms);
+}
+
+static void take_written(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    RTS_UI32 size;
+
+    if (entry_at(node->config, node->config_size, node->step, &size) != NULL)
+        node->step += ENTRY_HEAD + size;
+    node->repeated = false;
+    configure(node, now_ms);
+}
+
+static void begin_step(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    if (node->state == MASTER_IDENTIFY)
+        identify(node, now_ms);
+    else
+        configure(node, now_ms);
+}
+
+/* A transfer has failed: it is repeated once if there was no reply. */
+static void fail_step(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    bool silent = node->sdo.state == SDO_SILENT;
+
+    node->counters.timeouts += silent;
+    node->counters.aborts += !silent;
+    node->counters.last_abort = node->sdo.abort;
+    if (silent && !node->repeated) {
+        node->repeated = true;
+        begin_step(node, now_ms);
+        return;
+    }
+    node->index = node->sdo.index;
+    node->sub = node->sdo.sub;
+    if (silent)
+        fail(node, MASTER_WHY_SILENT, now_ms);
+    else
+        fail(node, node->state == MASTER_IDENTIFY ? identity[node->step].why : MASTER_WHY_CONFIGURATION, now_ms);
+}
+
+static void follow_transfer(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    switch (node->sdo.state) {
+    case SDO_IDLE:
+        begin_step(node, now_ms);
+        break;
+    case SDO_DONE:
+        if (node->state == MASTER_IDENTIFY)
+            take_identity(node, now_ms);
+        else
+            take_written(node, now_ms);
+        break;
+    case SDO_ABORTED:
+    case SDO_SILENT:
+        fail_step(node, now_ms);
+        break;
+    default:
+        break;
+    }
+}
+
+static RTS_UI32 grace_ms(const CANOPEN_NODE *node)
+{
+    RTS_UI32 grace = node->heartbeat_ms * 5 / 2;
+
+    return grace >= node->heartbeat_ms + LEAST_GRACE_MS ? grace : node->heartbeat_ms + LEAST_GRACE_MS;
+}
+
+static RTS_UI32 start_ms(const CANOPEN_NODE *node)
+{
+    return grace_ms(node) > START_MS ? grace_ms(node) : START_MS;
+}
+
+static void run(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    node->counters.boots++;
+    node->why = MASTER_WHY_NONE;
+    node->wait_ms = 0;
+    enter(node, MASTER_RUNS, now_ms);
+}
+
+/* ---- frames ---- */
+
+static void take_heartbeat(CANOPEN_NODE *node, RTS_UI8 state, RTS_UI32 now_ms)
+{
+    node->nmt_state = state;
+    if (state == NODE_BOOTS) {
+        if (node->state == MASTER_RUNS || node->state == MASTER_STARTS || node->state == MASTER_CONFIGURE)
+            fail(node, MASTER_WHY_RESTARTED, now_ms);
+        if (node->state == MASTER_BOOTS || node->state == MASTER_WAITS)
+            enter(node, MASTER_IDENTIFY, now_ms); /* it has just been reset: no need to do it again */
+    } else if (node->state == MASTER_STARTS && state == NODE_OPERATIONAL) {
+        run(node, now_ms);
+    } else if (node->state == MASTER_RUNS && state == NODE_OPERATIONAL) {
+        node->since_ms = now_ms;
+    } else if (node->state == MASTER_RUNS) {
+        fail(node, MASTER_WHY_STATE, now_ms);
+    }
+}
+
+void CanopenNodeTake(CANOPEN_NODE *node, const CAN_FRAME *frame, RTS_UI32 now_ms)
+{
+    RTS_UI32 function = frame->id & CANOPEN_FUNCTION_MASK;
+
+    if ((frame->flags & CAN_FLAG_REMOTE) != 0)
+        return;
+    if (function == CANOPEN_HEARTBEAT && frame->size == 1) {
+        take_heartbeat(node, frame->data[0] & 0x7F, now_ms);
+    } else if (function == CANOPEN_SDO_REPLY) {
+        SdoClientTake(&node->sdo, frame, now_ms);
+    } else if (function == CANOPEN_EMCY && frame->size >= EMCY_MIN) {
+        node->counters.emcy++;
+        node->counters.last_emcy = BytesGet16(frame->data);
+    }
+}
+
+/* ---- time ---- */
+
+static bool flush(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner)
+{
+    if (node->sdo.has_request)
+        node->sdo.has_request = !send(owner, &node->sdo.request);
+    return !node->sdo.has_request;
+}
+
+static void poll_state(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_UI32 now_ms)
+{
+    RTS_UI32 since_ms = now_ms - node->since_ms;
+
+    switch (node->state) {
+    case MASTER_RESET:
+        if (CanopenSendNmt(send, owner, NMT_RESET_COMMUNICATION, node->node))
+            enter(node, MASTER_BOOTS, now_ms);
+        break;
+    case MASTER_BOOTS:
+        if (since_ms >= BOOT_MS)
+            enter(node, MASTER_IDENTIFY, now_ms);
+        break;
+    case MASTER_START:
+        if (CanopenSendNmt(send, owner, NMT_START, node->node))
+            enter(node, MASTER_STARTS, now_ms);
+        break;
+    case MASTER_STARTS:
+        if (node->heartbeat_ms == 0)
+            run(node, now_ms);
+        else if (since_ms >= start_ms(node))
+            fail(node, MASTER_WHY_NO_HEARTBEAT, now_ms);
+        break;
+    case MASTER_RUNS:
+        if (node->heartbeat_ms != 0 && since_ms >= grace_ms(node))
+            fail(node, MASTER_WHY_LOST, now_ms);
+        break;
+    case MASTER_WAITS:
+        if (since_ms >= node->wait_ms)
+            enter(node, MASTER_RESET, now_ms);
+        break;
+    default:
+        break;
+    }
+}
+
+void CanopenNodePoll(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_UI32 now_ms)
+{
+    MASTER_STATE before;
+
+    do {
+        before = node->state;
+        SdoClientPoll(&node->sdo, now_ms);
+        if (!flush(node, send, owner))
+            return;
+        if (node->state == MASTER_IDENTIFY || node->state == MASTER_CONFIGURE)
+            follow_transfer(node, now_ms);
+        else
+            poll_state(node, send, owner, now_ms);
+        (void)flush(node, send, owner);
+    } while (node->state != before);
+}
+
+static RTS_UI32 left_ms(RTS_UI32 since_ms, RTS_UI32 of_ms)
+{
+    return since_ms < of_ms ? of_ms - since_ms : 0;
+}
+
+RTS_UI32 CanopenNodeGetWaitMs(const CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    RTS_UI32 since_ms = now_ms - node->since_ms;
+
+    if (node->sdo.has_request)
+        return AGAIN_MS;
+    switch (node->state) {
+    case MASTER_BOOTS:
+        return left_ms(since_ms, BOOT_MS);
+    case MASTER_STARTS:
+        return left_ms(since_ms, start_ms(node));
+    case MASTER_RUNS:
+        return node->heartbeat_ms != 0 ? left_ms(since_ms, grace_ms(node)) : UINT32_MAX;
+    case MASTER_WAITS:
+        return left_ms(since_ms, node->wait_ms);
+    case MASTER_IDENTIFY:
+    case MASTER_CONFIGURE:
+        return node->sdo.state == SDO_BUSY ? left_ms(now_ms - node->sdo.since_ms, node->sdo.timeout_ms) : AGAIN_MS;
+    default:
+        return AGAIN_MS;
+    }
+}

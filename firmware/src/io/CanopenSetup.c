@@ -1,0 +1,173 @@
+/*
+ * CanopenSetup.c - the networks, nodes and PDOs of CANopen that the configuration asks for.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CanopenSetup.h"
+
+#include <string.h>
+
+#include "CmpBytes.h"
+#include "CmpIoMgrEmbedded.h"
+#include "SysTime.h"
+
+#if CANOPEN_MAX_DEVICES > 0
+
+enum { DEFAULT_TIMEOUT_MS = 1000, MAX_MS = 60000 };
+
+static RTS_UI32 number(const IoConfigConnector *connector, RTS_UI32 id, RTS_UI32 otherwise)
+{
+    RTS_RESULT result;
+    const IoConfigParameter *parameter = IoMgrConfigGetParameter(connector, id);
+    RTS_UI32 value = IoMgrConfigGetParameterValueDword(parameter, &result);
+
+    return result == ERR_OK ? value : otherwise;
+}
+
+/* The bytes of a parameter; NULL: it is missing, or has none. */
+static const RTS_UI8 *bytes(const IoConfigConnector *connector, RTS_UI32 id, RTS_UI32 *size)
+{
+    const IoConfigParameter *parameter = IoMgrConfigGetParameter(connector, id);
+
+    *size = parameter != NULL ? parameter->bits / 8 : 0;
+    return *size != 0 ? IoMgrConfigGetParameterValuePointer(parameter, NULL) : NULL;
+}
+
+static bool is_pdo_good(const CANOPEN_PDO *pdo)
+{
+    return pdo->cob > CANOPEN_SYNC && pdo->cob < 0x800 && pdo->size >= 1 && pdo->size <= CANOPEN_PDO_SIZE;
+}
+
+static RTS_RESULT add_pdo(CANOPEN_SETUP *setup, CANOPEN_LINE *line, CANOPEN_DEVICE *device, const CANOPEN_PDO *pdo)
+{
+    CANOPEN_PDO_STATE *state = &setup->pdos[setup->pdo_count];
+    bool is_input = (pdo->flags & CANOPEN_PDO_OUTPUT) == 0;
+
+    if (setup->pdo_count == CANOPEN_MAX_PDOS)
+        return IoMgrConfigRefuse(device->connector, ERR_NOMEMORY, "this device has room for %u PDOs.",
+                                 (unsigned)CANOPEN_MAX_PDOS);
+    if (!is_pdo_good(pdo) || (is_input && line->by_cob[pdo->cob] != NULL))
+        return IoMgrConfigRefuse(device->connector, ERR_PARAMETER, "PDO %u cannot have the identifier 0x%X.",
+                                 (unsigned)device->pdo_count, (unsigned)pdo->cob);
+    state->pdo = *pdo;
+    if (is_input)
+        line->by_cob[pdo->cob] = state;
+    setup->pdo_count++;
+    device->pdo_count++;
+    return ERR_OK;
+}
+
+static RTS_RESULT add_pdos(CANOPEN_SETUP *setup, CANOPEN_LINE *line, CANOPEN_DEVICE *device)
+{
+    const CANOPEN_PDO *pdo;
+    RTS_RESULT result = ERR_OK;
+    RTS_UI32 before, size;
+
+    device->pdos = setup->pdos + setup->pdo_count;
+    do {
+        before = device->pdo_count;
+        pdo = (const CANOPEN_PDO *)bytes(device->connector, CANOPEN_PARAM_PDO + before, &size);
+        if (pdo != NULL && size == sizeof(*pdo))
+            result = add_pdo(setup, line, device, pdo);
+    } while (result == ERR_OK && device->pdo_count != before);
+    return result;
+}
+
+static RTS_RESULT describe(CANOPEN_NODE *node, const IoConfigConnector *connector)
+{
+    RTS_UI32 size;
+    const RTS_UI8 *expected = bytes(connector, CANOPEN_PARAM_EXPECTED, &size);
+
+    for (RTS_UI32 i = 0; i < EXPECTED_COUNT && expected != NULL && size == 4 * EXPECTED_COUNT; i++)
+        node->expected[i] = BytesGet32(expected + 4 * i);
+    node->heartbeat_ms = number(connector, CANOPEN_PARAM_HEARTBEAT, 0);
+    node->config = bytes(connector, CANOPEN_PARAM_CONFIG, &node->config_size);
+    if (node->config != NULL && !CanopenIsConfig(node->config, node->config_size))
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its concise DCF is damaged.");
+    return ERR_OK;
+}
+
+static RTS_RESULT add_device(CANOPEN_SETUP *setup, CANOPEN_LINE *line, const IoConfigConnector *connector)
+{
+    CANOPEN_DEVICE *device = &setup->devices[setup->device_count];
+    RTS_UI32 node = number(connector, CANOPEN_PARAM_NODE, 0);
+
+    if (setup->device_count == CANOPEN_MAX_DEVICES)
+        return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "this device has room for %u CANopen nodes.",
+                                 (unsigned)CANOPEN_MAX_DEVICES);
+    if (node < 1 || node > CANOPEN_MAX_NODE || node == line->own_node || line->by_node[node] != NULL)
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "it cannot have the node number %u.", (unsigned)node);
+    if (number(connector, CANOPEN_PARAM_TIMEOUT, DEFAULT_TIMEOUT_MS) - 1 >= MAX_MS ||
+        number(connector, CANOPEN_PARAM_HEARTBEAT, 0) > MAX_MS)
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its time-out or heartbeat cannot be.");
+    device->connector = connector;
+    device->node.node = (RTS_UI8)node;
+    line->by_node[node] = device;
+    setup->device_count++;
+    line->device_count++;
+    RTS_RESULT result = describe(&device->node, connector);
+    if (result == ERR_OK)
+        result = add_pdos(setup, line, device);
+    CanopenNodeBegin(&device->node, number(connector, CANOPEN_PARAM_TIMEOUT, DEFAULT_TIMEOUT_MS), SysTimeGetMs());
+    return result;
+}
+
+static RTS_RESULT add_line(CANOPEN_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connector)
+{
+    RTS_UI32 network = number(connector, CANOPEN_PARAM_NETWORK, 0);
+    RTS_UI32 index = IoMgrConfigGetIndex(connector);
+    const IoConfigConnector *child;
+    RTS_RESULT result = ERR_OK;
+
+    if (network >= CAN_CONTROLLERS || network >= SysCanGetCount())
+        return IoMgrConfigRefuse(connector, ERR_NO_OBJECT, "this device has no CAN network %u.", (unsigned)network);
+    if (number(connector, CANOPEN_PARAM_NODE, 0) > CANOPEN_MAX_NODE ||
+        number(connector, CANOPEN_PARAM_HEARTBEAT, 0) > MAX_MS)
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its own node number or heartbeat cannot be.");
+    CANOPEN_LINE *line = &setup->lines[network];
+    if (line->connector != NULL)
+        return IoMgrConfigRefuse(connector, ERR_DUPLICATE, "the CAN network %u is in use.", (unsigned)network);
+    line->connector = connector;
+    line->network = network;
+    line->own_node = (RTS_UI8)number(connector, CANOPEN_PARAM_NODE, 0);
+    line->heartbeat_ms = number(connector, CANOPEN_PARAM_HEARTBEAT, 0);
+    line->sync = number(connector, CANOPEN_PARAM_SYNC, 0) != 0;
+    line->devices = setup->devices + setup->device_count;
+    setup->line_count++;
+    for (RTS_UI32 i = index + 1; result == ERR_OK && (child = IoMgrConfigGetConnector(i)) != NULL; i++) {
+        if (child->parent == index && IoMgrConfigIsMine(child, driver))
+            result = add_device(setup, line, child);
+    }
+    return result;
+}
+
+RTS_RESULT CanopenSetUp(CANOPEN_SETUP *setup, const IO_DRIVER *driver)
+{
+    const IoConfigConnector *connector;
+    RTS_RESULT result = ERR_OK;
+
+    memset(setup, 0, sizeof(*setup));
+    for (RTS_UI32 i = 0; result == ERR_OK && (connector = IoMgrConfigGetConnector(i)) != NULL; i++) {
+        if (connector->parent == IO_CONFIG_NONE && IoMgrConfigIsMine(connector, driver))
+            result = add_line(setup, driver, connector);
+    }
+    return result;
+}
+
+CANOPEN_DEVICE *CanopenFindDevice(CANOPEN_SETUP *setup, const IoConfigConnector *connector)
+{
+    for (RTS_UI32 i = 0; i < setup->device_count; i++)
+        if (setup->devices[i].connector == connector)
+            return &setup->devices[i];
+    return NULL;
+}
+
+CANOPEN_PDO_STATE *CanopenFindPdo(CANOPEN_SETUP *setup, const IoConfigConnector *connector, RTS_UI32 parameter)
+{
+    const CANOPEN_DEVICE *device = CanopenFindDevice(setup, connector);
+    RTS_UI32 index = parameter - CANOPEN_PARAM_PDO;
+
+    return device != NULL && index < device->pdo_count ? &device->pdos[index] : NULL;
+}
+
+#endif

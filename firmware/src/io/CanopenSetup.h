@@ -1,0 +1,70 @@
+/*
+ * CanopenSetup.h - the networks, nodes and PDOs of CANopen that the configuration asks for.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef CANOPENSETUP_H
+#define CANOPENSETUP_H
+
+#include "CanopenMaster.h"
+#include "CmpCan.h"
+#include "IoDrv.h"
+#include "IoDrvCanopen.h"
+#include "rts_config.h"
+
+/* Who receives writes one of two copies, then `number`; a task reads the newer one. Inputs have only that, outputs only
+ * what follows. */
+typedef struct {
+    CANOPEN_PDO pdo;
+    RTS_UI32 number; /* of receptions */
+    RTS_UI32 received_ms;
+    RTS_UI8 in[2][CANOPEN_PDO_SIZE];
+    RTS_UI8 out[CANOPEN_PDO_SIZE];
+    RTS_UI8 sent[CANOPEN_PDO_SIZE];
+    RTS_UI32 sent_run; /* in which run of the node `sent` was */
+    RTS_UI32 sent_ms;
+} CANOPEN_PDO_STATE;
+
+typedef struct {
+    const IoConfigConnector *connector;
+    CANOPEN_NODE node;
+    CANOPEN_PDO_STATE *pdos;
+    RTS_UI32 pdo_count;
+    RTS_UI32 runs; /* number of the run that it is in, 0: it is not operational; for tasks */
+    RTS_UI32 noted_failures;
+    RTS_UI32 noted_emcy;
+} CANOPEN_DEVICE;
+
+typedef struct {
+    const IoConfigConnector *connector;
+    RTS_UI32 network;
+    RTS_UI8 own_node;
+    RTS_UI32 heartbeat_ms;
+    RTS_UI32 heartbeat_sent_ms;
+    bool sync;
+    bool attached;
+    bool was_off;
+    CANOPEN_DEVICE *devices;
+    RTS_UI32 device_count;
+    CAN_USER user;
+    CANOPEN_DEVICE *by_node[CANOPEN_MAX_NODE + 1];
+    CANOPEN_PDO_STATE *by_cob[0x800]; /* inputs */
+} CANOPEN_LINE;
+
+typedef struct {
+    RTS_UI32 line_count;
+    RTS_UI32 device_count;
+    RTS_UI32 pdo_count;
+    CANOPEN_LINE lines[CAN_CONTROLLERS];
+    CANOPEN_DEVICE devices[CANOPEN_MAX_DEVICES];
+    CANOPEN_PDO_STATE pdos[CANOPEN_MAX_PDOS];
+} CANOPEN_SETUP;
+
+/* The PDO of a channel, NULL: none. */
+CANOPEN_PDO_STATE *CanopenFindPdo(CANOPEN_SETUP *setup, const IoConfigConnector *connector, RTS_UI32 parameter);
+CANOPEN_DEVICE *CanopenFindDevice(CANOPEN_SETUP *setup, const IoConfigConnector *connector);
+
+/* Makes what the connectors of `driver` ask for. ERR_* of IoMgrConfigRefuse. */
+RTS_RESULT CanopenSetUp(CANOPEN_SETUP *setup, const IO_DRIVER *driver);
+
+#endif

@@ -1,0 +1,533 @@
+/*
+ * IoDrvCanopen.c - driver of CANopen nodes, whose manager this device is.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Nodes are managed in CH_COMM_CYCLE (CanopenMaster.h). PDOs are received in the context of the port and sent by the bus
+ * cycle task; tasks copy from and to their data.
+ */
+#include "IoDrvCanopen.h"
+
+#include <string.h>
+
+#include "CMUtils.h"
+#include "CanopenDriver.h"
+#include "CmpIoMgrEmbedded.h"
+#include "CmpLog.h"
+#include "IecCan.h"
+#include "SysAtomic.h"
+#include "SysLock.h"
+#include "SysTime.h"
+
+#if CANOPEN_MAX_DEVICES > 0
+
+enum { READ_TRIES = 4, NS_PER_MS = 1000000 };
+
+static CANOPEN_SETUP setup;
+static bool is_running; /* between IoDrvUpdateMapping and the next configuration */
+
+static const ICmpIoDrv functions;
+static IO_DRIVER driver = {.functions = &functions};
+
+static const CAN_FILTER filters[] = {{0, 0, false}}; /* all frames of 11 bits */
+
+#define FOR_EACH_LINE(line)                                                              \
+    for (CANOPEN_LINE *line = setup.lines; line < setup.lines + CAN_CONTROLLERS; line++) \
+        if (line->connector != NULL)
+#define FOR_EACH_DEVICE(line, device) \
+    for (CANOPEN_DEVICE *device = (line)->devices; device < (line)->devices + (line)->device_count; device++)
+
+CANOPEN_SETUP *IoDrvCanopenGetSetup(void)
+{
+    return &setup;
+}
+
+static const IoDrvInfo *get_info(void)
+{
+    static const IoDrvInfo info = {"IoDrvCanopen", "CANopen", "Open PLC runtime", 0x00010000};
+
+    return &info;
+}
+
+/* ---- frames ---- */
+
+static bool send(void *owner, const CAN_FRAME *frame)
+{
+    const CANOPEN_LINE *line = owner;
+
+    return CanSend(line->network, frame) == ERR_OK;
+}
+
+/* In the context of the port. */
+static bool take_urgent(RTS_UI32 index, const CAN_FRAME *frame)
+{
+    CANOPEN_PDO_STATE *state = setup.lines[index].by_cob[frame->id & 0x7FF];
+
+    if (state == NULL || (frame->flags & CAN_FLAG_REMOTE) != 0)
+        return false;
+    if (frame->size < state->pdo.size)
+        return false; /* main counts it */
+    RTS_UI32 next = state->number + 1;
+    memcpy(state->in[next % 2], frame->data, state->pdo.size);
+    SysAtomicStore(&state->received_ms, SysTimeGetMs());
+    SysAtomicStore(&state->number, next);
+    return true;
+}
+
+static void count_short(const CANOPEN_LINE *line, const CANOPEN_PDO_STATE *state)
+{
+    FOR_EACH_DEVICE (line, device)
+        if (state >= device->pdos && state < device->pdos + device->pdo_count)
+            device->node.counters.short_pdos++;
+}
+
+static void take(RTS_UI32 index, const CAN_FRAME *frame, RTS_UI32 now_ms)
+{
+    const CANOPEN_LINE *line = &setup.lines[index];
+    CANOPEN_DEVICE *device = line->by_node[frame->id & CANOPEN_NODE_MASK];
+
+    if (line->by_cob[frame->id & 0x7FF] != NULL) {
+        if (frame->size < line->by_cob[frame->id & 0x7FF]->pdo.size)
+            count_short(line, line->by_cob[frame->id & 0x7FF]);
+    } else if (device != NULL) {
+        CanopenNodeTake(&device->node, frame, now_ms);
+    }
+}
+
+/* Programs must not send what the manager does. */
+static bool is_reserved(RTS_UI32 network, RTS_UI32 id)
+{
+    const CANOPEN_LINE *line = &setup.lines[network];
+    RTS_UI32 node = id & CANOPEN_NODE_MASK;
+    RTS_UI32 function = id & CANOPEN_FUNCTION_MASK;
+
+    if (line->connector == NULL)
+        return false;
+    for (RTS_UI32 i = 0; i < setup.pdo_count; i++)
+        if (setup.pdos[i].pdo.cob == id)
+            return true;
+    return id == CANOPEN_NMT || id == CANOPEN_SYNC ||
+           ((function == CANOPEN_SDO_REPLY || function == CANOPEN_SDO_REQUEST || function == CANOPEN_HEARTBEAT ||
+             function == CANOPEN_EMCY) &&
+            (line->by_node[node] != NULL || node == line->own_node));
+}
+
+/* ---- configuration ---- */
+
+static void release(CANOPEN_LINE *line)
+{
+    FOR_EACH_DEVICE (line, device)
+        if (device->node.state == MASTER_RUNS)
+            (void)CanopenSendNmt(send, line, NMT_PREOPERATIONAL, device->node.node);
+    if (line->attached)
+        CanDetach(line->network, &line->user);
+    line->attached = false;
+}
+
+static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
+{
+    RTS_UNUSED(connectors);
+    RTS_UNUSED(count);
+    FOR_EACH_LINE (line)
+        release(line);
+    is_running = false;
+    memset(&setup, 0, sizeof(setup));
+    return ERR_OK;
+}
+
+static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
+{
+    const CANOPEN_PDO_STATE *state = CanopenFindPdo(&setup, connector, channel->parameter);
+
+    if (CanopenFindDevice(&setup, connector) == NULL)
+        return ERR_OK; /* an optional one that was refused */
+    if (state == NULL || ((state->pdo.flags & CANOPEN_PDO_OUTPUT) != 0) != (type == IO_MAP_OUTPUTS) ||
+        channel->parameter_bit + channel->bits > 8u * state->pdo.size)
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "a channel is not in its PDOs.");
+    return ERR_OK;
+}
+
+static RTS_RESULT attach(CANOPEN_LINE *line)
+{
+    line->user = (CAN_USER){filters, RTS_COUNT(filters), take_urgent, take, NULL};
+    RTS_RESULT result = CanAttach(line->network, &line->user);
+    line->attached = result == ERR_OK;
+    if (!line->attached)
+        return IoMgrConfigRefuse(line->connector, result, "the CAN network %u cannot be opened.",
+                                 (unsigned)line->network);
+    return ERR_OK;
+}
+
+static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_RESULT result = CanopenSetUp(&setup, &driver);
+
+    if (result == ERR_OK)
+        result = IoMgrConfigEachChannel(task_maps, count, &driver, check_channel);
+    FOR_EACH_LINE (line)
+        if (result == ERR_OK)
+            result = attach(line);
+    is_running = result == ERR_OK;
+    return result;
+}
+
+/* ---- tasks ---- */
+
+/* The newest data of an input; a frame that arrives meanwhile writes the other copy. */
+static void read_newest(const CANOPEN_PDO_STATE *state, RTS_UI8 *data)
+{
+    RTS_UI32 number;
+    RTS_UI32 tries = 0;
+
+    do {
+        number = SysAtomicLoad(&state->number);
+        memcpy(data, state->in[number % 2], CANOPEN_PDO_SIZE);
+        SysAtomicFence();
+    } while (SysAtomicLoad(&state->number) != number && ++tries < READ_TRIES);
+}
+
+static void copy(const IoConfigConnectorMap *map, bool is_output)
+{
+    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
+    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
+    RTS_UI8 data[CANOPEN_PDO_SIZE];
+    RTS_UI32 last = 0;
+
+    for (RTS_UI32 count = map->channel_map_count; count > 0; count--, channel++) {
+        CANOPEN_PDO_STATE *state = CanopenFindPdo(&setup, connector, channel->parameter);
+        if (state == NULL)
+            continue;
+        if (is_output) {
+            IoMgrCopyOutputLE(channel, state->out);
+            continue;
+        }
+        if (channel->parameter != last)
+            read_newest(state, data);
+        last = channel->parameter;
+        IoMgrCopyInputLE(channel, data);
+    }
+}
+
+static RTS_RESULT copy_all(const IoConfigConnectorMap *maps, int count, bool is_output)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    for (; count > 0; count--, maps++)
+        copy(maps, is_output);
+    SysLockLeave(lock);
+    return ERR_OK;
+}
+
+static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
+{
+    return copy_all(maps, count, false);
+}
+
+static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
+{
+    return copy_all(maps, count, true);
+}
+
+static bool is_due(const CANOPEN_PDO_STATE *state, const RTS_UI8 *out, RTS_UI32 run, RTS_UI32 now_ms)
+{
+    if ((state->pdo.flags & CANOPEN_PDO_SYNC) != 0 || state->sent_run != run)
+        return true;
+    return memcmp(out, state->sent, state->pdo.size) != 0 ||
+           (state->pdo.event_ms != 0 && now_ms - state->sent_ms >= state->pdo.event_ms);
+}
+
+static void send_output(CANOPEN_LINE *line, CANOPEN_PDO_STATE *state, RTS_UI32 run, RTS_UI32 now_ms)
+{
+    CAN_FRAME frame = {.id = state->pdo.cob, .size = state->pdo.size};
+    RTS_UI32 lock = SysLockEnter();
+
+    memcpy(frame.data, state->out, state->pdo.size);
+    SysLockLeave(lock);
+    if (!is_due(state, frame.data, run, now_ms) || !send(line, &frame))
+        return;
+    memcpy(state->sent, frame.data, state->pdo.size);
+    state->sent_run = run;
+    state->sent_ms = now_ms;
+}
+
+static RTS_RESULT start_bus_cycle(const IoConfigConnector *connector)
+{
+    static const CAN_FRAME sync = {.id = CANOPEN_SYNC};
+    RTS_UI32 now_ms = SysTimeGetMs();
+
+    FOR_EACH_LINE (line) {
+        if (line->connector != connector || !line->attached)
+            continue;
+        if (line->sync)
+            (void)send(line, &sync);
+        FOR_EACH_DEVICE (line, device) {
+            RTS_UI32 run = SysAtomicLoad(&device->runs);
+            for (RTS_UI32 i = 0; i < device->pdo_count && run != 0; i++)
+                if ((device->pdos[i].pdo.flags & CANOPEN_PDO_OUTPUT) != 0)
+                    send_output(line, &device->pdos[i], run, now_ms);
+        }
+    }
+    return ERR_OK;
+}
+
+/* ---- main ---- */
+
+/* How long it is until an input of a node that runs is late [ms]; UINT32_MAX: never. */
+static RTS_UI32 get_deadline_ms(const CANOPEN_DEVICE *device, RTS_UI32 now_ms, bool *has_all)
+{
+    RTS_UI32 wait_ms = UINT32_MAX;
+
+    *has_all = true;
+    for (RTS_UI32 i = 0; i < device->pdo_count; i++) {
+        const CANOPEN_PDO_STATE *state = &device->pdos[i];
+        if ((state->pdo.flags & CANOPEN_PDO_OUTPUT) != 0 || state->pdo.deadline_ms == 0)
+            continue;
+        RTS_UI32 since_ms = now_ms - SysAtomicLoad(&state->received_ms);
+        RTS_UI32 left_ms = since_ms < state->pdo.deadline_ms ? state->pdo.deadline_ms - since_ms : 0;
+        *has_all = *has_all && left_ms != 0;
+        wait_ms = left_ms < wait_ms ? left_ms : wait_ms;
+    }
+    return wait_ms;
+}
+
+static const char *describe_step(const CANOPEN_NODE *node)
+{
+    switch (node->why) {
+    case MASTER_WHY_SILENT:
+        return "it does not reply";
+    case MASTER_WHY_NO_HEARTBEAT:
+        return "it sends no heartbeat after its start";
+    case MASTER_WHY_LOST:
+        return "its heartbeat is missing";
+    case MASTER_WHY_RESTARTED:
+        return "it has restarted";
+    case MASTER_WHY_STATE:
+        return "it has left the operational state";
+    case MASTER_WHY_LATE:
+        return "one of its PDOs is late";
+    case MASTER_WHY_BUS:
+        return "the bus is off";
+    default:
+        return "it is not in operation yet";
+    }
+}
+
+enum { HEX_DIGITS = 4, PLACE_SIZE = sizeof("2001:00") };
+
+static char *put_hex(char *text, RTS_UI32 value, RTS_UI32 digits)
+{
+    while (digits-- > 0)
+        *text++ = "0123456789ABCDEF"[value >> 4 * digits & 0x0F];
+    *text = '\0';
+    return text;
+}
+
+/* What it is instead of what is expected; NULL: that is not why. */
+static const char *find_other(const CANOPEN_NODE *node)
+{
+    switch (node->why) {
+    case MASTER_WHY_TYPE:
+        return "device type";
+    case MASTER_WHY_VENDOR:
+        return "vendor";
+    case MASTER_WHY_PRODUCT:
+        return "product";
+    case MASTER_WHY_REVISION:
+        return "revision";
+    default:
+        return NULL;
+    }
+}
+
+static void explain_loss(const IoConfigConnector *connector, char *text, RTS_SIZE size)
+{
+    const CANOPEN_DEVICE *device = CanopenFindDevice(&setup, connector);
+    char place[PLACE_SIZE];
+
+    if (device == NULL) {
+        CMUtlsnprintf(text, size, "the bus is off, or its adapter away");
+    } else if (find_other(&device->node) != NULL) {
+        CMUtlsnprintf(text, size, "its %s is 0x%X", find_other(&device->node), (unsigned)device->node.found);
+    } else if (device->node.why == MASTER_WHY_CONFIGURATION) {
+        char *end = put_hex(place, device->node.index, HEX_DIGITS);
+        *end++ = ':';
+        (void)put_hex(end, device->node.sub, 2);
+        CMUtlsnprintf(text, size, "it refuses %s, 0x%X", place, (unsigned)device->node.counters.last_abort);
+    } else {
+        CMUtlsnprintf(text, size, "%s", describe_step(&device->node));
+    }
+}
+
+static void note_emcy(CANOPEN_DEVICE *device)
+{
+    const CANOPEN_COUNTERS *counters = &device->node.counters;
+    char code[HEX_DIGITS + 1];
+
+    if (counters->emcy == device->noted_emcy)
+        return;
+    device->noted_emcy = counters->emcy;
+    IoMgrConfigNoteError(device->connector);
+    (void)put_hex(code, counters->last_emcy, HEX_DIGITS);
+    LogAdd(CMPID_IoDrvCanopen, LOG_WARNING, ERR_DEVICE, "%s reports emergency 0x%s",
+           IoMgrConfigGetName(device->connector), code);
+}
+
+/* What the manager and the tasks see of a node. */
+static void note(CANOPEN_DEVICE *device, bool has_all)
+{
+    const CANOPEN_NODE *node = &device->node;
+    bool runs = node->state == MASTER_RUNS;
+
+    SysAtomicStore(&device->runs, runs ? node->counters.boots : 0);
+    note_emcy(device);
+    if (node->failures != device->noted_failures) {
+        device->noted_failures = node->failures;
+        IoMgrConfigSetDiagnosis(device->connector, CF_CONNECTOR_BUS_ERROR);
+    }
+    if (runs && has_all)
+        IoMgrConfigNoteData(device->connector);
+}
+
+static void poll_device(CANOPEN_LINE *line, CANOPEN_DEVICE *device, RTS_UI32 now_ms)
+{
+    bool has_all;
+    bool ran = device->node.state == MASTER_RUNS;
+
+    CanopenNodePoll(&device->node, send, line, now_ms);
+    if (!ran && device->node.state == MASTER_RUNS)
+        for (RTS_UI32 i = 0; i < device->pdo_count; i++)
+            SysAtomicStore(&device->pdos[i].received_ms, now_ms); /* its time begins */
+    (void)get_deadline_ms(device, now_ms, &has_all);
+    if (!has_all)
+        CanopenNodeLose(&device->node, MASTER_WHY_LATE, now_ms);
+    note(device, has_all);
+}
+
+static void send_heartbeat(CANOPEN_LINE *line, RTS_UI32 now_ms)
+{
+    const CAN_FRAME frame = {.id = CANOPEN_HEARTBEAT + (RTS_UI32)line->own_node, .size = 1, .data = {NODE_OPERATIONAL}};
+
+    if (line->own_node == 0 || line->heartbeat_ms == 0 || now_ms - line->heartbeat_sent_ms < line->heartbeat_ms)
+        return;
+    line->heartbeat_sent_ms = now_ms;
+    (void)send(line, &frame);
+}
+
+static void note_bus(CANOPEN_LINE *line, RTS_UI32 now_ms)
+{
+    CAN_STATE state;
+
+    SysCanGetState(line->network, &state);
+    bool off = state.bus == CAN_BUS_OFF || state.bus == CAN_BUS_STOPPED;
+    if (off && !line->was_off)
+        IoMgrConfigSetDiagnosis(line->connector, CF_CONNECTOR_BUS_ERROR);
+    if (off)
+        FOR_EACH_DEVICE (line, device)
+            CanopenNodeLose(&device->node, MASTER_WHY_BUS, now_ms);
+    else
+        IoMgrConfigNoteData(line->connector);
+    line->was_off = off;
+}
+
+static void poll_line(CANOPEN_LINE *line, RTS_UI32 now_ms)
+{
+    note_bus(line, now_ms);
+    FOR_EACH_DEVICE (line, device)
+        poll_device(line, device, now_ms);
+    send_heartbeat(line, now_ms);
+}
+
+static RTS_UI32 get_wait_ms(const CANOPEN_LINE *line, RTS_UI32 now_ms)
+{
+    RTS_UI32 wait_ms = UINT32_MAX;
+    bool has_all;
+
+    if (line->own_node != 0 && line->heartbeat_ms != 0) {
+        RTS_UI32 since_ms = now_ms - line->heartbeat_sent_ms;
+        wait_ms = since_ms < line->heartbeat_ms ? line->heartbeat_ms - since_ms : 0;
+    }
+    FOR_EACH_DEVICE (line, device) {
+        RTS_UI32 of_node = CanopenNodeGetWaitMs(&device->node, now_ms);
+        RTS_UI32 of_pdo = UINT32_MAX;
+        if (device->node.state == MASTER_RUNS)
+            of_pdo = get_deadline_ms(device, now_ms, &has_all);
+        wait_ms = of_node < wait_ms ? of_node : wait_ms;
+        wait_ms = of_pdo < wait_ms ? of_pdo : wait_ms;
+    }
+    return wait_ms;
+}
+
+RTS_I64 IoDrvCanopenGetDueNs(RTS_I64 now_ns)
+{
+    RTS_UI32 now_ms = (RTS_UI32)(now_ns / NS_PER_MS);
+    RTS_UI32 wait_ms = UINT32_MAX;
+
+    FOR_EACH_LINE (line)
+        if (is_running && line->attached) {
+            RTS_UI32 of_line = get_wait_ms(line, now_ms);
+            wait_ms = of_line < wait_ms ? of_line : wait_ms;
+        }
+    return wait_ms == UINT32_MAX ? INT64_MAX : (now_ns / NS_PER_MS + wait_ms) * NS_PER_MS;
+}
+
+static void cycle(void)
+{
+    RTS_UI32 now_ms = SysTimeGetMs();
+
+    FOR_EACH_LINE (line) {
+        if (!line->attached)
+            continue;
+        poll_line(line, now_ms);
+        SysTimeWantPass(get_wait_ms(line, now_ms));
+    }
+}
+
+/* ---- requests from the PC ---- */
+
+static RTS_RESULT read_parameter(const IoConfigConnector *connector, RTS_UI32 id, void *data, RTS_UI32 bits,
+                                 RTS_UI32 bit_offset)
+{
+    const CANOPEN_DEVICE *device = CanopenFindDevice(&setup, connector);
+    RTS_UI32 index = id - CANOPEN_PARAM_BOOTS;
+    RTS_UI32 value;
+
+    if (device == NULL || (index >= sizeof(CANOPEN_COUNTERS) / sizeof(value) && id != CANOPEN_PARAM_STATE))
+        return ERR_NO_OBJECT;
+    if (bit_offset != 0 || bits != 8 * sizeof(value))
+        return ERR_PARAMETER;
+    value = device->node.nmt_state;
+    if (id != CANOPEN_PARAM_STATE)
+        memcpy(&value, (const RTS_UI8 *)&device->node.counters + index * sizeof(value), sizeof(value));
+    memcpy(data, &value, sizeof(value));
+    return ERR_OK;
+}
+
+/* ---- life ---- */
+
+static const ICmpIoDrv functions = {
+    .IoDrvGetInfo = get_info,
+    .IoDrvUpdateConfiguration = update_configuration,
+    .IoDrvUpdateMapping = update_mapping,
+    .IoDrvReadInputs = read_inputs,
+    .IoDrvWriteOutputs = write_outputs,
+    .IoDrvStartBusCycle = start_bus_cycle,
+    .IoDrvReadParameter = read_parameter,
+    .IoDrvExplainLoss = explain_loss,
+};
+
+RTS_RESULT IoDrvCanopen_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT2)
+        return IoMgrRegisterInstance(&driver);
+    if (hook == CH_INIT3)
+        IecCanSetReserved(is_reserved);
+    if (hook == CH_COMM_CYCLE && is_running)
+        cycle();
+    else if (hook == CH_EXIT3)
+        (void)update_configuration(NULL, 0);
+    else if (hook == CH_EXIT2)
+        (void)IoMgrUnregisterInstance(&driver);
+    return ERR_OK;
+}
+
+#endif

@@ -1,0 +1,58 @@
+"""A program and its description with CANopen nodes, for the tests of the simulator and of plcrt."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+VALVES = Path(__file__).parents[1] / "examples/canopen/valves.eds"
+SOURCE = """
+PROGRAM Main
+VAR inputs, inputs2, inputs3, coils, coils2 : BYTE; door : BOOL; pressure : INT; lost : UDINT; frame : CAN_SEND;
+    bytes : ARRAY[0..7] OF BYTE; id : DWORD; go : BOOL; END_VAR
+frame(Execute := go, ID := id, Data := bytes);
+coils := inputs;
+IF NOT Valves.ok THEN lost := lost + 1; END_IF
+END_PROGRAM
+"""
+ONE = """
+[[canopen]]
+name = "Bus"
+node = 127
+heartbeat = "T#100ms"
+{line}
+
+[[canopen.device]]
+name = "Valves"
+node = 9
+eds = "valves.eds"
+heartbeat = "T#200ms"
+set = {{ "2001" = 700, "2000" = "press twenty-five" }}
+in = {{ "6000:01" = "Main.inputs", "6000:01.3" = "Main.door", "6401:01" = "Main.pressure" }}
+out = {{ "6200:01" = "Main.coils" }}
+{device}
+"""
+OTHERS = """
+[[canopen.device]]
+name = "Second"
+node = 10
+eds = "valves.eds"
+in = { "6000:01" = "Main.inputs2" }
+out = { "6200:01" = "Main.coils2" }
+
+[[canopen.device]]
+name = "Third"
+node = 11
+eds = "valves.eds"
+in = { "6000:01" = "Main.inputs3" }
+"""
+
+
+def write_program(folder: Path, *, others: str = "", line: str = "", device: str = "") -> Path:
+    """The sources in a folder; `line` and `device`: more keys of the network and its first node."""
+    folder.mkdir(exist_ok=True)
+    shutil.copy(VALVES, folder / "valves.eds")
+    (folder / "app.io.toml").write_text(ONE.format(line=line, device=device) + others)
+    path = folder / "app.st"
+    path.write_text(SOURCE)
+    return path

@@ -1,0 +1,84 @@
+"""plcrt as CANopen manager of a foreign node, python canopen's LocalNode, on a hub of pseudo terminals."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import canopen
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from canopen_programs import VALVES, write_program
+
+from plctool import connect
+from plctool.device import Plc
+from plctool.link.canbus import open_bus
+from plctool.testing.can_hub import CanHub
+from plctool.testing.plcrt import Plcrt
+from plctool.testing.waiting import eventually
+
+NODE = 9
+
+
+class ForeignNode:
+    """A node on the bus while the context lasts."""
+
+    def __init__(self, path: str) -> None:
+        self._bus = open_bus(f"slcan:{path}", 500000, 0)
+        self._network = canopen.Network(bus=self._bus)
+        self.node = canopen.LocalNode(NODE, str(VALVES))
+        self.outputs: list[bytes] = []
+
+    def __enter__(self) -> ForeignNode:
+        self._network.connect()
+        self._network.add_node(self.node)
+        self._network.subscribe(0x200 + NODE, lambda cob, data, time: self.outputs.append(bytes(data)))
+        self.node.nmt.state = "INITIALISING"
+        self.node.nmt.state = "PRE-OPERATIONAL"
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.node.nmt.stop_heartbeat()
+        self._network.disconnect()
+
+    def send_inputs(self, data: bytes) -> None:
+        self._network.send_message(0x180 + NODE, data)
+
+
+@pytest.fixture
+def hub() -> Iterator[CanHub]:
+    with CanHub(3) as hub:
+        yield hub
+
+
+@pytest.fixture
+def plc(hub: CanHub, tmp_path: Path, tool: Any) -> Iterator[Plc]:
+    image = tmp_path / "app.cdl"
+    built = tool("build", str(write_program(tmp_path / "program")), "-o", str(image))
+    assert built.status == 0, built.err
+    options = ("--can", f"slcan:{hub.paths[0]}", "--node", "5")
+    with Plcrt(tmp_path / "flash", *options), connect(f"can:slcan:{hub.paths[1]}?node=5") as plc:
+        plc.flash(image)
+        yield plc
+
+
+def test_foreign_node_is_brought_into_operation_lost_and_regained(hub: CanHub, plc: Plc) -> None:
+    for round_ in range(2):
+        with ForeignNode(hub.paths[2]) as foreign:
+            eventually(lambda: plc.read("Valves.ok"))
+            assert foreign.node.nmt.state == "OPERATIONAL"
+            assert foreign.node.sdo[0x2001].raw == 700
+            assert foreign.node.sdo[0x2000].raw == "press twenty-five"
+            assert foreign.node.sdo[0x1A00][1].raw == 0x64010110
+            value = 0x41 + round_
+            foreign.send_inputs(b"\x10\x27" + bytes([value]))
+            eventually(lambda value=value: plc.read("Main.inputs") == value and plc.read("Main.pressure") == 10_000)
+            eventually(lambda f=foreign, value=value: f.outputs[-1:] == [bytes([value])])
+        eventually(lambda: not plc.read("Valves.ok"))
+    texts = [entry.text for entry in plc.log()]
+    assert "Valves is lost: its heartbeat is missing" in texts
+    assert "Valves is back" in texts

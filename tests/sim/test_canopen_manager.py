@@ -1,0 +1,245 @@
+"""The CANopen manager and simulated nodes, on virtual time."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from canopen_programs import OTHERS, write_program
+
+from plctool.compiler.syntax.diagnostics import CompileError
+from plctool.errors import UsageError
+from plctool.sim import Simulator
+
+NMT, SDO, HEARTBEAT = 0x000, 0x600, 0x700
+RESERVED = 0x202
+BOOT_MS = 400  # for all nodes to be in operation
+
+
+@pytest.fixture
+def plc(tmp_path: Path) -> Iterator[Simulator]:
+    with Simulator.from_sources(write_program(tmp_path, others=OTHERS)) as simulator:
+        simulator.run_for(BOOT_MS)
+        yield simulator
+
+
+def in_operation(plc: Simulator, *names: str) -> bool:
+    return all(plc.read(f"{name}.ok") for name in names or ("Valves", "Second", "Third"))
+
+
+def of_manager(plc: Simulator) -> list[str]:
+    return [entry.text for entry in plc.log() if entry.component == "CmpIoMgrEmbedded"]
+
+
+def written(plc: Simulator, node: int) -> list[tuple[int, int]]:
+    """The objects that were written to a node, in order."""
+    frames = [f.data for f in plc.can_receive() if f.id == SDO + node and f.data[0] & 0xE0 == 0x20]
+    return [(int.from_bytes(data[1:3], "little"), data[3]) for data in frames]
+
+
+def test_nodes_are_configured_and_started(plc: Simulator) -> None:
+    assert in_operation(plc)
+    assert plc.read("Bus.ok")
+    assert of_manager(plc) == []
+
+
+def test_each_value_is_written_before_the_pdos_and_these_in_the_order_that_devices_want(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path)) as plc:
+        plc.run_for(BOOT_MS)
+        rpdo = [(0x1400, 1), (0x1600, 0), (0x1600, 1), (0x1600, 0), (0x1400, 2), (0x1400, 1)]
+        tpdo = [(0x1800, 1), (0x1A00, 0), (0x1A00, 1), (0x1A00, 2), (0x1A00, 0), (0x1800, 2), (0x1800, 5), (0x1800, 1)]
+        assert written(plc, 9) == [(0x1017, 0), (0x2001, 0), (0x2000, 0), *rpdo, *tpdo]
+
+
+def test_values_go_both_ways(plc: Simulator) -> None:
+    plc.set_input("Main.inputs", 0x5A)
+    plc.set_input("Main.pressure", -7)
+    plc.run_for(40)
+    assert (plc.read("Main.inputs"), plc.read("Main.door"), plc.read("Main.pressure")) == (0x5A, True, -7)
+    assert plc.output("Main.coils") == 0x5A
+    plc.write({"Main.coils2": 3})
+    plc.run_for(40)
+    assert plc.output("Main.coils2") == 3
+
+
+@pytest.mark.parametrize("name", ["Valves", "Second", "Third"])
+def test_node_that_is_pulled_is_lost_and_comes_back_while_others_keep_running(plc: Simulator, name: str) -> None:
+    others = {"Valves", "Second", "Third"} - {name}
+    plc.fault(name, "absent")
+    plc.run_for(520)
+    assert not plc.read(f"{name}.ok")
+    for _ in range(200):
+        plc.run_for(100)
+        assert in_operation(plc, *others)
+    plc.fault(name, "absent", 0)
+    plc.run_for(BOOT_MS)
+    assert in_operation(plc)
+    assert of_manager(plc) == [f"{name} is lost: its heartbeat is missing", f"{name} is back"]
+
+
+def test_node_is_back_whenever_it_is_pulled_while_it_boots(tmp_path: Path) -> None:
+    path = write_program(tmp_path)
+    with Simulator.from_sources(path) as plc:
+        for ms in range(40, 80):
+            plc.restart()
+            plc.run_for(ms)
+            plc.fault("Valves", "absent")
+            plc.run_for(30)
+            plc.fault("Valves", "absent", 0)
+            plc.run_for(10_000)
+            assert in_operation(plc, "Valves"), ms
+
+
+def test_node_without_reply_costs_the_bus_a_frame_in_eight_seconds(plc: Simulator) -> None:
+    plc.fault("Third", "absent")
+    plc.run_for(60_000)
+    plc.can_receive()
+    plc.run_for(60_000)
+    asked = [f for f in plc.can_receive() if f.id == SDO + 11]
+    assert 0 < len(asked) <= 4 * 8
+
+
+def test_other_device_with_the_number_is_not_started(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path)) as plc:
+        plc.fault("Valves", "type")
+        plc.run_for(5000)
+        assert not plc.read("Valves.ok")
+        assert of_manager(plc) == ["Valves is lost: its device type is 0x00030192"]
+        plc.fault("Valves", "type", 0)
+        plc.run_for(10_000)
+        assert plc.read("Valves.ok")
+
+
+def test_refused_write_is_named_and_tried_again(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path)) as plc:
+        plc.run_for(54)
+        plc.fault("Valves", "answers", 1)
+        plc.run_for(1000)
+        (text,) = of_manager(plc)[:1]
+        assert re.fullmatch(r"Valves is lost: it refuses [0-9A-F]{4}:[0-9A-F]{2}, 0x08000000", text)
+        plc.run_for(5000)
+        assert plc.read("Valves.ok")
+
+
+def test_slow_replies_are_waited_for(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path)) as plc:
+        plc.fault("Valves", "late", 900)
+        plc.run_for(40_000)
+        assert plc.read("Valves.ok")
+
+
+def test_our_heartbeat_is_sent(plc: Simulator) -> None:
+    plc.can_receive()
+    plc.run_for(1000)
+    assert [f.data for f in plc.can_receive() if f.id == HEARTBEAT + 127] == [b"\x05"] * 10
+
+
+def test_outputs_are_safe_while_the_program_is_stopped(plc: Simulator) -> None:
+    plc.set_input("Main.inputs", 0xFF)
+    plc.run_for(50)
+    assert plc.output("Main.coils") == 0xFF
+    plc.stop()
+    plc.run_for(200)
+    assert plc.output("Main.coils") == 0
+    plc.start()
+    plc.run_for(50)
+    assert plc.output("Main.coils") == 0xFF
+
+
+def test_input_that_is_late_is_a_loss(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path, device='every = "T#50ms"')) as plc:
+        plc.run_for(BOOT_MS)
+        plc.fault("Valves", "absent")
+        plc.run_for(250)
+        assert of_manager(plc) == ["Valves is lost: one of its PDOs is late"]
+
+
+def test_synchronous_pdos_follow_each_sync(tmp_path: Path) -> None:
+    path = write_program(tmp_path, line="sync = true", device='transmission = "sync"')
+    with Simulator.from_sources(path) as plc:
+        plc.run_for(BOOT_MS)
+        plc.can_receive()
+        plc.run_for(1000)
+        frames = [f.id for f in plc.can_receive()]
+        assert frames.count(0x080) == 100
+        assert frames.count(0x189) in (99, 100, 101)
+        assert frames.count(0x209) in (99, 100, 101)
+        plc.set_input("Main.inputs", 0x11)
+        plc.run_for(50)
+        assert plc.read("Main.inputs") == 0x11
+
+
+@pytest.mark.parametrize("number", [0x000, 0x080, 0x189, 0x209, 0x609, 0x77F])
+def test_program_cannot_send_what_the_manager_does(plc: Simulator, number: int) -> None:
+    plc.write({"Main.id": number, "Main.go": True})
+    plc.run_cycles(3)
+    assert plc.read("Main.frame.ErrorID") == RESERVED
+
+
+def test_emergency_is_logged_and_counted(plc: Simulator) -> None:
+    plc.can_send(0x089, bytes.fromhex("3012040000000000"))
+    plc.run_for(20)
+    assert [e.text for e in plc.log() if e.component == "IoDrvCanopen"] == ["Valves reports emergency 0x1230"]
+    assert in_operation(plc)
+
+
+def test_restart_of_a_node_is_noticed_and_configured_again(plc: Simulator) -> None:
+    plc.can_receive()
+    plc.can_send(NMT, b"\x81\x09")  # another tool resets it
+    plc.run_for(BOOT_MS)
+    assert in_operation(plc)
+    assert "Valves is lost: it has restarted" in of_manager(plc)
+    assert (0x2001, 0) in written(plc, 9)
+
+
+def test_frames_of_others_do_no_harm(plc: Simulator) -> None:
+    for node in (9, 10, 11, 50):
+        for function in (0x080, 0x180, 0x580, 0x700):
+            for size in range(9):
+                plc.can_send(function + node, bytes([0xFF] * size))
+                plc.run_for(2)
+    plc.run_for(10_000)
+    assert in_operation(plc)
+
+
+@pytest.mark.parametrize(
+    ("device", "message"),
+    [
+        ('timeout = "T#1ms"', "timeout is T#1ms"),
+        ('transmission = "sync"', "there is no SYNC: write sync = true"),
+        ("colour = 1", "there is no 'colour' here"),
+    ],
+)
+def test_mistakes_of_a_device_are_reported(tmp_path: Path, device: str, message: str) -> None:
+    with pytest.raises(CompileError, match=message):
+        Simulator.from_sources(write_program(tmp_path, device=device))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("node = 9", "node = 127", "this PLC has the node number 127, too"),
+        ('"valves.eds"', '"other.eds"', "other.eds"),
+        ('"2001" = 700', '"2001" = 1001', r"2001:00 \(Pressure limit\) can be 0 to 1000, not 1001"),
+        ('"2001" = 700', '"1000" = 1', r"1000:00 \(Device type\) cannot be written"),
+        ('"6000:01" =', '"6000:02" =', "valves.eds has no object 6000:02"),
+        ('"6000:01" =', '"speed" =', "'speed' is not an object"),
+        ('"6000:01.3" =', '"6000:01.8" =', "6000:01 has the bits 0 to 7"),
+        ('"6000:01" =', '"6200:01" =', r"6200:01 \(Outputs 1 to 8\): it cannot be an input"),
+        ('"6200:01" =', '"2001" =', "it cannot be in a PDO"),
+    ],
+)
+def test_mistakes_about_objects_are_reported(tmp_path: Path, old: str, new: str, message: str) -> None:
+    path = write_program(tmp_path)
+    description = path.with_name("app.io.toml")
+    text = description.read_text()
+    assert old in text
+    description.write_text(text.replace(old, new, 1))
+    with pytest.raises((CompileError, UsageError), match=message):
+        Simulator.from_sources(path)
