@@ -344,16 +344,14 @@ static bool end_code(TASK *task, const RTS_EXCEPTION *exception)
     return end_with_exception(task, exception->code, exception->address);
 }
 
-/* True if main has held the tasks after this one was let begin its cycle, and before that showed. */
 #if ONLINE_CHANGE && !RTS_ONE_CORE && BP_HOLDS_TASKS
 static RTS_NOINLINE bool wait_for_turn(TASK *task, RTS_I64 due_ns);
 
+/* True if main has held the tasks after this one was let begin its cycle, and before that showed. */
 static RTS_INLINE bool is_held(const TASK *task)
 {
     return SysAtomicLoad(&tasks.running) == TASKS_HELD && SysAtomicLoad(&tasks.not_held) != index_of(task);
 }
-#else
-#define is_held(task) false
 #endif
 
 /* Not inlined, because the compiler then computes the place of the task in the list again for each field. */
