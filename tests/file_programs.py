@@ -206,7 +206,8 @@ class ProgramFiles:
         files = self.of(plc)
         for name in ("../a", "/etc/passwd", "..", ".", "", ".a", "a/b", "a\\b", "a b", "x" * 33, "x" * 255):
             assert files.open(name, WRITE) == WRONG_PARAMETER, name
-            assert files.open(name) == NOT_EXIST, name
+            assert files.open(name) == WRONG_PARAMETER, name
+            assert files.call(10, name=name) == WRONG_PARAMETER, name
             assert files.call(8, name=name) == WRONG_PARAMETER, name
             assert files.call(9, name=name, other="b") == WRONG_PARAMETER, name
 

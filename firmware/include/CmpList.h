@@ -142,6 +142,9 @@ enum {
 #if HAS_IecCan
     CMP_ONE(IecCan)
 #endif
+#if HAS_IecClock
+    CMP_ONE(IecClock)
+#endif
 #if HAS_IoDrvModbus
     CMP_ONE(IoDrvModbus)
 #endif

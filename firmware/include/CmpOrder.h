@@ -72,6 +72,9 @@ X(IecFile)
 #if HAS_IecCan
 X(IecCan)
 #endif
+#if HAS_IecClock
+X(IecClock)
+#endif
 #if HAS_CmpTraceMgr
 X(CmpTraceMgr)
 #endif

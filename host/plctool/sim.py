@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -144,6 +144,7 @@ class Simulator(Controller):
 
     def _power_on(self, cycle_limit_ms: int) -> None:
         """With an empty flash and no events."""
+        self._lib.SimSetClock(lib.SIM_CLOCK_FIRST_S * 1_000_000_000)
         self._lib.SimSetFileStore(_FILE_STORE)
         made = self._lib.SimFlashConfigure(_FLASH_SIZE + _FILE_STORE, _SECTOR, _PROGRAM_UNIT, 0xFF)
         _check(made, "The simulated flash cannot be made")
@@ -241,6 +242,17 @@ class Simulator(Controller):
         _check(result, "The simulator does not start")
         for plant in self._plants:  # the clock begins at 0 again
             plant.due_ns = self.now_ns + plant.every_ns
+
+    # ---- the wall clock ----
+
+    def set_clock(self, time: datetime) -> None:
+        """Sets the wall clock of the device, which follows virtual time; it begins with 2000-01-01. A time without zone
+        is UTC."""
+        utc = time if time.tzinfo else time.replace(tzinfo=UTC)
+        since = utc - datetime(1970, 1, 1, tzinfo=UTC)
+        if since < timedelta(0):
+            raise UsageError(f"The clock counts from 1970 on: {time} is before.", "clock")
+        self._lib.SimSetClock(since // timedelta(microseconds=1) * 1000)
 
     # ---- files ----
 

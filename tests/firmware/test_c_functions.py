@@ -19,6 +19,7 @@ COMPONENTS = {
     "CmpAppCalls.functions": "CmpAppCalls",
     "IecFile.functions": "IecFile",
     "IecCan.functions": "IecCan",
+    "IecClock.functions": "IecClock",
     "IecLog.functions": "IecLog",
     "CmpOperationControl.functions": "CmpOperationControl",
     "CmpRetain.externals": "CmpRetain",

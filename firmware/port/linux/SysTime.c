@@ -5,8 +5,10 @@
  */
 #define _GNU_SOURCE
 #include "SysTime.h"
+#include "SysTimeRtc.h"
 #include "port.h"
 
+#include <errno.h>
 #include <time.h>
 
 static struct {
@@ -47,6 +49,35 @@ void SysTimePause(void)
     static const struct timespec pause = {0, 20000};
 
     nanosleep(&pause, NULL);
+}
+
+/* ---- the wall clock ---- */
+
+static bool may_set_clock;
+
+void PortClockMaySet(void)
+{
+    may_set_clock = true;
+}
+
+RTS_RESULT SysTimeRtcGet(RTS_I64 *utc_ns)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    *utc_ns = (RTS_I64)now.tv_sec * 1000000000 + now.tv_nsec;
+    return ERR_OK;
+}
+
+RTS_RESULT SysTimeRtcSet(RTS_I64 utc_ns)
+{
+    struct timespec wanted = {(time_t)(utc_ns / 1000000000), (long)(utc_ns % 1000000000)};
+    if (!may_set_clock) {
+        return ERR_NO_ACCESS_RIGHTS;
+    }
+    if (clock_settime(CLOCK_REALTIME, &wanted) == 0) {
+        return ERR_OK;
+    }
+    return errno == EPERM ? ERR_NO_ACCESS_RIGHTS : ERR_PARAMETER;
 }
 
 RTS_RESULT SysTime_Hook(CMP_HOOK hook)

@@ -110,6 +110,7 @@ static const char usage[] =
     "  --help-config   prints all settings, as a file to begin with\n"
     "  --reset-password\n"
     "                  removes the password that is in the flash file, and ends\n"
+    "  --set-clock     lets the program set the clock of this machine, if plcrt may: docs/library.md\n"
     "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
     "  --version       prints the version\n"
     "  --help          prints this\n"
@@ -170,6 +171,7 @@ enum {
     OPTION_EVENT,
     OPTION_ALONE,
     OPTION_RESET_PASSWORD,
+    OPTION_SET_CLOCK,
     OPTION_VERSION,
     OPTION_HELP,
     OPTION_CAN,
@@ -200,6 +202,7 @@ static const struct option long_options[] = {
     {"event", required_argument, NULL, OPTION_EVENT},
     {"no-supervisor", no_argument, NULL, OPTION_ALONE},
     {"reset-password", no_argument, NULL, OPTION_RESET_PASSWORD},
+    {"set-clock", no_argument, NULL, OPTION_SET_CLOCK},
     {"version", no_argument, NULL, OPTION_VERSION},
     {"help", no_argument, NULL, OPTION_HELP},
     {"can", required_argument, NULL, OPTION_CAN},
@@ -396,6 +399,9 @@ static void take_option(OPTIONS *options, int option)
         break;
     case OPTION_ALONE:
         options->alone = true;
+        break;
+    case OPTION_SET_CLOCK:
+        PortClockMaySet();
         break;
     case OPTION_RESET_PASSWORD:
         options->reset_password = true;

@@ -131,6 +131,11 @@ bool PortCanHas(const char *path);
 /* Name of the pseudo terminal, NULL when there is none. */
 const char *PortCanPtyName(void);
 
+/* ---- SysTime ---- */
+
+/* Lets programs set the clock of the machine, if the system lets plcrt. Before CMInit. */
+void PortClockMaySet(void);
+
 /* ---- SysTarget ---- */
 
 /* The name of the device in a scan; the text stays. Before CMInit. */

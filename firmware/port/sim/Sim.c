@@ -19,6 +19,7 @@
 #include "SysExcept.h"
 #include "SysLock.h"
 #include "SysTime.h"
+#include "SysTimeRtc.h"
 #include "SysTimer.h"
 #include "rts_config.h"
 #include "sim_port.h"
@@ -58,6 +59,27 @@ static struct {
     bool real_clock;  /* reading the clock costs what it costs on Linux */
     TIMER timer[MAX_TIMERS];
 } sim;
+
+/* ---- the wall clock ---- */
+
+static RTS_I64 wall_clock_ns = SIM_CLOCK_FIRST_S * (RTS_I64)1000000000; /* at virtual time 0 */
+
+RTS_RESULT SysTimeRtcGet(RTS_I64 *utc_ns)
+{
+    *utc_ns = wall_clock_ns + sim.now_ns;
+    return ERR_OK;
+}
+
+RTS_RESULT SysTimeRtcSet(RTS_I64 utc_ns)
+{
+    wall_clock_ns = utc_ns - sim.now_ns;
+    return ERR_OK;
+}
+
+void SimSetClock(RTS_I64 utc_ns)
+{
+    (void)SysTimeRtcSet(utc_ns);
+}
 
 /* ---- power ---- */
 
@@ -129,6 +151,7 @@ const SYS_START *SysStartGet(void)
 
 RTS_RESULT SimStart(void)
 {
+    wall_clock_ns += sim.now_ns; /* its battery goes on */
     starting.now = starting.next.text != NULL ? starting.next : power_came;
     starting.next.text = NULL;
     sim.on = false;

@@ -67,6 +67,12 @@ RTS_RESULT SimCommCycle(void);
 /* Virtual time since SimStart [ns]. */
 RTS_I64 SimNow(void);
 
+enum { SIM_CLOCK_FIRST_S = 946684800 }; /* 2000-01-01 in s since 1970-01-01 */
+
+/* Sets the wall clock of the device, UTC as ns since 1970-01-01; SIM_CLOCK_FIRST_S if never set. It follows virtual time,
+ * also over SimStart. */
+void SimSetClock(RTS_I64 utc_ns);
+
 /* Cycles that take longer than this in time of the processor [ms] are aborted as endless; the default, and what 0 sets,
  * is SIM_CYCLE_LIMIT_MS. */
 void SimSetCycleLimit(RTS_UI32 ms);

@@ -198,6 +198,8 @@ static RTS_I32 open_file(APP_CALL *call)
 
     if (file != NULL)
         return copy_parts(call, file);
+    if (!FileStoreIsName(name))
+        return IEC_FILE_WRONG_PARAMETER;
     file = find_closed();
     if (file == NULL)
         return IEC_FILE_TOO_MANY;
@@ -337,10 +339,11 @@ static RTS_I32 rename_file(const APP_CALL *call)
 
 static RTS_I32 get_size(APP_CALL *call)
 {
-    const FILE_ENTRY *entry = FileStoreFind((const char *)call->data);
+    const char *name = (const char *)call->data;
+    const FILE_ENTRY *entry = FileStoreFind(name);
 
     if (entry == NULL)
-        return IEC_FILE_NOT_EXIST;
+        return FileStoreIsName(name) ? IEC_FILE_NOT_EXIST : IEC_FILE_WRONG_PARAMETER;
     call->result = entry->size;
     return 0;
 }

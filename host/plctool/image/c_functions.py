@@ -43,6 +43,9 @@ _FUNCTIONS = {
         can_time(DINT):UDINT                                    64   80
         can_lost(DINT):UDINT                                    64   80
         can_free(DINT):BOOL                                     64   80""",
+    "IecClock": """
+        clock_get():LINT                                    32    48
+        clock_set(LINT):UDINT                               16    32""",
     "CmpMath": """
         sin(LREAL):LREAL                                  1008  1856
         cos(LREAL):LREAL                                  1008  1856
