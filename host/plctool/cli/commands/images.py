@@ -13,6 +13,7 @@ from plctool.cli.arguments import add_board, add_firmware, add_image, add_link, 
 from plctool.cli.builds import fresh_image, image_of, project_of
 from plctool.cli.connections import on_device
 from plctool.cli.documents import Document
+from plctool.cli.library_list import library, library_text
 from plctool.cli.links import names_link
 from plctool.cli.output import table
 from plctool.cli.overwriting import check_not_read
@@ -42,6 +43,11 @@ def image_arguments(command: Parser) -> None:
 def symbols_arguments(command: Parser) -> None:
     add_image(command)
     command.add_argument("patterns", nargs="*", type=utf8, metavar="PATTERN", help="names with * and ?: 'Main.pump.*'")
+    command.add_argument(
+        "--library",
+        action="store_true",
+        help="the functions and blocks of the standard library instead, such as 'CRC*'",
+    )
     command.set_defaults(action=_symbols)
 
 
@@ -110,6 +116,9 @@ def info_text(document: dict[str, Any]) -> str:
 
 
 def _symbols(args: argparse.Namespace) -> int:
+    if args.library:
+        patterns = [str(args.image), *args.patterns] if args.image is not None else args.patterns
+        return output.show(args, library(patterns), library_text)
     if args.image is not None and _is_pattern(args.image):
         args.image, args.patterns = None, [str(args.image), *args.patterns]
     return output.show(args, variables(image_of(args), args.patterns), variables_text)

@@ -52,6 +52,14 @@ def without_library(key: str) -> str:
     return _OTHERS.get(key.casefold()) or _PREFIXED.sub(r"\1_", _QUALIFIED.sub("", key, count=1), count=1)
 
 
+def shown_name(name: str) -> str:
+    """The name as users write it: `FILE.Open` of FILE_Open."""
+    return re.sub(rf"^({'|'.join(PREFIXED)})_", r"\1.", name)
+
+
+_COMMENT = re.compile(r"\(\*(?P<words>(?:(?!\*\)).)*)\*\)\s*(?:\{[^{}]*\}\s*)*$", re.DOTALL)
+
+
 @dataclass(frozen=True)
 class Entry:
     """Where a name is defined: the part of a source from `start` to `end`."""
@@ -66,6 +74,16 @@ class Entry:
     def is_function(self) -> bool:
         """True for a function, which is called by this name."""
         return self.keyword == "FUNCTION"
+
+    def comment(self) -> str:
+        """What stands before it in the source, without a blank line between; "" without a comment."""
+        before = self.source.text[self.start : self.source.text.index(self.keyword, self._opening())]
+        match = _COMMENT.search(before)
+        return match["words"].strip() if match and "\n\n" not in before[match.end("words") :] else ""
+
+    def _opening(self) -> int:
+        match = _OPENING.search(self.source.text, self.start)
+        return match.start() if match else self.start
 
 
 class Library:
