@@ -17,6 +17,7 @@ from plctool.cli.output import values_text
 from plctool.cli.overwriting import check_output, output_or
 from plctool.cli.parser import Parser
 from plctool.cli.plants import attached, files_of_plant, plan_faults
+from plctool.cli.sim_files import device_files
 from plctool.errors import UsageError, counted
 from plctool.files import STDOUT, usable_path, write_output
 
@@ -64,6 +65,10 @@ def run_arguments(command: Parser) -> None:
         help="of a simulated device, with value and time: Tank=late:150@T#5s (docs/io.md); may be repeated",
     )
     command.add_argument(
+        "--files", type=usable_path, metavar="FOLDER",
+        help="the files that the device has, which the program reads and changes (docs/library.md)",
+    )  # fmt: skip
+    command.add_argument(
         "--trace", nargs="+", action="extend", default=[], type=utf8, metavar="NAME",
         help="write the values after each cycle to a file; may be repeated",
     )  # fmt: skip
@@ -101,6 +106,7 @@ def _run(args: argparse.Namespace) -> int:
         trace,
         faults,
         aside=args.json or args.output == STDOUT,
+        files=args.files,
     )
     return output.show(args, document, lambda d: run_text(d, texts), output.beside_output(args))
 
@@ -123,10 +129,11 @@ def run(
     trace: TraceFile | None = None,
     faults: Sequence[Fault] = (),
     aside: bool = False,
+    files: Path | None = None,
 ) -> tuple[Document, Texts]:
     """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
     values as users read them. `plant`: what the inputs and outputs are connected to, which prints to stderr if `aside`;
-    `faults`: what happens to that.
+    `faults`: what happens to that. `files`: the folder that has the files of the device.
 
     Raises DeviceError when the program stops with an exception; what was traced until then is in its file.
     """
@@ -137,7 +144,10 @@ def run(
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
         plan_faults(plc, faults)
-        with attached(plc, plant, aside) if plant is not None else nullcontext():
+        with (
+            device_files(plc, files) if files is not None else nullcontext(),
+            attached(plc, plant, aside) if plant is not None else nullcontext(),
+        ):
             if trace:
                 _run_traced(plc, cycles, time_ms, trace)
             elif time_ms is None:
