@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import pytest
@@ -76,3 +77,25 @@ def test_an_error_in_plcopen_xml_has_the_line_of_the_file(tmp_path: Path) -> Non
 def test_the_formatter_leaves_a_list_alone() -> None:
     text = "program Main\nVAR n : INT; END_VAR\nLD n\n ST n\nEND_PROGRAM\n"
     assert formatted("main.st", text) == text
+
+
+LIST = (
+    "LD n", "ADD( n", "MUL 2", ")", "ST n", "on: LD b", "ANDN b", "JMPC on", "CAL t(IN := b,", "PT := T#1s)", "LD s",
+    "CONCAT 'a', (s)", "ST s", "LD b", "S b", "CLK t", "RETCN", "NOT", "JMP on",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_damaged_lists_are_compiled_or_named(tmp_path: Path, seed: int) -> None:
+    r = random.Random(seed)
+    lines = [r.choice(LIST) for _ in range(r.randint(1, 30))]
+    text = "\n".join(lines)
+    for _ in range(r.randint(0, 4)):
+        at = r.randint(0, len(text))
+        text = text[:at] + r.choice(["(", ")", "'", "(*", "\n", ":", ",", ";", "@", "\0", "LD ", "$"]) + text[at + 1 :]
+    found(tmp_path, *text.split("\n"))
+
+
+def test_an_operand_without_an_end_is_named_at_once(tmp_path: Path) -> None:
+    ((line, message), *_) = found(tmp_path, "LD n", "LIMIT (n", *["n,"] * 20000)
+    assert (line, message) == (2, "the brackets of this operand are not closed; write ) at its end")

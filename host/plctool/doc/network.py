@@ -85,7 +85,7 @@ class _Node:
 
 
 def picture(name: str, body: Element) -> str:
-    """Returns the diagram of a body. `name`: what readers of the picture are told. Raises UsageError for one that is
+    """Returns the diagram of a body. `name`: the label of the picture for screen readers. Raises UsageError if it is
     nested too deeply."""
     try:
         return _picture(name, body)

@@ -32,6 +32,7 @@ _NO_OPERAND = ("NOT", *RETURNS)
 _WITH_OPERAND = (*LOADS, *STORES, *BITS, *JUMPS, *CALLS, *OPERATORS, *NEGATING)
 _LINE = re.compile(r"\s*(?:(?P<label>[^\W\d]\w*)[ \t]*:(?!=))?[ \t]*(?P<word>[^\W\d][\w.]*|&N?|\))?[ \t]*(?P<rest>.*)")
 _STRINGS = re.compile(r"'(?:[^'$\n]|\$[^\n])*'?|\"(?:[^\"$\n]|\$[^\n])*\"?")
+_LINES = 500  # of one call at most
 _STATEMENTS = ("IF", "FOR", "WHILE", "REPEAT", "CASE", "RETURN", "EXIT", "CONTINUE")
 
 
@@ -147,8 +148,10 @@ class _Reader:
             found.nested = True
             found.start = found.end - len(self._plain[found.start + 1 : found.end].lstrip())
             return
-        while self._at < len(self._plain) and self._continues(found):
+        lines = 1
+        while lines < _LINES and self._at < len(self._plain) and self._continues(found):
             found.end = self._next_line()[1]
+            lines += 1
         if self._depth(found):
             raise self._error(found.start, "the brackets of this operand are not closed; write ) at its end")
         if opens and found.word not in (*_WITH_OPERAND, *INPUTS, *PRESETS) and self._is_whole(found):
