@@ -80,11 +80,15 @@ def alarms_in(table: SymbolTable) -> dict[str, Symbol]:
 
 
 def _alarms(symbol: Symbol, known: dict[str, bool]) -> Iterator[Symbol]:
-    if not _has_alarms(symbol.type, known):
+    t = symbol.type
+    if not _has_alarms(t, known):
         return
-    if _is_alarm(symbol.type):
+    if _is_alarm(t):
         yield symbol
-    for part in symbol.parts():
+    parts = symbol.parts()
+    if isinstance(t, StructType):
+        parts = (symbol.member(f) for f in t.fields if _has_alarms(f.type, known))
+    for part in parts:
         yield from _alarms(part, known)
 
 
