@@ -167,7 +167,7 @@ static void an_11_bit_frame_without_room_waits_and_keeps_others_waiting(void)
     end();
 }
 
-static void users_are_told_of_bus_off_once(void)
+static void users_notice_bus_off_once(void)
 {
     start(0x180, 0x780, false);
     SimCanDestroy(SIM_CAN_DEVICE, 32);
@@ -208,7 +208,7 @@ int main(void)
     RUN(more_filters_than_the_controller_has_let_all_frames_pass);
     RUN(an_11_bit_frame_goes_before_those_of_29_bits);
     RUN(an_11_bit_frame_without_room_waits_and_keeps_others_waiting);
-    RUN(users_are_told_of_bus_off_once);
+    RUN(users_notice_bus_off_once);
     RUN(a_third_user_has_no_place);
     RUN(a_closed_controller_sends_nothing);
     return test_result();

@@ -75,7 +75,7 @@ static void end(SDO_CLIENT *client, SDO_STATE state, RTS_UI32 abort)
     client->abort = abort;
 }
 
-/* The node is told, too. */
+/* Ends the transfer in the node, too. */
 static void give_up(SDO_CLIENT *client, SDO_STATE state, RTS_UI32 abort)
 {
     BytesPut32(begin_of_object(client, SDO_ABORT), abort);

@@ -12,6 +12,9 @@
 #include "IoDrvCanopen.h"
 #include "rts_config.h"
 
+/* A firmware without CANopen may compile this. */
+#define CANOPEN_ROOM(count) ((count) > 0 ? (count) : 1)
+
 /* Who receives writes one of two copies, then `number`; a task reads the newer one. Inputs have only that, outputs only
  * what follows. */
 typedef struct {
@@ -56,8 +59,8 @@ typedef struct {
     RTS_UI32 device_count;
     RTS_UI32 pdo_count;
     CANOPEN_LINE lines[CAN_CONTROLLERS];
-    CANOPEN_DEVICE devices[CANOPEN_MAX_DEVICES];
-    CANOPEN_PDO_STATE pdos[CANOPEN_MAX_PDOS];
+    CANOPEN_DEVICE devices[CANOPEN_ROOM(CANOPEN_MAX_DEVICES)];
+    CANOPEN_PDO_STATE pdos[CANOPEN_ROOM(CANOPEN_MAX_PDOS)];
 } CANOPEN_SETUP;
 
 /* The PDO of a channel, NULL: none. */
