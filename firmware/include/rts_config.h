@@ -227,6 +227,15 @@
 #define APP_RETAIN_SAVE_US 1000000
 #endif
 
+/* 1: the port tells when the power is about to fail (AppPowerFails.h), and retain variables are saved then. If the power is
+ * still there after APP_POWER_BACK_MS, the program is started again. 0: no flash for it. */
+#ifndef APP_POWER_FAIL
+#define APP_POWER_FAIL 0
+#endif
+#ifndef APP_POWER_BACK_MS
+#define APP_POWER_BACK_MS 5000
+#endif
+
 /* Set in the address of an entry of IEC code: 1 on cores that run Thumb code. */
 #ifndef APP_ENTRY_MODE_BIT
 #define APP_ENTRY_MODE_BIT 0

@@ -310,6 +310,8 @@ static void wait_for_signal(const sigset_t *set, RTS_I64 until_ms)
     int number = sigtimedwait(set, &info, &timeout);
     if (number == SIGTERM || number == SIGINT) {
         take_end_signal(number);
+    } else if (number == SIGPWR) {
+        signal_worker(SIGPWR);
     }
 }
 
@@ -372,6 +374,7 @@ int PortSupervise(int (*work)(void))
     sigaddset(&set, SIGCHLD);
     sigaddset(&set, SIGTERM);
     sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGPWR);
     sigprocmask(SIG_BLOCK, &set, NULL);
     (void)signal(SIGCHLD, SIG_DFL); /* if it is ignored, the exit status of a child is lost */
     do {

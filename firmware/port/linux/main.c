@@ -4,11 +4,12 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * SIGTERM and SIGINT end it in order, a second one at once. SIGHUP is ignored: a controller does not stop because
- * a user closes the terminal it was started from. The controller itself is a child process (Supervisor.c), which ends
+ * a user closes the terminal it was started from. SIGPWR says that the power is about to fail: values are saved. The controller itself is a child process (Supervisor.c), which ends
  * on SIGTERM only: SIGINT from a terminal reaches both.
  */
 #define _GNU_SOURCE
 #include "AppPassword.h"
+#include "AppPowerFails.h"
 #include "AppState.h"
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
@@ -115,7 +116,8 @@ static const char usage[] =
     "  --version       prints the version\n"
     "  --help          prints this\n"
     "\n"
-    "Ends on SIGTERM or SIGINT, with exit status 0 when everything was saved; SIGHUP is ignored.\n";
+    "Ends on SIGTERM or SIGINT, with exit status 0 when everything was saved; SIGHUP is ignored. SIGPWR saves retain\n"
+    "variables, since the power is about to fail: docs/retain.md.\n";
 
 static volatile sig_atomic_t quit;
 
@@ -545,6 +547,12 @@ static void on_end_signal(int number)
     SchedRequestEnd();
 }
 
+static void on_power_signal(int number)
+{
+    RTS_UNUSED(number);
+    AppPowerFails();
+}
+
 /* SIGXFSZ (a limit of file sizes) and SIGPIPE are errors of the write that met them. */
 static void ignore_signals(void)
 {
@@ -553,17 +561,21 @@ static void ignore_signals(void)
     (void)signal(SIGXFSZ, SIG_IGN);
 }
 
-/* `flags`: SA_RESETHAND, for a second signal that ends the process at once, or 0. */
+/* And SIGPWR, after which it goes on. `flags`: SA_RESETHAND, for a second signal that ends the process at once, or 0. */
 static void take_end_signals(int flags)
 {
     sigset_t ends;
     struct sigaction end = {.sa_handler = on_end_signal, .sa_flags = flags};
+    struct sigaction power = {.sa_handler = on_power_signal};
     sigemptyset(&end.sa_mask);
+    sigemptyset(&power.sa_mask);
+    sigaction(SIGPWR, &power, NULL);
     sigaction(SIGTERM, &end, NULL);
     sigaction(SIGINT, &end, NULL);
     sigemptyset(&ends); /* the parent process may have blocked them */
     sigaddset(&ends, SIGTERM);
     sigaddset(&ends, SIGINT);
+    sigaddset(&ends, SIGPWR);
     sigprocmask(SIG_UNBLOCK, &ends, NULL);
 }
 

@@ -13,6 +13,7 @@
 #include "AppEvents.h"
 #include "../load/AppFunctions.h"
 #include "AppLife.h"
+#include "AppPower.h"
 #include "CmpAppBP.h"
 #include "CmpForce.h"
 #include "CmpLog.h"
@@ -42,6 +43,7 @@ RTS_RESULT AppStartApplication(void)
 
 static RTS_RESULT stop_unasked(void)
 {
+    AppPowerForget();
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
     if (AppStopTasks() && (!AppHasException() || AppWasBrokenOff())) {
@@ -195,6 +197,7 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
             return ERR_NOMEMORY;
         if (!RTS_STARTS_ONCE) {
             AppForget();
+            AppPowerForget();
             AppDownloadAbort();
         }
         break;
@@ -202,6 +205,7 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
         AppBoot();
         break;
     case CH_COMM_CYCLE:
+        AppPowerCheck();
         AppHandlePendingException();
         AppCheckProof();
         break;
