@@ -22,6 +22,7 @@
 #include "CmpStd.h"
 #include "RetainTable.h"
 #include "SysFlashLog.h"
+#include "rts_config.h"
 
 /* The largest retain area that can be saved, bytes. */
 RTS_UI32 RetainCapacity(void);
@@ -63,6 +64,20 @@ RTS_RESULT RetainSaveExchanged(void);
  * the previous application, as long as the device may go back to it. */
 void RetainKeep(RTS_UI32 until);
 void RetainKeepNone(void);
+
+/* ---- a copy of them, for a file ---- */
+
+#if FILE_STORE_FILES > 0
+/* What was saved last: `size` bytes of the application with this tag. They stay as they are while RetainGetSequence is the
+ * same. NULL: nothing is kept, or a save is under way. */
+const RTS_UI8 *RetainGetSaved(RTS_UI32 *size, RTS_UI32 *tag);
+
+/* Where RetainRestore takes values from: as much room as RetainGetSaved has, whose bytes are lost. */
+RTS_UI8 *RetainGetRoom(void);
+
+/* The bytes in the room become the values, and are saved, as a whole; or the room is given up. No task runs. */
+RTS_RESULT RetainRestore(bool valid);
+#endif
 
 RTS_RESULT CmpRetain_Hook(CMP_HOOK hook);
 

@@ -17,6 +17,7 @@
 #include "CmpSettings.h"
 #include "CmpSrv.h"
 #include "FileStore.h"
+#include "RetainFile.h"
 #include "SysTarget.h"
 #include "rts_config.h"
 
@@ -38,6 +39,9 @@ struct FILE_KIND {
     RTS_RESULT (*read)(const FILE_ENTRY *entry, RTS_UI32 offset, RTS_UI8 *data, RTS_UI32 size);
     /* Whether a client may write and delete it; NULL: no. */
     bool (*may_change)(void);
+    /* For one that the device takes and does not keep: whether a client may put it now, and what it does with it. */
+    RTS_RESULT (*may_put)(void);
+    RTS_RESULT (*put)(const FILE_ENTRY *file);
 };
 
 /* A file that a client reads; session 0: none. */
@@ -53,6 +57,7 @@ static struct {
     const COMM_CLIENT *writer; /* NULL: none */
     RTS_UI32 writer_session;
     RTS_UI32 writer_handle;
+    const FILE_KIND *writer_kind;
 } files;
 
 /* ---- the program ---- */
@@ -211,12 +216,13 @@ static bool are_not_given(void)
 #endif
 
 static const FILE_KIND kinds[] = {
-    {FILE_NAME_IMAGE, find_image, read_image, NULL},
-    {FILE_NAME_LOG, find_log, read_log, NULL},
+    {FILE_NAME_IMAGE, find_image, read_image, NULL, NULL, NULL},
+    {FILE_NAME_LOG, find_log, read_log, NULL, NULL, NULL},
+    {FILE_NAME_RETAIN, RetainFileFind, RetainFileRead, NULL, RetainFileMayPut, RetainFilePut},
 #if SETTINGS
-    {SETTINGS_FILE_NAME, find_settings, read_settings, are_not_given},
+    {SETTINGS_FILE_NAME, find_settings, read_settings, are_not_given, NULL, NULL},
 #endif
-    {NULL, find_stored, read_stored, always},
+    {NULL, find_stored, read_stored, always, NULL, NULL},
 };
 
 static const FILE_KIND *kind_of(const char *name)
@@ -271,6 +277,20 @@ static RTS_RESULT read_own_name(const SRV_REQUEST *request, FILE_ENTRY *entry)
     RTS_RESULT result = read_name(request, entry);
 
     return result == ERR_OK && !may_change(kind_of(entry->name)) ? ERR_OPERATION_DENIED : result;
+}
+
+/* A name that may be written. */
+static RTS_RESULT read_name_to_put(const SRV_REQUEST *request, FILE_ENTRY *entry)
+{
+    RTS_RESULT result = read_name(request, entry);
+    const FILE_KIND *kind;
+
+    if (result != ERR_OK)
+        return result;
+    kind = kind_of(entry->name);
+    if (kind->may_put != NULL)
+        return kind->may_put();
+    return may_change(kind) ? (RTS_RESULT)ERR_OK : ERR_OPERATION_DENIED;
 }
 
 /* A malformed request is refused as a whole, all else in TAG_FILE_RESULT. */
@@ -526,6 +546,7 @@ static RTS_RESULT begin(const COMM_CLIENT *client, const FILE_ENTRY *entry)
     files.writer = client;
     files.writer_session = client->session.id;
     files.writer_handle = new_handle();
+    files.writer_kind = kind_of(entry->name);
     return ERR_OK;
 }
 
@@ -546,7 +567,7 @@ static RTS_RESULT start_download(SRV_REQUEST *request, BTAG_WRITER *reply)
 
     if (result != ERR_OK)
         return result;
-    result = read_own_name(request, &entry);
+    result = read_name_to_put(request, &entry);
     if (result == ERR_OK) {
         const FILE_CONTENT *content = (const FILE_CONTENT *)tag.data;
         entry.crc = BytesGet32(content->crc);
@@ -588,6 +609,21 @@ static RTS_RESULT download(SRV_REQUEST *request, BTAG_WRITER *reply)
     return ERR_OK;
 }
 
+/* A file that the device does not keep was in the store until now. */
+static RTS_RESULT put_file(const FILE_KIND *kind)
+{
+    const FILE_ENTRY *stored = FileStoreFind(kind->name);
+    FILE_ENTRY file;
+    RTS_RESULT result;
+
+    if (stored == NULL)
+        return ERR_DEVICE;
+    file = *stored;
+    result = kind->put(&file);
+    (void)FileStoreDelete(kind->name);
+    return result;
+}
+
 static RTS_RESULT end_file(const COMM_CLIENT *client, RTS_UI32 handle, bool cancel)
 {
     if (is_reading(client, handle)) {
@@ -597,8 +633,10 @@ static RTS_RESULT end_file(const COMM_CLIENT *client, RTS_UI32 handle, bool canc
     if (!is_writing(client) || handle != files.writer_handle)
         return ERR_INVALID_HANDLE;
     files.writer = NULL;
-    if (!cancel)
-        return FileStoreEnd();
+    if (!cancel) {
+        RTS_RESULT result = FileStoreEnd();
+        return result == ERR_OK && files.writer_kind->put != NULL ? put_file(files.writer_kind) : result;
+    }
     FileStoreAbort();
     return ERR_OK;
 }
@@ -647,11 +685,20 @@ static const SRV_SERVICE services[] = {
     {SRV_FILE_DELETE, RIGHT_DOWNLOAD, delete_file},
 };
 
+/* Power failed before the device had taken such a file. */
+static void drop_not_kept(void)
+{
+    for (const FILE_KIND *kind = kinds; kind->name != NULL; kind++)
+        if (kind->put != NULL && FileStoreFind(kind->name) != NULL)
+            (void)FileStoreDelete(kind->name);
+}
+
 RTS_RESULT CmpFileTransfer_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT) {
         memset(&files, 0, sizeof(files));
         FileStoreOpen();
+        drop_not_kept();
     } else if (hook == CH_COMM_CYCLE) {
         drop_orphan();
     }

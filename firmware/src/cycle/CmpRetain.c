@@ -277,6 +277,31 @@ void RetainKeepNone(void)
         FlashLogKeepNone(&retain.log);
 }
 
+#if FILE_STORE_FILES > 0
+const RTS_UI8 *RetainGetSaved(RTS_UI32 *size, RTS_UI32 *tag)
+{
+    if (!HAS_RETAIN || !kept.settled || !kept.saved_valid)
+        return NULL;
+    *size = kept.table->area_size;
+    *tag = retain.tag;
+    return saved_area;
+}
+
+RTS_UI8 *RetainGetRoom(void)
+{
+    kept.saved_valid = false;
+    return saved_area;
+}
+
+RTS_RESULT RetainRestore(bool valid)
+{
+    if (!valid)
+        return RetainSave(true);
+    memcpy(retain.area, saved_area, kept.table->area_size);
+    return save_copy();
+}
+#endif
+
 /* Whether a copy is wanted. */
 static bool is_due(void)
 {

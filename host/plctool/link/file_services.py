@@ -37,6 +37,10 @@ _WHY = {
     lib.ERR_NO_CONSISTENCY: "it changed while it was read; try again",
     lib.ERR_INVALID_STATE: "another tool or the program is writing a file; try again when it is done",
     lib.ERR_FT_CRC_MISMATCH: "it did not arrive as it was sent; try again",
+    lib.ERR_CALL_AGAIN: "the program runs; stop it with 'plctool stop', and put the file again",
+    lib.ERR_APP_NOT_LOADED: "the device has no program with retain variables; flash the one that saved the file",
+    lib.ERR_VERSION_MISMATCH: "another program saved it; flash that one, or write single values with 'plctool write'",
+    lib.ERR_CRC_FAILED: "it is damaged, or not a file of retain variables; take one of 'plctool files get Retain.bin'",
     lib.ERR_DEVICE: "its flash has failed, or it has no room for files",
 }
 
