@@ -14,6 +14,7 @@ from plctool.cli.documents import Document
 from plctool.cli.parser import Parser
 from plctool.errors import DeviceError, UsageError
 from plctool.files import usable_path
+from plctool.printable import one_line
 
 if TYPE_CHECKING:
     from plctool.device import Plc
@@ -67,7 +68,7 @@ def _checked(path: Path) -> bytes | None:
         raise UsageError(f"{path} cannot be read: {error.strerror}.", "no-file") from None
     found = faults(text)
     for fault in found:
-        print(f"plctool: {path}:{fault.line}: {fault.words}", file=sys.stderr)
+        output.say(f"plctool: {one_line(f'{path}:{fault.line}: {fault.words}')}", sys.stderr)
     return None if found else text
 
 
