@@ -15,9 +15,9 @@
 
 /* One per task, so that each task has the time of its own cycle. Read-only to IEC code. */
 typedef struct {
-    RTS_I64 time_ns; /* monotonic time at the start of this cycle, from start of the application */
-    RTS_I32 time_ms; /* the same in ms, wraps */
-    RTS_UI32 reserved;
+    RTS_I64 time_ns;               /* monotonic time at the start of this cycle, from start of the application */
+    RTS_I32 time_ms;               /* the same in ms, wraps */
+    RTS_UI32 task;                 /* number of the task, from 1; 0 in code outside of tasks. With IEC_TASK_CALLS */
     RTS_UI8 *area[APP_AREA_COUNT]; /* base address of each area; code too */
     const RTS_PFN *imports;        /* resolved external functions, in the order of their table */
 } IEC_CONTEXT;

@@ -109,6 +109,7 @@ enum {
     CMPID_SimCanBus = 0x0052,
     CMPID_IoDrvCanopen = 0x0053,
     CMPID_IecClock = 0x0072,
+    CMPID_IecTaskCalls = 0x00A1,
 };
 
 /* Name of a component, "" when unknown. */

@@ -145,6 +145,9 @@ enum {
 #if HAS_IecClock
     CMP_ONE(IecClock)
 #endif
+#if HAS_IecTaskCalls
+    CMP_ONE(IecTaskCalls)
+#endif
 #if HAS_IoDrvModbus
     CMP_ONE(IoDrvModbus)
 #endif

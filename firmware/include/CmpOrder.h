@@ -75,6 +75,9 @@ X(IecCan)
 #if HAS_IecClock
 X(IecClock)
 #endif
+#if HAS_IecTaskCalls
+X(IecTaskCalls)
+#endif
 #if HAS_CmpTraceMgr
 X(CmpTraceMgr)
 #endif

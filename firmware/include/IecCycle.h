@@ -137,6 +137,16 @@ void IecCycleResume(RTS_UI32 task);
 #endif
 #endif
 
+#if IEC_TASK_CALLS
+/* ---- for IecTaskCalls ---- */
+
+/* The watchdog time of a task [us]; 0: none, or no such task. */
+RTS_UI32 IecCycleGetWatchdog(RTS_UI32 task);
+/* Disables the watchdog of the task that calls it, or enables it again: only for this cycle, which may take as long as
+ * one without watchdog. What was disabled does not count. False when there is no such task. */
+bool IecCycleLiftWatchdog(RTS_UI32 task, bool lift);
+#endif
+
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
  * simulator, between cycles. */
 RTS_RESULT IecTaskGetEntry(RTS_UI32 task, IEC_ENTRY *entry, IEC_CONTEXT **context);

@@ -342,6 +342,13 @@
 #define IEC_FILES 0
 #endif
 
+/* 1: a program may ask about its tasks, and disable their watchdog for a cycle (IecTaskCalls.h); 24 bytes for each task. It
+ * needs HAS_IecTaskCalls in cmp_list.c, and one of EVENT_MAX_CALLBACKS. 0: no flash for it, and a program that does is
+ * refused. */
+#ifndef IEC_TASK_CALLS
+#define IEC_TASK_CALLS 0
+#endif
+
 /* Bytes for what is traced (CmpTraceMgr.h): each packet takes some 150, 28 for each record, and its samples. 0: none, and
  * no flash for them. It needs HAS_CmpTraceMgr in cmp_list.c, and two of EVENT_MAX_CALLBACKS. */
 #ifndef TRACE_BUFFER
@@ -378,7 +385,7 @@
 #endif
 
 /* Event callbacks that may be registered, all for components of a port but one each of CmpForce,
- * CmpOperationControl, IecEvents and CmpAppBP, and two of CmpTraceMgr; five words each. 0: the application sends no events. */
+ * CmpOperationControl, IecEvents, IecTaskCalls and CmpAppBP, and two of CmpTraceMgr; five words each. 0: the application sends no events. */
 #ifndef EVENT_MAX_CALLBACKS
 #define EVENT_MAX_CALLBACKS 8
 #endif

@@ -21,6 +21,7 @@ COMPONENTS = {
     "IecCan.functions": "IecCan",
     "IecClock.functions": "IecClock",
     "IecLog.functions": "IecLog",
+    "IecTaskCalls.functions": "IecTaskCalls",
     "CmpOperationControl.functions": "CmpOperationControl",
     "CmpRetain.externals": "CmpRetain",
     "ModbusCalls.functions": "IoDrvModbus",

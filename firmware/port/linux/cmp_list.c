@@ -28,6 +28,7 @@
 #define HAS_CmpCan 1
 #define HAS_IecCan 1
 #define HAS_IecClock 1
+#define HAS_IecTaskCalls 1
 #define HAS_CmpTraceMgr 1
 #define HAS_CmpAppBP 1
 #define HAS_CmpIoMgrSrv 1

@@ -42,6 +42,7 @@
 #define APP_CALL_DATA 4096
 #define IEC_FILES 16
 #define APP_POWER_FAIL 1
+#define IEC_TASK_CALLS 1
 #define TRACE_BUFFER (4 * 1024 * 1024)
 #define BP_MAX 128
 #define IEC_LATENESS 1

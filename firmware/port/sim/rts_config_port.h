@@ -41,6 +41,7 @@
 #define APP_CALL_DATA 1024
 #define IEC_FILES 16
 #define APP_POWER_FAIL 1
+#define IEC_TASK_CALLS 1
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */
 #define TRACE_BUFFER (1024 * 1024)
 #endif

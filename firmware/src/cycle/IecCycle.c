@@ -27,6 +27,10 @@ typedef struct {
     RTS_UI32 phase;
     RTS_I64 start_ns;
     RTS_I64 limit_ns;
+#if IEC_TASK_CALLS
+    RTS_UI32 is_lifted; /* for this cycle */
+    RTS_UI32 more_ns;   /* for this cycle: how long it was lifted */
+#endif
 } GUARD;
 
 typedef struct {
@@ -48,6 +52,9 @@ typedef struct {
     RTS_UI64 sum_ns;
 #if TRACE_BUFFER > 0
     RTS_I64 due_ns; /* of this cycle, while it is recorded */
+#endif
+#if IEC_TASK_CALLS
+    RTS_I64 lifted_ns; /* when its watchdog was lifted */
 #endif
 #if IEC_LATENESS
     RTS_UI32 late[IEC_LATENESS_CLASSES];
@@ -71,6 +78,11 @@ static struct {
 } tasks;
 
 enum { NS_PER_MS = 1000000, NS_PER_US = 1000 };
+
+#if IEC_TASK_CALLS
+/* How long a cycle may take that has disabled its watchdog: as long as that of a task without one. */
+#define LIFTED_NS ((RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US)
+#endif
 
 /* ---- guards: a few instructions, shorter than a call ---- */
 
@@ -100,6 +112,11 @@ bool IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *out)
         return false;
     out->start_ns = guard->start_ns;
     out->limit_ns = guard->limit_ns;
+#if IEC_TASK_CALLS
+    out->limit_ns += SysAtomicLoad(&guard->more_ns);
+    if (SysAtomicLoad(&guard->is_lifted) && out->limit_ns < LIFTED_NS)
+        out->limit_ns = LIFTED_NS;
+#endif
     SysAtomicFence();
     return SysAtomicLoad(&guard->phase) == out->serial;
 }
@@ -259,6 +276,11 @@ static RTS_INLINE bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
 {
     if (task->watchdog_ns == 0)
         return false;
+#if IEC_TASK_CALLS
+    elapsed_ns -= task->guard.more_ns;
+    if (task->guard.is_lifted)
+        return elapsed_ns > LIFTED_NS && elapsed_ns > task->guard.limit_ns;
+#endif
     if (elapsed_ns <= task->watchdog_ns) {
         task->exceeded = 0;
         return false;
@@ -362,6 +384,10 @@ static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
     RTS_EXCEPTION exception;
 
     set_time(task, start_ns - tasks.time_zero);
+#if IEC_TASK_CALLS
+    task->guard.is_lifted = false;
+    task->guard.more_ns = 0;
+#endif
     guard_begin(&task->guard, start_ns);
 #if ONLINE_CHANGE && !RTS_ONE_CORE && BP_HOLDS_TASKS
     if (is_held(task)) {
@@ -656,6 +682,9 @@ static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *protot
     memset(task, 0, sizeof *task);
     task->guard.phase = phase; /* goes on, so that a supervisor never takes a new cycle for an old one */
     task->context = *prototype;
+#if IEC_TASK_CALLS
+    task->context.task = index_of(task) + 1;
+#endif
     task->has_copies = AppImageSetContext(index_of(task), &task->context);
     task->has_phases = task->has_copies || CyclePhasesExist();
     task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
@@ -797,6 +826,29 @@ void IecTaskGetTimes(RTS_UI32 index, RTS_UI32 *cycle_ns, RTS_UI32 *late_ns)
 
     *cycle_ns = saturate(SysTimeGetNs() - task->guard.start_ns);
     *late_ns = saturate(task->guard.start_ns - task->due_ns);
+}
+#endif
+
+#if IEC_TASK_CALLS
+RTS_UI32 IecCycleGetWatchdog(RTS_UI32 index)
+{
+    return index < tasks.count ? tasks.list[index].record->watchdog_us : 0;
+}
+
+bool IecCycleLiftWatchdog(RTS_UI32 index, bool lift)
+{
+    GUARD *guard = &tasks.list[index].guard;
+
+    if (index >= tasks.count)
+        return false;
+    if (lift && !guard->is_lifted) {
+        tasks.list[index].lifted_ns = SysTimeGetNs();
+        SysAtomicStore(&guard->is_lifted, true);
+    } else if (!lift && guard->is_lifted) {
+        SysAtomicStore(&guard->more_ns, saturate(guard->more_ns + SysTimeGetNs() - tasks.list[index].lifted_ns));
+        SysAtomicStore(&guard->is_lifted, false);
+    }
+    return true;
 }
 #endif
 

@@ -46,6 +46,10 @@ _FUNCTIONS = {
     "IecClock": """
         clock_get():LINT                                    32    48
         clock_set(LINT):UDINT                               16    32""",
+    "IecTaskCalls": """
+        task_value(UDINT,UDINT):UDINT                      192   192
+        task_name(UDINT,UDINT):LWORD                       192   192
+        task_watchdog(UDINT,BOOL):BOOL                      64    64""",
     "CmpMath": """
         sin(LREAL):LREAL                                  1008  1856
         cos(LREAL):LREAL                                  1008  1856

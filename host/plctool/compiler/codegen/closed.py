@@ -36,7 +36,7 @@ from plctool.image.targets import Target
 
 _PLAIN = (Assign, BitPlace, Case, If, Load, Return, Unary)
 _OPEN = (Intrinsic.EXCHANGE, Intrinsic.STRING_SIZE)
-_TIMES = (Intrinsic.TIME, Intrinsic.LTIME)
+_OF_CONTEXT = (Intrinsic.TIME, Intrinsic.LTIME, Intrinsic.TASK)
 _LARGEST = 1000  # expressions and statements: a larger body may become several functions
 
 
@@ -58,7 +58,7 @@ def closed_block(pou: Pou, target: Target, calls: int) -> Closed | None:
     for number, node in enumerate(walk(pou.body)):
         if number > _LARGEST or not _is_harmless(node):
             return None
-        has_context |= isinstance(node, IntrinsicCall) and node.intrinsic in _TIMES
+        has_context |= isinstance(node, IntrinsicCall) and node.intrinsic in _OF_CONTEXT
     outputs = [p.variable for p in pou.parameters if p.direction is Direction.OUTPUT]
     fitting = (v for v in outputs if is_scalar(v.type) and v.type.size <= target.pointer_size)
     return Closed(next(fitting, None), has_context, calls)

@@ -33,6 +33,7 @@ from plctool.compiler.codegen.lower_calls import call_function, lasting
 from plctool.compiler.codegen.lower_frame import (
     AGGREGATES,
     ARRAY_BOUNDS,
+    TASK_OFFSET,
     TIME_MS_OFFSET,
     TIME_NS_OFFSET,
     VALUES,
@@ -261,6 +262,8 @@ def intrinsic(frame: Frame, e: IntrinsicCall) -> Value:
         return frame.context_load(TIME_MS_OFFSET, "i32")
     if op is Intrinsic.LTIME:
         return frame.context_load(TIME_NS_OFFSET, "i64")
+    if op is Intrinsic.TASK:
+        return frame.context_load(TASK_OFFSET, "i32")
     if op is Intrinsic.STRING_SIZE:
         return convert(frame, frame.aggregate(e.args[0]).capacity, UDINT, t)
     first = e.args[0].type

@@ -22,7 +22,8 @@ _OPENING = re.compile(
     r"^(?:(?P<pou>FUNCTION_BLOCK|FUNCTION)\s+(?P<name>\w+)|(?P<types>TYPE)\b|(?P<globals>VAR_GLOBAL)\b)", re.MULTILINE
 )
 STAND_INS = (
-    "Standard", "Standard64", "Util", "SysMem", "IBaseLibrary", "__System", "MEM", "CmpLog", "SysTimeRtc",
+    "Standard", "Standard64", "Util", "SysMem", "IBaseLibrary", "__System", "MEM", "CmpLog", "CmpIecTask", "CmpApp",
+    "SysTimeRtc",
     "Tc2_Standard", "Tc2_System", "Tc2_Utilities",
 )  # fmt: skip
 """Libraries of other systems that this one stands in for, as far as it has their names."""

@@ -343,6 +343,7 @@ class Intrinsic(Enum):
     LTIME = "LTIME"  # () -> LTIME of this cycle [ns]
     BITCAST = "BITCAST"  # same size, bits kept (REAL <-> DWORD, LREAL <-> LWORD)
     EXCHANGE = "EXCHANGE"  # (address of a DINT, old, new) -> BOOL: it was old and is new, in one step
+    TASK = "TASK"  # () -> UDINT: number of the task that runs, from 1; 0 in code outside of tasks
     STRING_SIZE = "STRING_SIZE"  # (string place load) -> capacity in characters of the actual argument
 
 

@@ -14,6 +14,7 @@
 /* The full configuration has no room for traces and breakpoints in 64 KiB of RAM. */
 #define TRACE_BUFFER 0
 #define BP_MAX 0
+#define IEC_TASK_CALLS 0
 
 /* A second connection has no room in its 64 KiB. */
 #define COMM_MAX_CLIENTS 1

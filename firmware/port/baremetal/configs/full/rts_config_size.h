@@ -28,6 +28,9 @@
 #define FORCE_MAX 16
 #define OPERATION_CONTROL 1
 #define IEC_LOG_BURST 8
+#ifndef IEC_TASK_CALLS
+#define IEC_TASK_CALLS 1
+#endif
 #ifndef IEC_EVENTS
 #define IEC_EVENTS 1
 #endif

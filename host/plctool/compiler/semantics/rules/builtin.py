@@ -187,6 +187,13 @@ def _exchange(c: Checker, f: Applied) -> Expr:
     return IntrinsicCall(Intrinsic.EXCHANGE, args, BOOL, c.pos(f.node.pos))
 
 
+def _task(c: Checker, f: Applied) -> Expr:
+    """`__TASK()` of the standard library."""
+    if not c.scope.library:
+        return c.missing(f.node.pos, f.name, f"unknown function {f.name}")
+    return IntrinsicCall(Intrinsic.TASK, [], UDINT, c.pos(f.node.pos))
+
+
 def _bound(c: Checker, f: Applied) -> Expr:
     """`LOWER_BOUND(array, dimension)`"""
     array, dimension = f.args
@@ -211,6 +218,7 @@ def _bound(c: Checker, f: Applied) -> Expr:
 _ON_VARIABLES: dict[str, BuiltIn] = {
     "STRING_SIZE": BuiltIn(_string_size, 1, 1),
     "__EXCHANGE": BuiltIn(_exchange, 3, 3),
+    "__TASK": BuiltIn(_task, 0, 0),
     "LOWER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
     "UPPER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
 }

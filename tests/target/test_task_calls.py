@@ -1,0 +1,35 @@
+"""What a program on a board asks about its tasks; the rest of the promise is in tests/task_calls.py."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from task_calls import PROGRAM, TaskWatchdogs
+
+from plctool.device import Plc
+from plctool.errors import DeviceError
+from plctool.link.connection import Connection
+
+
+class TestBoard(TaskWatchdogs):
+    LOOPS = 20_000_000
+
+    @pytest.fixture
+    def plc(self, make_board, build):
+        with make_board("full") as board, Plc(Connection(board.line())) as plc:
+            plc.flash(build(PROGRAM).path)
+            yield plc
+
+
+def test_a_firmware_that_does_not_tell_refuses_the_program(make_board, build):
+    with (
+        make_board("standard") as board,
+        Plc(Connection(board.line())) as plc,
+        pytest.raises(DeviceError, match="task_value"),
+    ):
+        plc.flash(build(PROGRAM).path)
