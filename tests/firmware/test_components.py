@@ -66,4 +66,4 @@ def test_what_a_port_chooses_exists(path: Path) -> None:
 
 
 def test_there_is_a_list_for_every_configuration() -> None:
-    assert len(LISTS) == 10
+    assert len(LISTS) == 11

@@ -12,7 +12,7 @@ from plctool.image.c_functions import C_FUNCTIONS
 from plctool.image.targets import find_target
 
 MACHINE = find_target(TARGET).machine
-CONFIGS = [config for config in ("minimal", "standard", "full", "modbus") if firmware(config).exists()]
+CONFIGS = [config for config in ("minimal", "standard", "plus", "full", "modbus") if firmware(config).exists()]
 
 
 @cache

@@ -9,11 +9,14 @@ import pytest
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
+from environment import firmware
 from event_functions import PROGRAM, EndlessFunctions
 
 from plctool.device import Plc
 from plctool.errors import DeviceError
 from plctool.link.connection import Connection
+
+CONFIGS = [config for config in ("full", "plus") if firmware(config).exists()]
 
 
 class TestBoard(EndlessFunctions):
@@ -21,9 +24,9 @@ class TestBoard(EndlessFunctions):
     def image(self, build):
         return build(PROGRAM).path
 
-    @pytest.fixture
-    def plc(self, make_board, image):
-        with make_board("full") as board, Plc(Connection(board.line())) as plc:
+    @pytest.fixture(params=CONFIGS)
+    def plc(self, request, make_board, image):
+        with make_board(request.param) as board, Plc(Connection(board.line())) as plc:
             plc.flash(image)
             yield plc
 

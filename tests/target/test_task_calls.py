@@ -9,19 +9,22 @@ import pytest
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
+from environment import firmware
 from task_calls import PROGRAM, TaskWatchdogs
 
 from plctool.device import Plc
 from plctool.errors import DeviceError
 from plctool.link.connection import Connection
 
+CONFIGS = [config for config in ("full", "plus") if firmware(config).exists()]
+
 
 class TestBoard(TaskWatchdogs):
     LOOPS = 20_000_000
 
-    @pytest.fixture
-    def plc(self, make_board, build):
-        with make_board("full") as board, Plc(Connection(board.line())) as plc:
+    @pytest.fixture(params=CONFIGS)
+    def plc(self, request, make_board, build):
+        with make_board(request.param) as board, Plc(Connection(board.line())) as plc:
             plc.flash(build(PROGRAM).path)
             yield plc
 
