@@ -9,7 +9,6 @@ from collections.abc import Iterator
 
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, FunctionInfo, PouSymbol
 from plctool.compiler.semantics.world import World
-from plctool.compiler.syntax.attributes import CALL_ON
 from plctool.compiler.syntax.diagnostics import did_you_mean
 from plctool.compiler.typed.nodes import Call, CallStatement, Const, EventFunction, Pos, Pou, PouKind
 from plctool.core import lib
@@ -58,7 +57,7 @@ def declare_event_functions(world: World) -> list[EventFunction]:
     """Declares the functions that the program attaches to events, in the order of the program."""
     found: dict[str, EventFunction] = {}
     for symbol in world.names.functions():
-        names = symbol.decl.attributes.get(CALL_ON)
+        names = symbol.decl.attributes.get("call_on")
         info = None if names is None else _function(world, symbol)
         if names is None or info is None:
             continue

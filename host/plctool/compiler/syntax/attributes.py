@@ -18,8 +18,6 @@ Attributes = dict[int, dict[str, str]]
 Repeated = dict[int, list[tuple[int, str, str]]]
 """The same in their order, with the offset of each: one that stands several times is there as often."""
 
-CALL_ON = "call_on"
-
 HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
     "pack_mode": frozenset(("STRUCT",)),
@@ -27,7 +25,7 @@ HEEDED: dict[str, frozenset[str]] = {
     "strict": frozenset(("enumeration",)),
     "to_string": frozenset(("enumeration",)),
     "call_after_init": frozenset(("FUNCTION_BLOCK", "METHOD")),
-    CALL_ON: frozenset(("FUNCTION",)),
+    "call_on": frozenset(("FUNCTION",)),
     "instance-path": frozenset(("variable",)),
     "external": frozenset(("FUNCTION",)),
     "fault": frozenset(("TEST",)),
