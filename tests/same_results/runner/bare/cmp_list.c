@@ -9,5 +9,8 @@
 #define HAS_CmpEventMgrEmbedded 1
 #define HAS_CmpRetain 1
 #define HAS_CmpMath 1
+#define HAS_IecLog 1
+#define HAS_IecEvents 1
+#define HAS_IecTaskCalls 1
 #define PORT_COMPONENTS(X) X(CmpIntCalls) X(CmpRealCalls) X(CmpLrealCalls) X(SysSim)
 #include "CmpList.h"
