@@ -11,7 +11,7 @@
 /*
  * EVT_CLASS_* is in the high half; EVTPARAM_CmpApp is the parameter.
  *
- * EVT_PrepareDownload and EVT_Deny* are questions: an answer other than ERR_OK (CmpEventMgr.h) denies, before anything
+ * EVT_PrepareDownload, EVT_PrepareOnlineChange and EVT_Deny* are questions: an answer other than ERR_OK (CmpEventMgr.h) denies, before anything
  * has changed. Services and the start-up ask. What keeps a device reachable does not: exceptions, a reset to the origin,
  * a start that leaves the program stopped, the end of the runtime.
  */
@@ -22,8 +22,8 @@ enum {
     EVT_StopDone = 0x10004,
     EVT_PrepareReset = 0x10005,
     EVT_ResetDone = 0x10006,
-    EVT_PrepareOnlineChange = 0x10007, /* no online change yet: never posted, nor is the next one */
-    EVT_OnlineChangeDone = 0x10008,
+    EVT_PrepareOnlineChange = 0x10007, /* of the new application, which is checked; the old one still runs */
+    EVT_OnlineChangeDone = 0x10008,    /* after each of them, also a denied one, of what runs then */
     EVT_PrepareDownload = 0x10009, /* of the new application, which is checked; the old one still runs */
     EVT_DownloadDone = 0x1000A,    /* after each EVT_PrepareDownload, also a denied one, of what is loaded then */
     EVT_PrepareExit = 0x1000E,     /* its variables end: it is given up, or gets its initial values again */

@@ -588,6 +588,13 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
     return fakes.end_result;
 }
 
+#if ONLINE_CHANGE
+RTS_RESULT AppDownloadChange(APP_REFUSAL *refusal)
+{
+    return AppDownloadEnd(refusal);
+}
+#endif
+
 /* ---- password ---- */
 
 #if COMM_PASSWORD

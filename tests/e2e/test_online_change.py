@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from subprocess import PIPE
 
 import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from changing import Changing, program
+from changing import BLOCKS, BODY, VARIABLES, Changing, program
+from conftest import Tool
 from online_programs import built
 
 from plctool import connect
 from plctool.device import Plc
+from plctool.errors import EXIT_INTERRUPTED
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.waiting import eventually
 
@@ -54,3 +59,87 @@ def test_changed_program_is_what_runs_after_power_off_and_has_its_retain_values(
         assert again.status().image_crc == result.crc
         assert again.read("Main.kept") == 123
         eventually(lambda: again.read("Main.n") < 0)
+
+
+PROJECT = 'sources = ["main.st"]\n'
+
+
+@pytest.fixture
+def project(plcrt: Plcrt, tool: Tool) -> Path:
+    """A project in the folder of the tool, whose program runs."""
+    plcrt.stop()
+    plcrt.options = ("--tcp", "0")
+    plcrt.start()
+    (tool.folder / "plc.toml").write_text(PROJECT)
+    (tool.folder / "main.st").write_text(program(BODY))
+    tool.ok("flash", "--tcp", plcrt.tcp)
+    return tool.folder
+
+
+def test_edited_project_is_changed_in_the_program_that_runs(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    flash = ("flash", "--online-change", "--tcp", plcrt.tcp)
+    assert "already" in tool(*flash).out
+    tool.ok("write", "--tcp", plcrt.tcp, "Main.fixed=70")
+    (project / "main.st").write_text(program(BODY, before="VAR_GLOBAL more : INT := 3; END_VAR" + BLOCKS))
+    plan = tool.ok(*flash, "--dry-run")
+    assert (plan["new"], plan["removed"], plan["problems"]) == (["more"], [], [])
+    assert tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed")["values"] == {"Main.fixed": 70}
+    done = tool(*flash)
+    assert done.status == 0 and "  new: more\nchanged: " in done.out
+    values = tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed", "more")["values"]
+    assert values == {"Main.fixed": 70, "more": 3}
+    assert tool.ok("flash", "--tcp", plcrt.tcp)["skipped"]  # what runs is the image of the project
+    assert "Online change, CRC" in tool("log", "--tcp", plcrt.tcp).out
+
+
+def test_impossible_edit_is_refused_before_anything_is_sent(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    (project / "main.st").write_text(
+        program(BODY).replace("fixed : DINT", "fixed : LINT").replace("DINT := ADR", "LINT := ADR")
+    )
+    done = tool("flash", "--online-change", "--tcp", plcrt.tcp)
+    assert done.status == 2
+    assert "Main.fixed was DINT, is LINT" in done.err
+    assert tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed")["values"] == {"Main.fixed": 7}
+
+
+def test_force_of_a_removed_variable_ends_and_others_stay(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    tool.ok("force", "--tcp", plcrt.tcp, "Main.gone=1", "Main.fixed=2")
+    (project / "main.st").write_text(program(BODY).replace("gone : LINT := 5;", ""))
+    assert tool.ok("flash", "--online-change", "--tcp", plcrt.tcp)["released"] == ["Main.gone"]
+    assert list(tool.ok("forced", "--tcp", plcrt.tcp)["values"]) == ["Main.fixed"]
+
+
+def test_a_program_may_forbid_online_changes_alone(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    body = "PlcOperationControlInstance.xDisableApplicationOnlineChange := fixed = 8;"
+    flash = ("flash", "--online-change", "--tcp", plcrt.tcp)
+    (project / "main.st").write_text(program(body))
+    tool.ok(*flash)
+    tool.ok("write", "--tcp", plcrt.tcp, "Main.fixed=8")
+    eventually(lambda: "online change" in tool("status", "--tcp", plcrt.tcp).out)
+    (project / "main.st").write_text(program(body + BODY))
+    done = tool(*flash)
+    assert done.status == 1 and "the running program forbids it" in done.err.lower()
+    tool.ok("write", "--tcp", plcrt.tcp, "Main.fixed=7")
+    eventually(lambda: tool(*flash).status == 0)
+
+
+def test_saved_file_runs_and_a_mistake_in_it_is_only_said(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    command = [sys.executable, "-m", "plctool", "flash", "--online-change", "--watch", "--tcp", plcrt.tcp]
+    environment = os.environ | {"XDG_CACHE_HOME": str(project / "cache")}
+    with (
+        subprocess.Popen(command, cwd=project, env=environment, stdout=PIPE, stderr=PIPE, text=True) as watching,
+        connect(f"tcp:{plcrt.tcp}") as plc,
+    ):
+        assert watching.stdout is not None and watching.stderr is not None
+        try:
+            assert "already" in watching.stdout.readline()
+            (project / "main.st").write_text(program(BODY + " mistake;"))
+            assert watching.stderr.readline().startswith("main.st:")
+            (project / "main.st").write_text(program(BODY, VARIABLES.replace("seen :", "fresh, seen :")))
+            lines = iter(watching.stdout.readline, "")
+            assert next(line for line in lines if "new" in line)
+            assert next(line for line in lines if line.startswith("changed: "))
+            assert plc.raw_status().state == "run"
+        finally:
+            watching.send_signal(signal.SIGINT)
+        assert watching.wait(60) == EXIT_INTERRUPTED

@@ -25,13 +25,13 @@
 
 #define U(value) ((unsigned)(value))
 
+/* On the stack of main: the tables are of the image that is to run next. */
 typedef struct {
     const APP_IMAGE *image;
     const RTS_UI8 *code;
     APP_TABLES tables;
     APP_IMAGE old;
     const RTS_UI8 *old_code;
-    APP_TABLES old_tables;
     RTS_UI32 exception; /* of what initialises */
 } CHANGE;
 
@@ -125,14 +125,14 @@ static bool is_same_task(const CDL_TASK *a, const CDL_TASK *b)
 
 static RTS_RESULT check_tasks(const CHANGE *change, APP_REFUSAL *refusal)
 {
+    const CDL_TASK *old = AppGetTables()->tasks;
     RTS_UI32 i;
 
     if (change->image->task_count != change->old.task_count)
         return APP_REFUSE(refusal, ERR_NOT_SUPPORTED, "The change has other tasks; download it.");
     for (i = 0; i < change->old.task_count; i++) {
-        if (!is_same_task(&change->tables.tasks[i], &change->old_tables.tasks[i]))
-            return APP_REFUSE(refusal, ERR_NOT_SUPPORTED, "Task %s is another one; download the program.",
-                              change->old_tables.tasks[i].name);
+        if (!is_same_task(&change->tables.tasks[i], &old[i]))
+            return APP_REFUSE(refusal, ERR_NOT_SUPPORTED, "Task %s is another one; download the program.", old[i].name);
     }
     return ERR_OK;
 }
@@ -166,7 +166,7 @@ static void go_back(void *arg)
 {
     const CHANGE *change = arg;
 
-    AppExchange(&change->old, change->old_code, &change->old_tables);
+    AppExchange(&change->old, change->old_code, &change->tables);
 }
 
 /* Calculated initial values, and FB_Init, of new variables. */
@@ -175,7 +175,7 @@ static bool initialise(void *arg)
     CHANGE *change = arg;
     bool done = AppRunInit(change->image->change.init, &change->exception);
 
-    if (!done)
+    if (!done && AppLoaderRead(&change->old, &change->tables) == ERR_OK)
         go_back(change);
     return done;
 }
@@ -207,8 +207,10 @@ static RTS_RESULT commit(CHANGE *change, RTS_UI32 retain_after, APP_REFUSAL *ref
         result = AppCommitInstall(change->image->file, change->image->crc, retain_after);
     if (result == ERR_OK)
         return ERR_OK;
-    while (IecTaskExchange(&moment) == ERR_TIMEOUT)
-        AppHandlePendingException();
+    if (AppLoaderRead(&change->old, &change->tables) == ERR_OK) {
+        while (IecTaskExchange(&moment) == ERR_TIMEOUT)
+            AppHandlePendingException();
+    }
     return APP_REFUSE(refusal, result, "The flash cannot be written.");
 }
 
@@ -230,7 +232,6 @@ static RTS_RESULT prepare(CHANGE *change, APP_REFUSAL *refusal)
     RTS_RESULT result;
 
     change->old = *AppGetImage();
-    change->old_tables = *AppGetTables();
     change->old_code = AppGetContext()->area[APP_AREA_CODE];
     change->code = AppMapCode(change->image);
     if (change->code == NULL)

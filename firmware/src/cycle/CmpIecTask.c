@@ -68,22 +68,25 @@ RTS_NOINLINE void IecTaskStopAll(void)
 }
 
 #if ONLINE_CHANGE
+#if BP_MAX > 0
 RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange)
 {
-    RTS_RESULT result;
-#if BP_MAX > 0
     bool watched = watcher != NULL && IecCycleMayRun();
+    RTS_RESULT result;
 
     if (watched)
         watcher->stop();
-#endif
     result = IecCycleExchange(exchange);
-#if BP_MAX > 0
     if (watched)
         watcher->will_start();
-#endif
     return result;
 }
+#else
+RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange)
+{
+    return IecCycleExchange(exchange);
+}
+#endif
 #endif
 
 static void run_each_once(RTS_UI32 priority, bool by_event)

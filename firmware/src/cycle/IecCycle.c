@@ -551,7 +551,7 @@ void IecCycleResume(RTS_UI32 index)
 #define run_if_not_stopped(task, due_ns) false
 #endif
 
-#if ONLINE_CHANGE && !RTS_ONE_CORE
+#if ONLINE_CHANGE && !RTS_ONE_CORE && BP_HOLDS_TASKS
 RTS_STATIC_ASSERT(BP_MAX > 0, set_BP_MAX_or_no_ONLINE_CHANGE_where_tasks_run_beside_main);
 #endif
 

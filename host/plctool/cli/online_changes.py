@@ -55,7 +55,7 @@ def change_document(result: BuildResult) -> Document:
         "new": [v.name for v in change.new if _is_of_user(v.name)],
         "removed": [name for name in change.removed if _is_of_user(name)],
         "extended": list(dict.fromkeys(v.name for v, fresh in change.fresh if not fresh.was_in_register)),
-        "bytes": 0 if image is None else sum(step.size for step in image.steps),
+        "written": 0 if image is None else sum(step.size for step in image.steps),
         "problems": change.problems,
     }
 
@@ -78,7 +78,7 @@ def change_text(document: dict[str, Any]) -> str:
     """What a change does, in lines."""
     lines = [
         f"online change of {document['base']}: {counted(document['kept'], 'variable')} kept, "
-        f"{len(document['new'])} new, {len(document['removed'])} removed; {document['bytes']} bytes are written"
+        f"{len(document['new'])} new, {len(document['removed'])} removed; {document['written']} bytes are written"
     ]
     for kind in ("new", "removed", "extended"):
         lines += [f"  {kind}: {name}" for name in document[kind][:_SHOWN]]

@@ -15,7 +15,7 @@ from plctool.cli.builds import image_of
 from plctool.cli.connections import Progress, connect, connect_to, on_device, password_source
 from plctool.cli.documents import Document
 from plctool.cli.links import link_of
-from plctool.cli.output import EXIT_OK
+from plctool.cli.output import EXIT_OK, EXIT_USAGE
 from plctool.cli.parser import Parser
 from plctool.errors import EXIT_INTERRUPTED, PlcError, UsageError
 from plctool.files import usable_path
@@ -36,12 +36,25 @@ def flash_arguments(command: Parser) -> None:
         "--with-source", nargs="*", type=usable_path, metavar="FILE.st|DIR",
         help="also keep its sources and symbols on the device; without any, those of the project of the current folder",
     )  # fmt: skip
+    command.add_argument(
+        "--online-change", action="store_true",
+        help="replace the program between two cycles, so that variables keep their values; of a project, or of an "
+        "image that was built with --base",
+    )  # fmt: skip
+    command.add_argument("--dry-run", action="store_true", help="with --online-change: only say what it would do")
+    command.add_argument(
+        "--watch", action="store_true", help="with --online-change: again whenever a file of the project is saved"
+    )
     add_link(command)
     command.set_defaults(action=_flash)
 
 
 def _flash(args: argparse.Namespace) -> int:
     link = link_of(args)
+    if args.online_change:
+        return _change(args, link)
+    if args.dry_run or args.watch:
+        raise UsageError("--dry-run and --watch are for --online-change.", "usage")
     args.image = image_of(args)
     if len(link.nodes or ()) > 1:
         if args.with_source is not None:
@@ -70,6 +83,23 @@ def _flash(args: argparse.Namespace) -> int:
         return on_device(args, operation, flash_text)
     except KeyboardInterrupt:
         raise interrupted_flash({"": partial(connect, args)}, args.image) from None
+
+
+def _change(args: argparse.Namespace, link: Link) -> int:
+    from plctool.cli.live_changes import change, live_change_text, watch
+
+    if len(link.nodes or ()) > 1:
+        raise UsageError("--online-change is for one device; name one with --node.", "usage")
+    if args.no_start or args.force or args.with_source is not None:
+        raise UsageError("--online-change goes without --no-start, --force and --with-source.", "usage")
+    with connect(args) as plc:
+        if not args.watch:
+            document = change(plc, args)
+            output.show(args, document, live_change_text)
+            return EXIT_USAGE if document.get("problems") else EXIT_OK
+        for document in watch(plc, args):
+            output.show(args, document, live_change_text)
+    return EXIT_OK
 
 
 def _flash_several(args: argparse.Namespace, link: Link) -> int:

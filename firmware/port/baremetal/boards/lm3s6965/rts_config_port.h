@@ -6,6 +6,7 @@
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H
 
+#define ONLINE_CHANGE 0
 #define TRACE_BUFFER 0 /* the full configuration has no room for traces in 64 KiB of RAM */
 #define IEC_EVENTS 0   /* nor for functions of events */
 #define SETTINGS 0     /* nor for settings */

@@ -27,6 +27,9 @@
 #define SRV_OTHER_CLIENTS 1
 #define FORCE_MAX 16
 #define OPERATION_CONTROL 1
+#ifndef ONLINE_CHANGE
+#define ONLINE_CHANGE 1
+#endif
 #define IEC_LOG_BURST 8
 #ifndef IEC_TASK_CALLS
 #define IEC_TASK_CALLS 1

@@ -1,0 +1,72 @@
+"""Online changes on a board; the rest of the promise is in tests/changing.py."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from changing import BODY, Changing, program
+from conftest import TARGET
+from online_programs import built
+
+from plctool.device import Plc
+from plctool.errors import DeviceError
+from plctool.link.connection import Connection
+from plctool.testing.waiting import eventually
+
+
+class TestBoard(Changing):
+    target = TARGET
+
+    @pytest.fixture
+    def plc(self, make_board, tmp_path):
+        result = built(tmp_path, program(), None, TARGET)
+        with make_board("full") as board, Plc(Connection(board.line())) as plc:
+            plc.add_symbols(result.symbols)
+            plc.flash(result.image)
+            yield plc
+
+    def test_ten_changes_lose_no_cycle_of_the_task(self, plc, tmp_path):
+        """None is due and does not begin: that would be an overrun, and the program would count less than its task."""
+        for n in range(10):
+            self.change(plc, tmp_path, program(f"{BODY} fixed := {n};"))
+        values = plc.sample(["Main.n"]).values
+        (task,) = plc.tasks()
+        assert task.overruns == 0
+        assert values["Main.n"] <= task.cycles
+        (info,) = plc.tasks()
+        assert abs(plc.read("Main.n") - info.cycles) < 20
+
+
+def test_power_off_right_after_a_change_keeps_retain_values(make_board, tmp_path):
+    first = built(tmp_path, program(), None, TARGET)
+    board = make_board("full")
+    with board, Plc(Connection(board.line())) as plc:
+        plc.add_symbols(first.symbols)
+        plc.flash(first.image)
+        plc.write({"Main.kept": 123})
+        second = built(tmp_path, program("n := n - 1;"), first.symbols, TARGET)
+        plc.add_symbols(second.symbols)
+        plc.change(second.image)
+        plc.write({"Main.kept": 123})
+    with board, Plc(Connection(board.line())) as plc:
+        plc.add_symbols(second.symbols)
+        assert plc.status().image_crc == second.crc
+        eventually(lambda: plc.read("Main.n") < 0)
+        assert plc.read("Main.kept") == 123
+
+
+def test_a_firmware_without_online_change_says_so(make_board, tmp_path):
+    text = "PROGRAM Main VAR n : DINT; END_VAR n := n + 1; END_PROGRAM"
+    first = built(tmp_path, text, None, TARGET)
+    second = built(tmp_path, text.replace("n + 1", "n + 2"), first.symbols, TARGET)
+    with make_board("standard") as board, Plc(Connection(board.line())) as plc:
+        plc.add_symbols(first.symbols)
+        plc.flash(first.image)
+        with pytest.raises(DeviceError, match="knows no online change"):
+            plc.change(second.image)
+        assert plc.status().image_crc == first.crc
