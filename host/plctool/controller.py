@@ -252,8 +252,8 @@ class Controller(ABC):
         progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> ChangeResult:
         """Replaces the application by an image that was built with it as base, between two cycles: variables that both
-        have keep their values. What is forced of removed variables is not forced any more. `unchecked`: the image is
-        not checked here; the controller checks it anyway.
+        have keep their values. What is forced of removed variables is not forced any more, and breakpoints end.
+        `unchecked`: the image is not checked here; the controller checks it anyway.
 
         Raises UsageError for an image that was not built to replace what runs, DeviceError when the controller refuses
         it. The application goes on as it was then.
@@ -265,6 +265,9 @@ class Controller(ABC):
             status = self._status_before(data)
             if not unchecked:
                 _check_base(data, status.image_crc)
+            if status.state is AppState.HALTED:
+                raise DeviceError("A debugger has halted the program; let it go on first.", "halted")
+            self.end_debugging()  # its breakpoints are in the old code
             released = self._release_removed(status.image_crc, image_crc(data))
             begin = self._now()
             self._change(data, lambda done: progress(done, len(data)))

@@ -20,7 +20,7 @@ from online_programs import built
 
 from plctool import connect
 from plctool.device import Plc
-from plctool.errors import EXIT_INTERRUPTED
+from plctool.errors import EXIT_INTERRUPTED, DeviceError
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.waiting import eventually
 
@@ -143,3 +143,23 @@ def test_saved_file_runs_and_a_mistake_in_it_is_only_said(project: Path, plcrt: 
         finally:
             watching.send_signal(signal.SIGINT)
         assert watching.wait(60) == EXIT_INTERRUPTED
+
+
+def test_breakpoints_of_the_old_code_are_taken_out(plc: Plc, tmp_path: Path) -> None:
+    """With a condition that never holds, so that the program is not halted; a halted one is not changed."""
+    text = program("n := n + 1;\nfixed := 7;")
+    result = built(tmp_path, text, plc.symbols())
+    plc.add_symbols(result.symbols)
+    plc.change(result.image)
+    line = text.splitlines().index("fixed := 7;") + 1
+    plc.breakpoints.set("program.st", line, condition="Main.n < 0")
+    changed = built(tmp_path, text.replace("n + 1", "n + 2"), result.symbols)
+    plc.add_symbols(changed.symbols)
+    plc.change(changed.image)
+    n = plc.read("Main.n")
+    eventually(lambda: plc.read("Main.n") > n)
+    assert plc.breakpoints.list() == []
+    plc.breakpoints.set("program.st", line)
+    eventually(lambda: plc.status().state == "halted")
+    with pytest.raises(DeviceError, match="A debugger has halted the program"):
+        plc.change(built(tmp_path, text, changed.symbols).image)
