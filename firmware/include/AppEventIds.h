@@ -24,9 +24,9 @@ enum {
     EVT_ResetDone = 0x10006,
     EVT_PrepareOnlineChange = 0x10007, /* of the new application, which is checked; the old one still runs */
     EVT_OnlineChangeDone = 0x10008,    /* after each of them, also a denied one, of what runs then */
-    EVT_PrepareDownload = 0x10009, /* of the new application, which is checked; the old one still runs */
-    EVT_DownloadDone = 0x1000A,    /* after each EVT_PrepareDownload, also a denied one, of what is loaded then */
-    EVT_PrepareExit = 0x1000E,     /* its variables end: it is given up, or gets its initial values again */
+    EVT_PrepareDownload = 0x10009,     /* of the new application, which is checked; the old one still runs */
+    EVT_DownloadDone = 0x1000A,        /* after each EVT_PrepareDownload, also a denied one, of what is loaded then */
+    EVT_PrepareExit = 0x1000E,         /* its variables end: it is given up, or gets its initial values again */
     EVT_CreateBootprojectDone = 0x10010,
     EVT_LoadBootprojectDone = 0x10011,
     EVT_DenyLoadBootproject = 0x10012,    /* no name yet, since its image has not been read */
