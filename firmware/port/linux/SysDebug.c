@@ -11,7 +11,6 @@
 #include "../baremetal/cortexm/ArmCondition.h"
 #include "../baremetal/cortexm/ThumbStep.h"
 #include "StepOver.h"
-#include "SysLock.h"
 
 #include <linux/futex.h>
 #include <pthread.h>
@@ -128,7 +127,10 @@ void SysDebugRestore(uintptr_t address, RTS_UI32 original)
 
 /* ---- a single instruction ---- */
 
-/* That one thread executes, with a trap after it. With the lock of the runtime. */
+/* Nothing in it is written, and no code, without it. */
+static pthread_mutex_t step_lock = PTHREAD_MUTEX_INITIALIZER;
+
+/* That one thread executes, with a trap after it. */
 static struct {
     RTS_UI32 thread; /* 0: none; atomic */
     uintptr_t next;  /* the instruction after it */
@@ -141,24 +143,30 @@ static struct {
 
 RTS_RESULT SysDebugWriteTrap(uintptr_t address, RTS_UI32 *original)
 {
+    bool done = true;
+    pthread_mutex_lock(&step_lock);
     if (step.thread != 0 && step.is_own && address == step.next) {
         *original = step.original;
         step.is_own = false;
-        return ERR_OK;
+    } else {
+        *original = read_code(address);
+        done = write_trap(address);
     }
-    *original = read_code(address);
-    return write_trap(address) ? ERR_OK : ERR_NO_ACCESS_RIGHTS;
+    pthread_mutex_unlock(&step_lock);
+    return done ? ERR_OK : ERR_NO_ACCESS_RIGHTS;
 }
 
 /* The trap that ends a step stays. */
 void SysDebugRestore(uintptr_t address, RTS_UI32 original)
 {
+    pthread_mutex_lock(&step_lock);
     if (step.thread != 0 && address == step.next) {
         step.original = original;
         step.is_own = true;
-        return;
+    } else {
+        restore_code(address, original);
     }
-    restore_code(address, original);
+    pthread_mutex_unlock(&step_lock);
 }
 
 static RTS_UI32 self(void)
@@ -281,15 +289,15 @@ static void finish_step(ucontext_t *context)
 #endif
 
 /* One step at a time. */
-static RTS_UI32 enter_when_none_steps(void)
+static void enter_when_none_steps(void)
 {
-    RTS_UI32 lock = SysLockEnter(), other;
+    RTS_UI32 other;
+    pthread_mutex_lock(&step_lock);
     while ((other = step.thread) != 0) {
-        SysLockLeave(lock);
+        pthread_mutex_unlock(&step_lock);
         SysDebugWait(&step.thread, other);
-        lock = SysLockEnter();
+        pthread_mutex_lock(&step_lock);
     }
-    return lock;
 }
 
 bool StepBegin(void *ucontext)
@@ -298,7 +306,7 @@ bool StepBegin(void *ucontext)
     if (execute_branch(context)) {
         return true;
     }
-    RTS_UI32 lock = enter_when_none_steps();
+    enter_when_none_steps();
     step.next = next_of(context);
     step.is_own = !SysDebugIsTrap(step.next);
     step.original = read_code(step.next);
@@ -307,7 +315,7 @@ bool StepBegin(void *ucontext)
         __atomic_store_n(&step.thread, self(), __ATOMIC_SEQ_CST);
         prepare_step(context);
     }
-    SysLockLeave(lock);
+    pthread_mutex_unlock(&step_lock);
     return !trapped;
 }
 
@@ -325,7 +333,7 @@ STEP_TRAP StepEnd(void *ucontext)
     if (running == 0 || (ucontext == NULL && running != self())) {
         return STEP_NONE;
     }
-    RTS_UI32 lock = SysLockEnter();
+    pthread_mutex_lock(&step_lock);
     RTS_UI32 thread = step.thread;
     bool is_mine = thread == self();
     bool is_there = ucontext != NULL && thread != 0 && address_of(ucontext) == step.next;
@@ -336,7 +344,7 @@ STEP_TRAP StepEnd(void *ucontext)
             finish_step(ucontext);
         }
     }
-    SysLockLeave(lock);
+    pthread_mutex_unlock(&step_lock);
     if (is_mine) {
         SysDebugWake(&step.thread);
         return is_there && is_own ? STEP_ENDED : STEP_INTERRUPTED;
