@@ -222,7 +222,8 @@ def _setting(entry: Entry, found: EdsEntry, mistakes: Mistakes) -> bytes | None:
         return None
     low, high = (None if limit is None else limit.value for limit in (found.low, found.high))
     if _is_outside(value, low, high):
-        mistakes.error(entry.pos, f"{found.place} ({found.name}) can be {low} to {high}, not {found.type.text(value)}")
+        limits = " to ".join("any" if limit is None else found.type.text(limit) for limit in (low, high))
+        mistakes.error(entry.pos, f"{found.place} ({found.name}) can be {limits}, not {found.type.text(value)}")
         return None
     return found.type.encode(value)
 
