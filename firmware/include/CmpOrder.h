@@ -48,6 +48,9 @@ X(IoDrvGpio)
 #if HAS_IoDrvModbus
 X(IoDrvModbus)
 #endif
+#if HAS_IecCan
+X(IecCan)
+#endif
 #if HAS_IoDrvCanopen
 X(IoDrvCanopen)
 #endif
@@ -68,9 +71,6 @@ X(CmpAppCalls)
 #endif
 #if HAS_IecFile
 X(IecFile)
-#endif
-#if HAS_IecCan
-X(IecCan)
 #endif
 #if HAS_IecClock
 X(IecClock)

@@ -29,7 +29,8 @@ def _components(path: Path) -> list[str]:
     """The components of a list, as the compiler sees it."""
     compiler = shutil.which("cc")
     assert compiler, "this test needs a C compiler: install gcc or clang"
-    include = [FIRMWARE / folder for folder in ("include", "port/baremetal/common", "port/sim")]
+    own = path.parent if (path.parent / "rts_config_port.h").exists() else FIRMWARE / "port/sim"
+    include = [FIRMWARE / "include", FIRMWARE / "port/baremetal/common", own]
     done = subprocess.run(
         [compiler, "-E", "-P", "-std=c99", "-DCOMM_ENDPOINTS=1", *(f"-I{folder}" for folder in include), path],
         capture_output=True, text=True, check=True,
