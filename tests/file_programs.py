@@ -213,7 +213,7 @@ class ProgramFiles:
 
     def test_program_cannot_change_what_the_device_makes(self, plc: Controller) -> None:
         files = self.of(plc)
-        for name in ("Application.cdl", "PlcLog.txt"):
+        for name in ("Application.cdl", "PlcLog.txt", "Retain.bin", "Settings.cfg"):
             assert files.open(name, WRITE) == READ_ONLY
             assert files.call(8, name=name) == READ_ONLY
 

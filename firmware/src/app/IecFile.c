@@ -13,7 +13,9 @@
 #include "CmpAppCalls.h"
 #include "CmpChecksum.h"
 #include "CmpEventMgr.h"
+#include "CmpSettings.h"
 #include "FileStore.h"
+#include "RetainFile.h"
 
 enum { VERSION = 0x00010000, SLOTS = 256, COPIES = 8 };
 
@@ -91,9 +93,16 @@ static RTS_I32 error_of(RTS_RESULT result)
     }
 }
 
-static bool is_made_by_device(const char *name)
+/* Or read by it: a program sets no settings of the device that runs it. */
+static bool is_of_device(const char *name)
 {
-    return strcmp(name, FILE_NAME_IMAGE) == 0 || strcmp(name, FILE_NAME_LOG) == 0;
+    static const char *const names[] = {FILE_NAME_IMAGE, FILE_NAME_LOG, FILE_NAME_RETAIN, SETTINGS_FILE_NAME};
+
+    for (RTS_SIZE i = 0; i < RTS_COUNT(names); i++) {
+        if (strcmp(name, names[i]) == 0)
+            return true;
+    }
+    return false;
 }
 
 /* The error of a name that a file cannot have, or that a program must not write. */
@@ -101,7 +110,7 @@ static RTS_I32 check_own(const char *name)
 {
     if (!FileStoreIsName(name))
         return IEC_FILE_WRONG_PARAMETER;
-    return is_made_by_device(name) ? IEC_FILE_READ_ONLY : 0;
+    return is_of_device(name) ? IEC_FILE_READ_ONLY : 0;
 }
 
 /* True if the open file of that name is written by the program. */
