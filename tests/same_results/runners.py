@@ -33,11 +33,11 @@ _BARE_SOURCES = [
     FIRMWARE / "port/baremetal/blank/SysAtomic.c",  # nothing here can come in between
     *(HERE / "bare").glob("*.c"),
 ]
-_OF_PLCTOOL = ("SimBoards.c", "SimModbus.c", "SimWire.c")
+_OF_PLCTOOL = ("SimBoards.c", "SimCanBus.c", "SimCanopen.c", "SimModbus.c", "SimWire.c")
 _LINUX_SOURCES = [
     *_PORTABLE,
     *(FIRMWARE / "src").glob("comm/*.c"),
-    *(s for s in (FIRMWARE / "src/io").glob("*.c") if "Modbus" not in s.name),
+    *(s for s in (FIRMWARE / "src/io").glob("*.c") if not any(bus in s.name for bus in ("Canopen", "Modbus"))),
     *(s for s in (FIRMWARE / "port/sim").glob("*.c") if s.name not in _OF_PLCTOOL),
     *(
         FIRMWARE / "port/linux" / name

@@ -391,8 +391,10 @@ static void serve_bus(void)
 {
     RTS_I64 due_ns = SimBus != NULL ? SimBus->due_ns(sim.now_ns) : NEVER;
 
+#if APP_CALLS > 0
     if (AppCallsWait())
         due_ns = sim.now_ns;
+#endif
     if (due_ns < sim.last_comm_ns + COMM_PAUSE_NS)
         due_ns = sim.last_comm_ns + COMM_PAUSE_NS;
     if (due_ns < sim.next_comm_ns)
