@@ -47,3 +47,65 @@ def test_impossible_change_is_refused_in_words(tool: Any, scratch: Path) -> None
 def test_base_that_is_no_image_is_refused(tool: Any) -> None:
     assert "is not a valid application image" in tool("build", "main.st", "--base", "main.st").err
     assert "--dry-run needs --base" in tool("build", "main.st", "--dry-run").err
+
+
+PROGRAM_CHART = """PROGRAM Main
+VAR go, back : BOOL; END_VAR
+INITIAL_STEP Idle: END_STEP
+STEP Work: END_STEP
+TRANSITION FROM Idle TO Work := go; END_TRANSITION
+TRANSITION FROM Work TO Idle := back; END_TRANSITION
+END_PROGRAM
+"""
+BLOCK_CHART = (
+    PROGRAM_CHART.replace("END_PROGRAM", "END_FUNCTION_BLOCK").replace("PROGRAM Main", "FUNCTION_BLOCK Mixer")
+    + "PROGRAM Main VAR mixer : Mixer; END_VAR mixer(); END_PROGRAM\n"
+)
+NEW_STEP = "STEP More: END_STEP\n"
+TO_NEW_STEP = (
+    "TRANSITION FROM Work TO More := go; END_TRANSITION\nTRANSITION FROM More TO Idle := back; END_TRANSITION\n"
+)
+
+
+@pytest.mark.parametrize("text", [PROGRAM_CHART, BLOCK_CHART], ids=["program", "block"])
+@pytest.mark.parametrize(
+    ("before", "after", "problem"),
+    [
+        ("Work", "Labour", "the step Work is removed, and may be the active one"),
+        ("Idle TO Work :=", "Idle TO (Work, Work2) :=", "steps run in parallel now"),
+        (
+            "INITIAL_STEP Idle: END_STEP\nSTEP Work: END_STEP",
+            "STEP Work: END_STEP\nINITIAL_STEP Idle: END_STEP",
+            "order",
+        ),
+    ],
+    ids=["renamed", "parallel", "order"],
+)
+def test_change_that_would_move_a_chart_to_another_step_is_refused(
+    tool: Any, scratch: Path, text: str, before: str, after: str, problem: str
+) -> None:
+    main = scratch / "main.st"
+    main.write_text(text)
+    assert tool("build", "main.st", "-o", "old.cdl").status == 0
+    changed = text.replace(before, after)
+    if "Work2" in after:
+        changed = changed.replace("STEP Work:", "STEP Work2: END_STEP\nSTEP Work:")
+    main.write_text(changed)
+    done = tool("build", "main.st", "-o", "new.cdl", "--base", "old.cdl")
+    assert done.status == 2
+    assert "in the chart of M" in done.err
+    assert problem in done.err
+
+
+def test_step_can_be_added_after_the_others_and_actions_can_change(tool: Any, scratch: Path) -> None:
+    main = scratch / "main.st"
+    main.write_text(PROGRAM_CHART)
+    assert tool("build", "main.st", "-o", "old.cdl").status == 0
+    longer = PROGRAM_CHART.replace("END_PROGRAM", TO_NEW_STEP + "END_PROGRAM")
+    step = "STEP Work: END_STEP\n"
+    main.write_text(longer.replace(step, step + NEW_STEP))
+    done = tool("build", "main.st", "-o", "new.cdl", "--base", "old.cdl", "--dry-run")
+    assert (done.status, "new: Main.More" in done.out) == (0, True), done.err
+    main.write_text(longer.replace(step, NEW_STEP + step))
+    done = tool("build", "main.st", "-o", "new.cdl", "--base", "old.cdl")
+    assert "new before others; write new ones after those that are there" in done.err

@@ -13,6 +13,7 @@ from bisect import insort
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
+from plctool.compiler.semantics.sfc import RUNNING, STATE, STEP_TYPE
 from plctool.compiler.typed.nodes import Variable
 from plctool.compiler.typed.online_change import Fresh, OnlineChange, Previous, PreviousVariable
 from plctool.iec.areas import Area
@@ -109,6 +110,10 @@ class Matcher:
                 result.misfit = f"{new}.{f.name} {part.misfit}" if part.misfit.startswith("was ") else part.misfit
         if new.size > old.size:
             result.moved = result.moved or f"{new} grew by {new.size - old.size} bytes"
+        chart = _chart_problem(
+            _Chart.of((f.name, f.type) for f in old.fields), _Chart.of((f.name, f.type) for f in new.fields)
+        )
+        result.misfit = result.misfit or (f"in the chart of {new}, {chart}" if chart else "")
         return result
 
 
@@ -142,6 +147,58 @@ def _target(pointer: Type) -> str:
     return "" if isinstance(pointer, InterfaceType) else pointer.target.name.casefold()
 
 
+# ---- charts ----
+
+
+@dataclass
+class _Chart:
+    """The chart of a unit, or all charts of its actions: the steps in their order, and the hidden variables that say
+    which step is active. Where one step is active at a time, that is its number in this order."""
+
+    steps: list[str] = field(default_factory=list)
+    states: set[str] = field(default_factory=set)
+
+    @staticmethod
+    def of(variables: Iterable[tuple[str, Type]]) -> _Chart:
+        """The chart among the variables of a unit."""
+        chart = _Chart()
+        for name, t in variables:
+            if t.name == STEP_TYPE:
+                chart.steps.append(name)
+            elif name.endswith((STATE, RUNNING)):
+                chart.states.add(name.casefold())
+        return chart
+
+    @property
+    def is_numbered(self) -> bool:
+        return any(name.endswith(STATE) for name in self.states)
+
+
+def _chart_problem(old: _Chart, new: _Chart) -> str:
+    """Says why a chart would not continue in the step that it is in; "" if it would."""
+    if not old.steps or not new.steps:
+        return ""
+    had, has = ([name.casefold() for name in chart.steps] for chart in (old, new))
+    gone = next((name for name in old.steps if name.casefold() not in has), None)
+    if gone is not None:
+        return f"the step {gone} is removed, and may be the active one"
+    if old.states != new.states:
+        return "steps run in parallel now and did not before, or the reverse"
+    if new.is_numbered and has[: len(had)] != had:
+        return "steps are in another order, or new before others; write new ones after those that are there"
+    return ""
+
+
+def _charts(variables: Iterable[tuple[str, Type]]) -> dict[str, _Chart]:
+    """The charts of instances of programs, by their names."""
+    found: dict[str, list[tuple[str, Type]]] = {}
+    for name, t in variables:
+        unit, _, own = name.rpartition(".")
+        if t.name == STEP_TYPE or own.endswith((STATE, RUNNING)):
+            found.setdefault(unit, []).append((own, t))
+    return {unit: _Chart.of(own) for unit, own in found.items()}
+
+
 # ---- places ----
 
 
@@ -153,7 +210,7 @@ class StablePlaces:
         self._matcher = Matcher(previous.in_registers)
         self._taken: dict[Area, list[tuple[int, int]]] = {area: [] for area in PLACED_AREAS}
 
-    def place(self, variables: Iterable[Variable]) -> None:
+    def place(self, variables: Collection[Variable]) -> None:
         """Places the variables that have no offset yet."""
         open_ones = [v for v in variables if v.area in PLACED_AREAS]
         for variable in open_ones:
@@ -168,6 +225,7 @@ class StablePlaces:
             variable.offset = self._room(variable.area, variable.type)
             self._take(variable.area, variable.offset, variable.type.size)
         self.change.new = new
+        self._check_charts(variables)
         names = {v.name.casefold() for v in variables}
         for key, before in had.items():
             if key not in names and before.area in PLACED_AREAS:
@@ -218,6 +276,14 @@ class StablePlaces:
         else:
             change.fresh += [(variable, fresh) for fresh in match.fresh]
         return True
+
+    def _check_charts(self, variables: Iterable[Variable]) -> None:
+        """Checks the charts of programs, whose steps are variables of their own; Matcher checks those of blocks."""
+        had = _charts((v.name, v.type) for v in self.change.previous.variables.values())
+        for unit, chart in _charts((v.name, v.type) for v in variables).items():
+            problem = _chart_problem(had.get(unit, _Chart()), chart)
+            if problem:
+                self.problem(f"in the chart of {unit}, {problem}")
 
     def _check_exit(self, before: PreviousVariable) -> None:
         if any(t.name.casefold() in self.change.previous.with_exit for t in _parts(before.type)):
