@@ -80,9 +80,11 @@ def watch(
 ) -> Iterator[Document]:
     """Changes the program that runs as often as a file of the project is saved, until `wait` raises. What does not work
     is said, and the program goes on."""
+    if project_of(args) is None:
+        raise UsageError("--watch is for a project; name its folder.", "usage")
     seen = None
     while True:
-        now = _state_of(project_of(args))
+        now = _state_of(args)
         if now != seen:
             seen = now
             try:
@@ -97,12 +99,15 @@ def _say(error: PlcError) -> None:
     output.say(error.message if is_compilers else f"plctool: {error.message}", sys.stderr, colours=is_compilers)
 
 
-def _state_of(settings: Settings | None) -> list[tuple[Path, int, int]]:
-    """The files of a project, each with its size and the time of its last change."""
-    if settings is None:
-        raise UsageError("--watch is for a project; name its folder.", "usage")
+def _state_of(args: argparse.Namespace) -> list[tuple[Path, int, int]] | str:
+    """The files of a project, each with its size and the time of its last change; or the mistake in its plc.toml,
+    which `change` reports as well."""
+    try:
+        settings = project_of(args)
+    except PlcError as error:
+        return error.message
     found = []
-    for file in sorted(set(settings.every_file())):
+    for file in sorted(set() if settings is None else set(settings.every_file())):
         try:
             status = file.stat()
         except OSError:  # an editor puts another one in its place just now
