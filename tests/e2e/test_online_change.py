@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from shutil import rmtree
 from subprocess import PIPE
 
 import pytest
@@ -100,6 +101,17 @@ def test_impossible_edit_is_refused_before_anything_is_sent(project: Path, plcrt
     assert done.status == 2
     assert "Main.fixed was DINT, is LINT" in done.err
     assert tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed")["values"] == {"Main.fixed": 7}
+
+
+def test_change_without_the_symbols_of_what_runs_says_what_to_do(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    rmtree(project / "cache")
+    flash = ("flash", "--online-change", "--tcp", plcrt.tcp)
+    (project / "main.st").write_text(program(BODY, before="VAR_GLOBAL more : INT := 3; END_VAR" + BLOCKS))
+    assert tool.ok(*flash, "--dry-run")["new"] == ["more"]  # those beside the image
+    (project / "app.sym").unlink()
+    done = tool(*flash)
+    assert done.status == 2
+    assert "Change it from the computer that flashed it, or download the program with 'plctool flash'." in done.err
 
 
 def test_force_of_a_removed_variable_ends_and_others_stay(project: Path, plcrt: Plcrt, tool: Tool) -> None:

@@ -23,6 +23,7 @@ from plctool.errors import PlcError, UsageError
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
     from plctool.controller import Controller
+    from plctool.debug.symbols import SymbolTable
 
 _POLL = 0.1  # how often the files of a project are looked at [s]
 
@@ -35,10 +36,31 @@ def change(plc: Controller, args: argparse.Namespace) -> Document:
         if args.dry_run:
             raise UsageError("--dry-run is for a project: a plan is made of sources.", "usage")
         return _sent(plc, Path(args.image), not args.json)
-    settings = replace(settings, base=plc.symbols())
+    settings = replace(settings, base=_base_of(plc, settings))
     if args.dry_run:
         return change_document(compiled(settings))
     return _change_project(plc, settings, args)
+
+
+def _base_of(plc: Controller, settings: Settings) -> SymbolTable:
+    """The symbols of the program that runs. Raises UsageError if they are neither known nor beside the image of the
+    project."""
+    from plctool.debug.symbols import find_symbols
+
+    try:
+        return plc.symbols()
+    except UsageError as error:
+        if error.code != "no-symbols":
+            raise
+    crc = plc.raw_status().image_crc
+    try:
+        return find_symbols(crc, settings.output)
+    except UsageError:
+        raise UsageError(
+            f"This computer does not have the symbols of the program that runs (CRC {crc:08X}). Change it from the "
+            "computer that flashed it, or download the program with 'plctool flash'.",
+            "no-symbols",
+        ) from None
 
 
 def _change_project(plc: Controller, settings: Settings, args: argparse.Namespace) -> Document:
