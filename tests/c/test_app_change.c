@@ -6,6 +6,9 @@
  * A device runs application 1 (proven), whose variables have values by now. Application 2 takes its place while it runs, goes
  * on, proves itself, is stopped and started again.
  */
+#include "AppException.h"
+#include "AppState.h"
+#include "CmpEventMgr.h"
 #include "app_image.h"
 #include "test.h"
 
@@ -256,6 +259,26 @@ static void without_a_program_that_runs_there_is_no_change(void)
     CHECK_EQUAL(app_state(), AS_NONE);
 }
 
+static void fail_in_event(EVENT_PARAM *event)
+{
+    RTS_UNUSED(event);
+    AppHandleException(APP_IN_EVENT, RTSEXCPT_DIVIDEBYZERO, 0);
+}
+
+static void a_program_that_fails_when_it_is_asked_stays_and_is_not_changed(void)
+{
+    APP_STATUS status;
+
+    prepare(8, 0xFF, 512);
+    start_again();
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpAppEmbedded, EVT_PrepareOnlineChange, fail_in_event, NULL), ERR_OK);
+    CHECK_EQUAL(change_to(&images[2]), ERR_INVALID_STATE);
+    AppGetStatus(&status);
+    CHECK_EQUAL(status.state, AS_STOP);
+    CHECK_EQUAL(status.image_crc, image_crc(&images[1]));
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, NEW_OFFSET), 0);
+}
+
 /* It goes to the slot of the one before the last, like a download. */
 static void many_changes_in_a_row_go_on(void)
 {
@@ -292,6 +315,7 @@ int main(void)
     RUN(what_does_not_fit_what_runs_is_refused);
     RUN(each_number_of_the_list_is_checked);
     RUN(without_a_program_that_runs_there_is_no_change);
+    RUN(a_program_that_fails_when_it_is_asked_stays_and_is_not_changed);
     RUN(many_changes_in_a_row_go_on);
     return test_result();
 }

@@ -260,7 +260,12 @@ RTS_RESULT AppChange(const APP_IMAGE *image, APP_REFUSAL *refusal)
     if (result != ERR_OK)
         return result;
     result = AppEventAsk(EVT_PrepareOnlineChange, image);
-    result = result == ERR_OK ? take_place(image, refusal) : APP_REFUSE(refusal, result, "%s.", AppTakeReason());
+    if (result != ERR_OK)
+        result = APP_REFUSE(refusal, result, "%s.", AppTakeReason());
+    else
+        result = check_state(image, refusal); /* the program may have failed in its function for the event, or halted */
+    if (result == ERR_OK)
+        result = take_place(image, refusal);
     AppPostEvent(EVT_OnlineChangeDone);
     return result;
 }
