@@ -222,6 +222,31 @@ static void every_operation_with_every_odd_argument_is_an_error_of_the_library(v
     CHECK_EQUAL(FileStoreIsWriting(), 0);
 }
 
+/* Numbers of files can be guessed: the one that the program gets when its copy is complete is the next one. */
+static void a_file_that_is_copied_to_append_cannot_be_closed_before(void)
+{
+    RTS_I32 number;
+    RTS_UI32 next;
+
+    setup();
+    CHECK(put_file("a", IEC_FILE_MODE_WRITE, pattern, 1000));
+    CHECK(open_as("a", IEC_FILE_MODE_READ));
+    next = result + 256;
+    CHECK(call(IEC_FILE_CLOSE, result, 0, NULL, 0));
+    number = file_call(IEC_FILE_OPEN, 0, IEC_FILE_MODE_APPEND);
+    put_bytes(number, (const RTS_UI8 *)"a", 2);
+    CHECK(call_send(number, 2));
+    CHECK(!call(IEC_FILE_CLOSE, next, 0, NULL, 0)); /* in the same pass */
+    CHECK_EQUAL(result, IEC_FILE_HANDLE_INVALID);
+    for (int i = 0; i < 10; i++)
+        (void)SimCommCycle();
+    CHECK_EQUAL(call_state(number), 1);
+    CHECK_EQUAL(call_result(number), next);
+    CHECK(call(IEC_FILE_CLOSE, next, 0, NULL, 0));
+    CHECK(!FileStoreIsWriting());
+    CHECK(has("a", pattern, 1000));
+}
+
 static void a_name_without_end_is_refused(void)
 {
     setup();
@@ -333,6 +358,7 @@ int main(void)
     RUN(a_call_that_is_abandoned_is_free_after_a_minute);
     RUN(numbers_that_are_none_change_nothing);
     RUN(every_operation_with_every_odd_argument_is_an_error_of_the_library);
+    RUN(a_file_that_is_copied_to_append_cannot_be_closed_before);
     RUN(a_name_without_end_is_refused);
     RUN(a_power_cut_leaves_the_previous_file_or_the_new_one);
     RUN(a_power_cut_while_appending_leaves_the_previous_file_or_the_longer_one);

@@ -289,7 +289,7 @@ static RTS_I32 do_with_open(APP_CALL *call)
     OPEN_FILE *file = find_open(call->handle);
     USE needed = call->operation == IEC_FILE_WRITE ? WRITING : call->operation == IEC_FILE_LIST ? LISTING : READING;
 
-    if (file == NULL)
+    if (file == NULL || file->use == COPYING) /* a program that guesses its handle */
         return IEC_FILE_HANDLE_INVALID;
     if (call->operation == IEC_FILE_CLOSE)
         return close_file(file);
