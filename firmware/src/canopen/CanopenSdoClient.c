@@ -144,6 +144,10 @@ static void take_segment(SDO_CLIENT *client, const RTS_UI8 *data)
         give_up(client, SDO_ABORTED, SDO_ABORT_MEMORY);
         return;
     }
+    if (size == 0 && (data[0] & IS_LAST) == 0) { /* a transfer without end */
+        give_up(client, SDO_ABORTED, SDO_ABORT_COMMAND);
+        return;
+    }
     memcpy(client->in + client->done, data + 1, size);
     client->done += size;
     client->toggle ^= SDO_TOGGLE;
@@ -163,11 +167,13 @@ static void take_of_read(SDO_CLIENT *client, const RTS_UI8 *data, bool is_of_obj
 
 /* ---- both ---- */
 
+/* Only a reply that moves the transfer on begins a new wait. */
 void SdoClientTake(SDO_CLIENT *client, const CAN_FRAME *frame, RTS_UI32 now_ms)
 {
     const RTS_UI8 *data = frame->data;
 
-    if (client->state != SDO_BUSY || frame->size != FRAME || frame->id != CANOPEN_SDO_REPLY + (RTS_UI32)client->node)
+    if (client->state != SDO_BUSY || client->has_request || frame->size != FRAME ||
+        frame->id != CANOPEN_SDO_REPLY + (RTS_UI32)client->node)
         return;
     bool is_of_object = BytesGet16(data + 1) == client->index && data[3] == client->sub;
     if (data[0] == SDO_ABORT && is_of_object)
@@ -176,7 +182,8 @@ void SdoClientTake(SDO_CLIENT *client, const CAN_FRAME *frame, RTS_UI32 now_ms)
         take_of_write(client, data, is_of_object);
     else
         take_of_read(client, data, is_of_object);
-    client->since_ms = now_ms;
+    if (client->has_request)
+        client->since_ms = now_ms;
 }
 
 void SdoClientPoll(SDO_CLIENT *client, RTS_UI32 now_ms)
