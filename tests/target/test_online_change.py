@@ -13,6 +13,7 @@ from changing import BODY, Changing, program
 from conftest import TARGET
 from online_programs import built
 
+from plctool.core import lib
 from plctool.device import Plc
 from plctool.errors import DeviceError
 from plctool.link.connection import Connection
@@ -58,6 +59,39 @@ def test_power_off_right_after_a_change_keeps_retain_values(make_board, tmp_path
         assert plc.status().image_crc == second.crc
         eventually(lambda: plc.read("Main.n") < 0)
         assert plc.read("Main.kept") == 123
+
+
+TWO_TASKS = """PROGRAM Main VAR n : DINT; END_VAR
+n := n + 1;
+END_PROGRAM
+PROGRAM Other VAR n : DINT; END_VAR n := n + 1; END_PROGRAM
+CONFIGURATION Config RESOURCE Res ON PLC
+    TASK Fast(INTERVAL := T#5ms, PRIORITY := 1);
+    TASK Slow(INTERVAL := T#7ms, PRIORITY := 9);
+    PROGRAM Main WITH Fast : Main;
+    PROGRAM Other WITH Slow : Other;
+END_RESOURCE END_CONFIGURATION
+"""
+
+
+def test_a_change_during_a_step_of_another_tool_lets_all_tasks_go_on(make_board, tmp_path):
+    first = built(tmp_path, TWO_TASKS, None, TARGET)
+    second = built(tmp_path, TWO_TASKS.replace("n + 1;\n", "n + 2;\n"), first.symbols, TARGET)
+    with make_board("full") as board, Plc(Connection(board.line())) as plc:
+        plc.add_symbols(first.symbols)
+        plc.add_symbols(second.symbols)
+        plc.flash(first.image)
+        debugger = plc.breakpoints
+        debugger.set("program.st", 2)
+        assert debugger.wait(20) is not None
+        debugger.clear_all()
+        target = debugger._target
+        target.attach(keep=True)
+        target.go(lib.BP_STEP, target.status().serial)  # to no line, so that it does not end
+        plc._debugger = None  # of another tool
+        plc.change(second.image)
+        before = plc.read("Other.n")
+        eventually(lambda: plc.read("Other.n") > before)
 
 
 def test_a_firmware_without_online_change_says_so(make_board, tmp_path):

@@ -677,7 +677,7 @@ static void tasks_will_start(void)
         return;
     check_image();
     lock = SysLockEnter();
-    bp.owner = 0;
+    give_up_owner(); /* before an online change a task may have stepped, and held the others */
     if (!bp.active)
         put_in_all();
     SysLockLeave(lock);
