@@ -15,10 +15,12 @@ from canopen_programs import OTHERS, write_program
 
 from plctool.compiler.syntax.diagnostics import CompileError
 from plctool.errors import UsageError
+from plctool.iec.types import UDINT
 from plctool.sim import Simulator
 
 NMT, SDO, HEARTBEAT = 0x000, 0x600, 0x700
 RESERVED = 0x202
+EMERGENCIES = 0x8005
 BOOT_MS = 400  # for all nodes to be in operation
 
 
@@ -186,6 +188,19 @@ def test_emergency_is_logged_and_counted(plc: Simulator) -> None:
     plc.can_send(0x089, bytes.fromhex("3012040000000000"))
     plc.run_for(20)
     assert [e.text for e in plc.log() if e.component == "IoDrvCanopen"] == ["Valves reports emergency 0x1230"]
+    assert in_operation(plc)
+
+
+def test_a_flood_of_emergencies_does_not_drive_all_else_out_of_the_log(plc: Simulator) -> None:
+    for number in range(500):
+        plc.can_send(0x089, bytes([number & 0xFF, 0x10, 1, 0, 0, 0, 0, 0]))
+        plc.run_for(5)
+    plc.run_for(1500)
+    told = [e.text for e in plc.log() if e.component == "IoDrvCanopen"]
+    assert told[0] == "Valves reports emergency 0x1000"
+    assert told[-1] == f"Valves reports emergency 0x{0x1000 + (499 & 0xFF):X}"
+    assert len(told) <= 5
+    assert plc.io_read_parameter("Valves", EMERGENCIES, UDINT) == 500
     assert in_operation(plc)
 
 

@@ -36,6 +36,8 @@ typedef struct {
     RTS_UI32 runs; /* number of the run that it is in, 0: it is not operational; for tasks */
     RTS_UI32 noted_failures;
     RTS_UI32 noted_emcy;
+    RTS_UI32 logged_emcy;
+    RTS_UI32 logged_emcy_ms;
 } CANOPEN_DEVICE;
 
 typedef struct {

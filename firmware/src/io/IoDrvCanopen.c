@@ -21,7 +21,7 @@
 
 #if CANOPEN_MAX_DEVICES > 0
 
-enum { READ_TRIES = 4, NS_PER_MS = 1000000 };
+enum { READ_TRIES = 4, NS_PER_MS = 1000000, EMCY_LOG_MS = 1000 };
 
 static CANOPEN_SETUP setup;
 static bool is_running; /* between IoDrvUpdateMapping and the next configuration */
@@ -358,28 +358,40 @@ static void explain_loss(const IoConfigConnector *connector, char *text, RTS_SIZ
     }
 }
 
-static void note_emcy(CANOPEN_DEVICE *device)
+/* At most one entry in a while, of the newest emergency: a node may send thousands. */
+static void log_emcy(CANOPEN_DEVICE *device, RTS_UI32 now_ms)
 {
     const CANOPEN_COUNTERS *counters = &device->node.counters;
     char code[HEX_DIGITS + 1];
 
-    if (counters->emcy == device->noted_emcy)
+    if (device->logged_emcy != 0 && now_ms - device->logged_emcy_ms < EMCY_LOG_MS)
         return;
-    device->noted_emcy = counters->emcy;
-    IoMgrConfigNoteError(device->connector);
+    device->logged_emcy = counters->emcy;
+    device->logged_emcy_ms = now_ms;
     (void)put_hex(code, counters->last_emcy, HEX_DIGITS);
     LogAdd(CMPID_IoDrvCanopen, LOG_WARNING, ERR_DEVICE, "%s reports emergency 0x%s",
            IoMgrConfigGetName(device->connector), code);
 }
 
+static void note_emcy(CANOPEN_DEVICE *device, RTS_UI32 now_ms)
+{
+    RTS_UI32 emcy = device->node.counters.emcy;
+
+    if (device->noted_emcy != emcy)
+        IoMgrConfigNoteError(device->connector);
+    device->noted_emcy = emcy;
+    if (device->logged_emcy != emcy)
+        log_emcy(device, now_ms);
+}
+
 /* What the manager and the tasks see of a node. */
-static void note(CANOPEN_DEVICE *device, bool has_all)
+static void note(CANOPEN_DEVICE *device, bool has_all, RTS_UI32 now_ms)
 {
     const CANOPEN_NODE *node = &device->node;
     bool runs = node->state == MASTER_RUNS;
 
     SysAtomicStore(&device->runs, runs ? node->counters.boots : 0);
-    note_emcy(device);
+    note_emcy(device, now_ms);
     if (node->failures != device->noted_failures) {
         device->noted_failures = node->failures;
         IoMgrConfigSetDiagnosis(device->connector, CF_CONNECTOR_BUS_ERROR);
@@ -400,7 +412,7 @@ static void poll_device(CANOPEN_LINE *line, CANOPEN_DEVICE *device, RTS_UI32 now
     (void)get_deadline_ms(device, now_ms, &has_all);
     if (!has_all)
         CanopenNodeLose(&device->node, MASTER_WHY_LATE, now_ms);
-    note(device, has_all);
+    note(device, has_all, now_ms);
 }
 
 static void send_heartbeat(CANOPEN_LINE *line, RTS_UI32 now_ms)
