@@ -633,6 +633,21 @@ static void the_bench_measures_real_time_and_keeps_the_schedule(void)
     CHECK_EQUAL(SimBench(1, 1000, &code_ns, &cycle_ns), ERR_INVALIDID);
 }
 
+/* The sanitizer sees an index that is used before it is checked. */
+static void the_watchdog_of_a_task_that_there_is_not_is_not_lifted(void)
+{
+    static const RTS_UI32 wrong[] = {0, APP_MAX_TASKS, APP_MAX_TASKS + 1, 0x7FFFFFFF, 0xFFFFFFFF};
+    RTS_UI8 (*task_watchdog)(RTS_UI32 task, RTS_UI8 on);
+    RTS_SIZE i;
+
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    task_watchdog = (RTS_UI8(*)(RTS_UI32, RTS_UI8))CMFindExternal("task_watchdog")->function;
+    for (i = 0; i < RTS_COUNT(wrong); i++) {
+        CHECK_EQUAL(task_watchdog(wrong[i], 0), 0);
+        CHECK_EQUAL(task_watchdog(wrong[i], 1), 0);
+    }
+}
+
 int main(void)
 {
     NEEDS_X86_64;
@@ -662,6 +677,7 @@ int main(void)
     RUN(of_two_endless_loops_both_are_broken_one_limit_after_the_other);
     RUN(short_cycles_of_another_task_do_not_protect_a_loop);
     RUN(the_supervisor_breaks_initialisation_code_too);
+    RUN(the_watchdog_of_a_task_that_there_is_not_is_not_lifted);
     RUN(no_cycle_starts_while_the_application_is_stopped);
     RUN(the_bench_measures_real_time_and_keeps_the_schedule);
     return test_result();

@@ -603,8 +603,8 @@ static bool hold_all(void)
  * left out. */
 static bool exchange_all(const CYCLE_EXCHANGE *exchange)
 {
-    RTS_UI32 running = tasks.running;
     RTS_UI32 lock = TASKS_RUN_BESIDE_MAIN ? 0 : SysLockEnter();
+    RTS_UI32 running = tasks.running; /* with the lock: the exception of a task is not undone below */
     bool done = true;
 
     exchange->begin(exchange->arg);
@@ -837,10 +837,11 @@ RTS_UI32 IecCycleGetWatchdog(RTS_UI32 index)
 
 bool IecCycleLiftWatchdog(RTS_UI32 index, bool lift)
 {
-    GUARD *guard = &tasks.list[index].guard;
+    GUARD *guard;
 
     if (index >= tasks.count)
         return false;
+    guard = &tasks.list[index].guard;
     if (lift && !guard->is_lifted) {
         tasks.list[index].lifted_ns = SysTimeGetNs();
         SysAtomicStore(&guard->is_lifted, true);
