@@ -167,6 +167,33 @@ static void what_no_task_has_a_copy_of_is_forced_where_all_see_it(void)
     CHECK_EQUAL(read_u32(APP_AREA_OUTPUT, 0), 1);
 }
 
+static RTS_RESULT change_to_copies(void)
+{
+    APP_REFUSAL refusal;
+    APP_BYTES next;
+    RTS_RESULT result;
+
+    spec.change = (CDL_CHANGE){image_crc(&image), CDL_CHANGE_NO_INIT, 0, 0};
+    share_all();
+    build_image(&next, &spec);
+    result = send_part(&next, next.size);
+    return result == ERR_OK ? AppDownloadChange(&refusal) : result;
+}
+
+static void what_tasks_have_copies_of_since_an_online_change_stays_forced(void)
+{
+    begin_program();
+    load();
+    CHECK_EQUAL(force(APP_AREA_INPUT, 0, 2, 0x1234), MONITORING_ERR_OK);
+    CHECK_EQUAL(force(APP_AREA_OUTPUT, 0, 1, 0x77), MONITORING_ERR_OK);
+    run_cycle();
+    CHECK_EQUAL(change_to_copies(), ERR_OK);
+    *at(APP_AREA_INPUT, 0) = 1; /* by a driver */
+    run_cycle();
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, 8), 0x1234);
+    CHECK_EQUAL(*at(APP_AREA_OUTPUT, 0), 0x77);
+}
+
 static void put_pointer(uintptr_t value)
 {
     memset(at(APP_AREA_DATA, POINTER_AT), 0, APP_POINTER_SIZE);
@@ -352,6 +379,7 @@ int main(void)
     RUN(inputs_and_outputs_that_a_task_has_alone_are_forced);
     RUN(inputs_and_outputs_that_tasks_have_copies_of_are_forced);
     RUN(what_no_task_has_a_copy_of_is_forced_where_all_see_it);
+    RUN(what_tasks_have_copies_of_since_an_online_change_stays_forced);
     RUN(a_pointer_is_followed_in_each_cycle);
     RUN(a_stopped_program_has_safe_outputs_and_after_the_start_forced_ones);
     RUN(an_exception_leaves_safe_outputs);

@@ -160,7 +160,7 @@ static void put_all(RTS_UI32 task, const IEC_CONTEXT *context)
 
 /* ---- the list ---- */
 
-/* Whether a task works on a copy of it, or may change it after the safe state. */
+/* Whether a task works on a copy of it, may do so after an online change, or may change it after the safe state. */
 static bool needs_search(const APP_PLACE *place)
 {
     RTS_UI32 task;
@@ -173,7 +173,7 @@ static bool needs_search(const APP_PLACE *place)
         if (AppImageGetCopy(task, place->area, place->offset[0], place->size) != NULL)
             return true;
     }
-    return !RTS_ONE_CORE;
+    return !RTS_ONE_CORE || ONLINE_CHANGE;
 }
 
 MON_RESULT ForceCheck(const APP_PLACE *place)
