@@ -290,6 +290,35 @@ static void a_pointer_is_followed_in_each_cycle(void)
     CHECK_EQUAL(samples[3][2], 4);
 }
 
+/* The task has a copy of the inputs, and none after the change. */
+static void inputs_are_recorded_where_the_task_has_them_since_an_online_change(void)
+{
+    APP_REFUSAL refusal;
+    APP_BYTES next;
+    RTS_UI32 count;
+
+    begin_program();
+    spec.images[0] = (CDL_IMAGE){0, 2, CDL_IMAGE_SHARED};
+    spec.image_count = 1;
+    load();
+    begin_config(0);
+    add(APP_AREA_INPUT, 0, 1);
+    CHECK_EQUAL(create(), ERR_OK);
+    *at(APP_AREA_INPUT, 0) = 5;
+    run_cycles(2);
+    spec.image_count = 0;
+    spec.change = (CDL_CHANGE){image_crc(&image), CDL_CHANGE_NO_INIT, 0, 0};
+    build_image(&next, &spec);
+    CHECK_EQUAL(send_part(&next, next.size), ERR_OK);
+    CHECK_EQUAL(AppDownloadChange(&refusal), ERR_OK);
+    *at(APP_AREA_INPUT, 0) = 9;
+    run_cycles(2);
+    count = read_all();
+    CHECK(count >= 4);
+    CHECK_EQUAL(samples[0][2], 5);
+    CHECK_EQUAL(samples[count - 1][2], 9);
+}
+
 static void system_values_of_the_task_are_recorded(void)
 {
     begin_program();
@@ -728,6 +757,7 @@ int main(void)
     RUN(a_message_takes_as_many_as_fit_and_the_next_one_goes_on);
     RUN(what_the_ring_has_lost_is_left_out_and_said);
     RUN(a_pointer_is_followed_in_each_cycle);
+    RUN(inputs_are_recorded_where_the_task_has_them_since_an_online_change);
     RUN(system_values_of_the_task_are_recorded);
     RUN(a_trigger_compares_values_of_each_kind);
     RUN(a_trigger_of_one_bit_looks_at_it_alone);

@@ -149,6 +149,8 @@ static MON_RESULT plan(PACKET *packet, RTS_UI32 index, STEP *step)
     if (result != MONITORING_ERR_OK || place.pointers > 0)
         return result; /* pointers may lead nowhere now */
     result = find(packet, &place, &step->at);
+    if (ONLINE_CHANGE && (place.area == APP_AREA_INPUT || place.area == APP_AREA_OUTPUT))
+        return result; /* the task may have a copy, or another one, after an online change */
     step->copy = place.size == 1 || ((uintptr_t)step->at & (place.size - 1u)) != 0 ? COPY_BYTES : place.size;
     return result;
 }
