@@ -141,12 +141,14 @@ class FlashResult:
 
 @dataclass(frozen=True)
 class ChangeResult:
-    """What an online change has done. `released`: the variables that were forced, and are removed."""
+    """What an online change has done. `released`: the variables that were forced, and are removed. `ended`: the names
+    of traces that recorded removed variables, "" of one of a tool."""
 
     bytes: int
     seconds: float
     state: AppState
     released: list[str] = field(default_factory=list)
+    ended: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -252,7 +254,8 @@ class Controller(ABC):
         progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> ChangeResult:
         """Replaces the application by an image that was built with it as base, between two cycles: variables that both
-        have keep their values. What is forced of removed variables is not forced any more, and breakpoints end.
+        have keep their values. What is forced of removed variables is not forced any more; traces of them end, and all
+        breakpoints.
         `unchecked`: the image is not checked here; the controller checks it anyway.
 
         Raises UsageError for an image that was not built to replace what runs, DeviceError when the controller refuses
@@ -268,25 +271,37 @@ class Controller(ABC):
             if status.state is AppState.HALTED:
                 raise DeviceError("A debugger has halted the program; let it go on first.", "halted")
             self.end_debugging()  # its breakpoints are in the old code
-            released = self._release_removed(status.image_crc, image_crc(data))
+            released, ended = self._release_removed(status.image_crc, image_crc(data))
             begin = self._now()
             self._change(data, lambda done: progress(done, len(data)))
             seconds = self._now() - begin
             now = self.raw_status()
             if now.image_crc != image_crc(data):
                 raise went_down()
-        return ChangeResult(len(data), seconds, now.state, released)
+        return ChangeResult(len(data), seconds, now.state, released, ended)
 
-    def _release_removed(self, before: int, after: int) -> list[str]:
-        """Ends the force of variables that the new program does not have; returns their names."""
-        with suppress(UsageError, DeviceError):
+    def _release_removed(self, before: int, after: int) -> tuple[list[str], list[str]]:
+        """Ends the force and the traces of variables that the new program does not have; returns the names of both."""
+        try:
             had, has = (self._tables.get(crc) or find_symbols(crc) for crc in (before, after))
-            removed = [s for name, s in had.variables.items() if name not in has.variables]
+        except UsageError:
+            return [], []
+        removed = [s for name, s in had.variables.items() if name not in has.variables]
+        places = []
+        with suppress(DeviceError):
             places = [place for place in self._read_forces().places if any(place.overlaps(s) for s in removed)]
             if places:
                 self._unforce(had, places)
-            return list(name_forced(places, list(had.variables.values())))
-        return []
+        return list(name_forced(places, list(had.variables.values()))), self._end_traces_of(removed)
+
+    def _end_traces_of(self, removed: Sequence[Symbol]) -> list[str]:
+        ended = []
+        with suppress(DeviceError):
+            for packet, config in list(self._packets()):
+                if any(place.overlaps(symbol) for place in config.places for symbol in removed):
+                    self.delete_trace(packet)
+                    ended.append(config.name)
+        return ended
 
     @abstractmethod
     def _change(self, data: bytes, progress: Callable[[int], None]) -> None:

@@ -121,6 +121,14 @@ def test_force_of_a_removed_variable_ends_and_others_stay(project: Path, plcrt: 
     assert list(tool.ok("forced", "--tcp", plcrt.tcp)["values"]) == ["Main.fixed"]
 
 
+def test_trace_of_a_removed_variable_ends_and_others_stay(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    tool.ok("trace", "--tcp", plcrt.tcp, "Main.n", "Main.gone", "--name", "gone", "--keep")
+    tool.ok("trace", "--tcp", plcrt.tcp, "Main.n", "Main.fixed", "--name", "stays", "--keep", "--samples", "100")
+    (project / "main.st").write_text(program(BODY).replace("gone : LINT := 5;", ""))
+    assert tool.ok("flash", "--online-change", "--tcp", plcrt.tcp)["ended"] == ["gone"]
+    assert [t["name"] for t in tool.ok("trace", "--tcp", plcrt.tcp, "--list")["traces"]] == ["stays"]
+
+
 def test_a_program_may_forbid_online_changes_alone(project: Path, plcrt: Plcrt, tool: Tool) -> None:
     body = "PlcOperationControlInstance.xDisableApplicationOnlineChange := fixed = 8;"
     flash = ("flash", "--online-change", "--tcp", plcrt.tcp)

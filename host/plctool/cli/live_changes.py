@@ -83,6 +83,7 @@ def _sent(plc: Controller, image: Path, shown: bool) -> Document:
         "seconds": round(result.seconds, 3),
         "state": str(result.state),
         "released": result.released,
+        "ended": result.ended,
     }
 
 
@@ -92,6 +93,9 @@ def live_change_text(document: dict[str, Any]) -> str:
         return f"the device runs this program already (CRC {document['unchanged']})"
     lines = [change_text(document)] if "kept" in document else []
     lines += [f"no longer forced, since it is removed: {name}" for name in document.get("released", ())]
+    lines += [
+        f"trace {name or '(a tool)'} has ended, since a variable of it is removed" for name in document.get("ended", ())
+    ]
     if "seconds" in document:
         lines.append(f"changed: {document['bytes']} bytes in {document['seconds']:.2f} s; state: {document['state']}")
     return "\n".join(lines)
