@@ -31,6 +31,15 @@ typedef enum {
     SYS_DEBUG_HALT, /* SYS_DEBUG_WAITS 0: SysExceptTry returns with SYS_DEBUG_HALTED; the code keeps registers and stack */
 } SYS_DEBUG_ACTION;
 
+/* Instructions, and traps, begin at multiples of this. */
+#if defined(__x86_64__)
+#define SYS_DEBUG_ALIGN 1
+#elif defined(__aarch64__)
+#define SYS_DEBUG_ALIGN 4
+#else
+#define SYS_DEBUG_ALIGN 2
+#endif
+
 /* RTS_EXCEPTION.code of a task that is halted, and SYS_DEBUG_STOP.code when it is to go on. */
 #define SYS_DEBUG_HALTED 0xFFFFFFFFu
 

@@ -50,6 +50,18 @@ def test_a_hostile_debugger_leaves_a_board_that_takes_a_program(plc, tmp_path, s
     assert not any("fault of the runtime" in entry.text for entry in plc.log())
 
 
+def test_a_trap_within_the_parts_of_an_instruction_is_refused(plc):
+    target = plc.breakpoints._target
+    target.attach(keep=False)
+    target.set(64, 0, None)
+    target.clear(64)
+    for offset in (1, 63, 65):
+        with pytest.raises(DeviceError):
+            target.set(offset, 0, None)
+        with pytest.raises(DeviceError):
+            target.temporary([offset])
+
+
 def test_a_firmware_without_breakpoints_says_so(make_board, build):
     with make_board("standard") as board, Plc(Connection(board.line())) as plc:
         plc.flash(build("PROGRAM Main VAR n : DINT; END_VAR n := n + 1; END_PROGRAM").path)

@@ -500,7 +500,7 @@ static RTS_RESULT check_place(RTS_UI32 offset)
     if (AppGetState() == AS_NONE)
         return ERR_APP_NOT_LOADED;
     check_image();
-    return offset < AppGetImage()->code.size ? ERR_OK : ERR_OUT_OF_LIMITS;
+    return offset % SYS_DEBUG_ALIGN == 0 && offset < AppGetImage()->code.size ? ERR_OK : ERR_OUT_OF_LIMITS;
 }
 
 /* With the lock. */
