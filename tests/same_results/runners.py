@@ -44,7 +44,10 @@ _LINUX_SOURCES = [
         for name in ("IecStack.c", "IecStackSwitch.S", "SysDebug.c", "SysExcept.c", "SysMem.c")
     ),
 ]
-_ARM_SOURCES = [FIRMWARE / "port/baremetal/common/CmpCompilerCalls.c", FIRMWARE / "port/baremetal/cortexm/IecCall.c"]
+_ARM_SOURCES = [
+    FIRMWARE / "port/baremetal/common/CmpCompilerCalls.c",
+    *(FIRMWARE / "port/baremetal/cortexm" / name for name in ("IecCall.c", "ThumbStep.c")),
+]
 # Picolibc keeps the clock to itself unless a flag says that there is one.
 _BARE_FLAGS = [
     "--specs=picolibc.specs", "--oslib=semihost", "--crt0=hosted", "-Wl,--gc-sections",
