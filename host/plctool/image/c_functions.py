@@ -47,7 +47,7 @@ _FUNCTIONS = {
         clock_get():LINT                                    32    48
         clock_set(LINT):UDINT                               16    32""",
     "IecTaskCalls": """
-        task_value(UDINT,UDINT):UDINT                      192   192
+        task_value(UDINT,UDINT):UDINT                      224   240
         task_name(UDINT,UDINT):LWORD                       192   192
         task_watchdog(UDINT,BOOL):BOOL                      64    64""",
     "CmpMath": """
