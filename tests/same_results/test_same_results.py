@@ -24,7 +24,7 @@ from plctool.compiler.front import check_sources
 from plctool.compiler.typed.nodes import TypedProgram
 
 UNOPTIMISED = 3  # of so many programs one is repeated without optimisation
-OF_ONE_DEVICE = ("wall_clock_is_read_and_set",)  # the runners have no clock that each program finds anew
+OF_ONE_DEVICE = ("wall_clock_is_read_and_set",)  # the clock of the runners is not set back for each program
 KEEPS_ALL = 2  # the highest level at which no variable is in registers only, and memory is that of -O0
 
 
