@@ -1,4 +1,5 @@
 # make demo   the whole story on this machine        make test   the tests (ARGS="--jobs 1": one at a time)
+# make test-whole  as make test, with all programs on all processors, and more values for each property
 # make quick  the tests nearest to what changed since the last commit, in about ten seconds (ARGS="--since main", "--list")
 # make lint   style, types, words                    make bench  figures, side by side (ARGS="--programs DIR": more pairs)
 # make format gives C and Python their one style
@@ -34,7 +35,7 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak fuzz properties habits tree-sitter vsix test-editors all clean
+.PHONY: demo test test-whole quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak fuzz properties habits tree-sitter vsix test-editors all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm run-test-arm-system
 VSCODE := editors/vscode
 NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
@@ -45,6 +46,9 @@ demo: $(VENV)/installed
 # A make of its own, so that BUILDS sees what bootstrapping has just installed.
 test all bench size release linux-arm test-linux-arm test-arm-system: $(VENV)/dev
 	@$(MAKE) --no-print-directory run-$@
+
+test-whole:
+	TEST_WHOLE=1 $(MAKE) --no-print-directory test
 
 run-test: run-all
 	$(BIN)/python tests/run_all.py --meson $(MESON) $(ARGS) $(LINUX_ARM:%=--processor %) $(BUILDS)

@@ -1,4 +1,4 @@
-"""PLCopen XML out and in again gives the same image, for every program of tests/st and every example.
+"""PLCopen XML out and in again gives the same image, for every example and programs of tests/st.
 
 So does the file without the plain text of the declarations, as systems read it that know only the elements of the
 standard, unless the export named what they will not see.
@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from shares import share
 from test_st_programs import PROGRAMS, built_without_optimisation, read_script, runs
 
 from plctool.compiler import IoFiles, check_with_tests, program_files
@@ -27,7 +28,7 @@ _ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted(path for path in (_ROOT / "examples").iterdir() if any(path.rglob("*.st")))
 SYSTEMS = [_ROOT / "tests/corpus" / system for system in ("codesys", "openplc", "twincat")]
 CORPUS = [path for system in SYSTEMS for path in sorted(system.iterdir())]
-RUNNING = [path for path in PROGRAMS if runs(read_script(path))]
+RUNNING = share([path for path in PROGRAMS if runs(read_script(path))], 4)
 OPTIONS = Options(find_target(DEFAULT_TARGET), 0, parse_checks("all"))
 PLAIN = re.compile(r'<data name="[^"]*interfaceasplaintext".*?</data>', re.DOTALL)
 ASKS_FOR_ITS_PLACE = "__POSITION"  # of which the place in the XML is another one

@@ -72,7 +72,6 @@ class Runner:
     command: tuple[str, ...]  # the program's path follows
     bare: bool = True
     family: str = "cortexm"  # of port/baremetal, if bare
-    share: int = 1  # of so many programs of tests/st one is run; what they are made of is
 
     def missing(self) -> list[str]:
         """The tools that are not installed."""
@@ -130,23 +129,23 @@ def _compile_once(runner: Runner) -> Path:
     return runner.compile(folder)
 
 
-def _cortex_m(target: str, flags: tuple[str, ...], machine: str, share: int = 1) -> Runner:
+def _cortex_m(target: str, flags: tuple[str, ...], machine: str) -> Runner:
     qemu = (
         "qemu-system-arm", "-M", machine, "-display", "none", "-monitor", "none", "-serial", "null",
         "-semihosting-config", "enable=on,target=native", "-kernel",
     )  # fmt: skip
-    return Runner(target, "arm-none-eabi-gcc", ("-mthumb", *flags, *_memory(0, 0x20000000)), qemu, share=share)
+    return Runner(target, "arm-none-eabi-gcc", ("-mthumb", *flags, *_memory(0, 0x20000000)), qemu)
 
 
 RUNNERS = {
     runner.target: runner
     for runner in (
         # There is no board with a Cortex-M0 and enough memory in QEMU; a Cortex-M3 runs its code. No port is for it.
-        _cortex_m("cortex-m0", ("-mcpu=cortex-m0",), "mps2-an385", share=3),
+        _cortex_m("cortex-m0", ("-mcpu=cortex-m0",), "mps2-an385"),
         _cortex_m("cortex-m3", ("-mcpu=cortex-m3",), "mps2-an385"),
         _cortex_m("cortex-m4f", ("-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"), "mps2-an386"),
         # As the Cortex-M4F in all but a few instructions.
-        _cortex_m("cortex-m7", ("-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"), "mps2-an500", share=4),
+        _cortex_m("cortex-m7", ("-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"), "mps2-an500"),
         Runner(
             "rv32imac",
             "riscv64-unknown-elf-gcc",
