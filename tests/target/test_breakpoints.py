@@ -53,6 +53,8 @@ def test_a_hostile_debugger_leaves_a_board_that_takes_a_program(plc, tmp_path, s
 def test_a_trap_within_the_parts_of_an_instruction_is_refused(plc):
     target = plc.breakpoints._target
     target.attach(keep=False)
+    target.set(64, 0, None)
+    target.clear(64)
     for offset in (1, 63, 65):
         with pytest.raises(DeviceError):
             target.set(offset, 0, None)

@@ -15,7 +15,8 @@
  * Nested only by pre-emption, last in first out: depth d is interrupted while depth d + 1 runs.
  *
  * Rights (RTS_IEC_UNPRIVILEGED). What runs in a Try is unprivileged. To such code the MPU gives
- *   code and RAM of the architecture (below 1 GiB)  read, execute; writing them takes privileges
+ *   code and RAM of the architecture (below 1 GiB)  read, execute; writing them takes privileges; without what the
+ *                                                   board names as holes
  *   vectors, where NULL points                      nothing, as to all else
  *   areas of the application (AppAreas.c)           read, write
  *   stack slot of the depth that runs               read, write
@@ -133,6 +134,11 @@ RTS_NOINLINE void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size
 
 #if RTS_IEC_UNPRIVILEGED
 
+/* Eighths of the first GiB without memory. Where they read as zeros, a wild jump would execute all of them. */
+#ifndef BOARD_MEMORY_HOLES
+#define BOARD_MEMORY_HOLES 0
+#endif
+
 /* Of the linker script. Where the areas begin and end is a multiple of an eighth of their size, rounded up to a power
  * of 2 (APP_AREAS_ALIGNED): so two regions of that size next to each other hold them. */
 extern RTS_UI8 areas_start[], areas_end[];
@@ -151,7 +157,7 @@ static void allow_areas(void)
 static void protect_runtime(void)
 {
     enum { CODE_AND_RAM_LOG2 = 30, STACK_LOG2 = RTS_LOG2(RTS_IEC_STACK_SIZE) };
-    MpuProtect(MPU_MEMORY, 0, CODE_AND_RAM_LOG2, MPU_WRITE_PRIVILEGED);
+    MpuProtect(MPU_MEMORY, 0, CODE_AND_RAM_LOG2, MPU_WRITE_PRIVILEGED | MPU_WITHOUT_EIGHTHS(BOARD_MEMORY_HOLES));
     MpuProtect(MPU_IEC_STACK, (uintptr_t)stacks, STACK_LOG2, MPU_DATA);
     allow_areas();
 }

@@ -18,10 +18,18 @@
 #define WATCHDOG_LOCK REG32(WATCHDOG + 0xC00)
 #define SCC_LAMPS REG32(0x4002F004u) /* CFG1 */
 
-/* What is below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
-enum { MPU_BELOW_RAM = MPU_BOARD + 1, BELOW_RAM_LOG2 = 16 };
 #define RAM_BASE 0x20000000u
-RTS_STATIC_ASSERT(MPU_BELOW_RAM < 8, the_mpu_has_a_region_left);
+#if RTS_IEC_UNPRIVILEGED
+/* Reserved; reads as zeros, each an instruction that does nothing: a wild jump executes millions of them. */
+enum { HOLE_LOG2 = 23 };
+#define HOLE_BASE (RAM_BASE + 0x800000u)
+#else
+/* What is below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
+enum { HOLE_LOG2 = 16 };
+#define HOLE_BASE (RAM_BASE - (1u << HOLE_LOG2))
+#endif
+enum { MPU_HOLE = MPU_BOARD + 1 };
+RTS_STATIC_ASSERT(MPU_HOLE < 8, the_mpu_has_a_region_left);
 
 enum { TIMER_ENABLE_IRQ = 9, WATCHDOG_INTEN_RESEN = 3, WATCHDOG_KEY = 0x1ACCE551 };
 
@@ -30,7 +38,7 @@ void BoardInit(void)
     IrqEnable(IRQ_TIMER0, LEVEL_DEVICE);
     UartInit();
     FlashInit();
-    MpuProtect(MPU_BELOW_RAM, RAM_BASE - (1u << BELOW_RAM_LOG2), BELOW_RAM_LOG2, MPU_NO_ACCESS);
+    MpuProtect(MPU_HOLE, HOLE_BASE, HOLE_LOG2, MPU_NO_ACCESS);
 }
 
 void BoardAlarmSet(RTS_UI32 ns)

@@ -11,7 +11,8 @@
 #define BOARD_CLOCK_HZ 25000000u
 #define BOARD_IRQ_COUNT 32u
 #define BOARD_PRIORITY_BITS 3
-#define BOARD_TASK_IRQ 24u /* lines of single GPIO pins */
+#define BOARD_MEMORY_HOLES 0xEE /* code and RAM are in the first and the fifth 128 MiB */
+#define BOARD_TASK_IRQ 24u      /* lines of single GPIO pins */
 
 enum { IRQ_UART0_RX = 0, IRQ_UART0_TX = 1, IRQ_UART1_RX = 2, IRQ_UART1_TX = 3, IRQ_TIMER0 = 8 };
 
