@@ -31,13 +31,19 @@ typedef enum {
     SYS_DEBUG_HALT, /* SYS_DEBUG_WAITS 0: SysExceptTry returns with SYS_DEBUG_HALTED; the code keeps registers and stack */
 } SYS_DEBUG_ACTION;
 
-/* Instructions, and traps, begin at multiples of this. */
+/* Instructions, and traps, begin at multiples of this; SYS_DEBUG_LONGEST: bytes of the longest trap. */
 #if defined(__x86_64__)
 #define SYS_DEBUG_ALIGN 1
+#define SYS_DEBUG_LONGEST 1
 #elif defined(__aarch64__)
 #define SYS_DEBUG_ALIGN 4
+#define SYS_DEBUG_LONGEST 4
+#elif defined(__arm__)
+#define SYS_DEBUG_ALIGN 2
+#define SYS_DEBUG_LONGEST 4
 #else
 #define SYS_DEBUG_ALIGN 2
+#define SYS_DEBUG_LONGEST 2
 #endif
 
 /* RTS_EXCEPTION.code of a task that is halted, and SYS_DEBUG_STOP.code when it is to go on. */
@@ -56,6 +62,8 @@ void SysDebugSetHandler(PF_SYS_DEBUG handler);
  * execute the code at the same time. ERR_NO_ACCESS_RIGHTS: the system does not let code be written. From any context. */
 RTS_RESULT SysDebugWriteTrap(uintptr_t address, RTS_UI32 *original);
 void SysDebugRestore(uintptr_t address, RTS_UI32 original);
+/* Bytes that a trap overwrites there, or has overwritten. */
+RTS_UI32 SysDebugTrapSize(uintptr_t address);
 /* True if the instruction there is a trap. */
 bool SysDebugIsTrap(uintptr_t address);
 

@@ -62,6 +62,27 @@ def test_a_trap_within_the_parts_of_an_instruction_is_refused(plc):
             target.temporary([offset])
 
 
+def test_a_trap_that_would_overwrite_a_part_of_another_one_is_refused(plc):
+    debugger = plc.breakpoints
+    debugger.set(FILE, 27)
+    breakpoints.halt(debugger)
+    target = debugger._target
+    taken = 0
+    for offset in range(4, 64, 2):  # also within instructions: neither trap may leave a part of the other one
+        target.set(offset, 0, None)
+        with suppress(DeviceError):
+            target.set(offset + 2, 0, None)
+            taken += 1
+        target.clear(offset)
+        with suppress(DeviceError):
+            target.clear(offset + 2)
+    assert taken > 3
+    debugger.clear_all()
+    debugger.go()
+    before = plc.read("Main.cycles")
+    eventually(lambda: plc.read("Main.cycles") > before + 5)
+
+
 def test_a_firmware_without_breakpoints_says_so(make_board, build):
     with make_board("standard") as board, Plc(Connection(board.line())) as plc:
         plc.flash(build("PROGRAM Main VAR n : DINT; END_VAR n := n + 1; END_PROGRAM").path)

@@ -75,6 +75,11 @@ static void restore_code(uintptr_t address, RTS_UI32 original)
     ThumbRestore(address, original, store_code);
 }
 
+RTS_UI32 SysDebugTrapSize(uintptr_t address)
+{
+    return ThumbSize(*(const RTS_UI16 *)address);
+}
+
 bool SysDebugIsTrap(uintptr_t address)
 {
     return ThumbIsTrap(address);
@@ -101,6 +106,12 @@ static bool write_trap(uintptr_t address)
 static void restore_code(uintptr_t address, RTS_UI32 original)
 {
     (void)store_code(address, (CODE_UNIT)original);
+}
+
+RTS_UI32 SysDebugTrapSize(uintptr_t address)
+{
+    RTS_UNUSED(address);
+    return sizeof(CODE_UNIT);
 }
 
 bool SysDebugIsTrap(uintptr_t address)
@@ -238,14 +249,7 @@ static uintptr_t address_of(const ucontext_t *context)
 
 enum { STATE_THUMB = 1 << 5 };
 
-/* What cannot be read ends in an exception here as well as there. */
-bool ThumbMayRead(uintptr_t address, RTS_UI32 size)
-{
-    RTS_UNUSED(address);
-    RTS_UNUSED(size);
-    return true;
-}
-
+/* A load that reads neither code nor the stack is left to the processor, whose exception is that of the program. */
 static bool execute_branch(ucontext_t *context)
 {
     THUMB_REGISTERS at;

@@ -14,6 +14,7 @@
 #define _GNU_SOURCE
 #include "SysExcept.h"
 
+#include "../baremetal/cortexm/ThumbStep.h"
 #include "IecStack.h"
 #include "StepOver.h"
 #include "SysDebug.h"
@@ -252,6 +253,15 @@ static bool goes_on(const CONTEXT *context, RTS_UI32 code, const siginfo_t *info
 }
 #define abandon_step() ((void)0)
 #else
+#if defined(__arm__)
+bool ThumbMayRead(uintptr_t address, RTS_UI32 size)
+{
+    const IEC_STACK *stack = &self()->stack;
+    return (address >= stack->bottom && address < stack->top && size <= stack->top - address) ||
+           (SysExceptIsCode(address) && SysExceptIsCode(address + size - 1));
+}
+#endif
+
 static bool goes_on(const CONTEXT *context, RTS_UI32 code, const siginfo_t *info, void *ucontext)
 {
     PLACE place = place_of(ucontext);

@@ -78,6 +78,24 @@ static TRAP *find_trap(RTS_UI32 offset)
     return NULL;
 }
 
+static bool reaches(const TRAP *trap, RTS_UI32 offset)
+{
+    return offset > trap->offset && offset - trap->offset < SysDebugTrapSize(address_of(trap->offset));
+}
+
+/* True if a trap would overwrite a part of another one: neither could be taken out alone. */
+static bool overlaps(RTS_UI32 offset)
+{
+    TRAP added = {offset, 0, 0};
+    RTS_UI32 i;
+
+    for (i = 0; i < bp.trap_count; i++) {
+        if (reaches(&bp.trap[i], offset) || reaches(&added, bp.trap[i].offset))
+            return true;
+    }
+    return false;
+}
+
 static RTS_RESULT add_trap(RTS_UI32 offset, RTS_UI32 owner)
 {
     TRAP *trap = find_trap(offset);
@@ -86,6 +104,8 @@ static RTS_RESULT add_trap(RTS_UI32 offset, RTS_UI32 owner)
     if (trap == NULL) {
         if (bp.trap_count == BP_TRAPS)
             return ERR_NOMEMORY;
+        if (SYS_DEBUG_ALIGN < SYS_DEBUG_LONGEST && overlaps(offset))
+            return ERR_OUT_OF_LIMITS;
         trap = &bp.trap[bp.trap_count];
         trap->offset = offset;
         trap->owners = 0;
@@ -493,14 +513,29 @@ static void check_alive(void)
     AppBpDetach();
 }
 
-static RTS_RESULT check_place(RTS_UI32 offset)
+static bool is_in_code(RTS_UI32 offset)
+{
+    RTS_UI32 size = AppGetImage()->code.size;
+
+    return offset % SYS_DEBUG_ALIGN == 0 && offset < size && size - offset >= SYS_DEBUG_ALIGN &&
+           size - offset >= SysDebugTrapSize(address_of(offset));
+}
+
+static RTS_RESULT check_debugger(void)
 {
     if (!bp.attached)
         return ERR_INVALID_STATE;
     if (AppGetState() == AS_NONE)
         return ERR_APP_NOT_LOADED;
     check_image();
-    return offset % SYS_DEBUG_ALIGN == 0 && offset < AppGetImage()->code.size ? ERR_OK : ERR_OUT_OF_LIMITS;
+    return ERR_OK;
+}
+
+static RTS_RESULT check_place(RTS_UI32 offset)
+{
+    RTS_RESULT result = check_debugger();
+
+    return result == ERR_OK && !is_in_code(offset) ? (RTS_RESULT)ERR_OUT_OF_LIMITS : result;
 }
 
 /* With the lock. */

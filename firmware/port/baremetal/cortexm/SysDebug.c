@@ -38,6 +38,11 @@ void SysDebugRestore(uintptr_t address, RTS_UI32 original)
     ThumbRestore(address, original, store);
 }
 
+RTS_UI32 SysDebugTrapSize(uintptr_t address)
+{
+    return ThumbSize(*(const RTS_UI16 *)address);
+}
+
 bool SysDebugIsTrap(uintptr_t address)
 {
     return ThumbIsTrap(address);

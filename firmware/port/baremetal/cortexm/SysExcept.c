@@ -527,6 +527,13 @@ static bool end_step(FRAME *frame)
     return debug.ends_at_own;
 }
 
+/* False after the last instruction of the code, which could not go on there. */
+static bool has_next(const FRAME *frame)
+{
+    uintptr_t next = frame->pc + ThumbSize(*(const RTS_UI16 *)(uintptr_t)frame->pc);
+    return SysExceptIsCode(next + 1) && SysExceptIsCode(next + SysDebugTrapSize(next) - 1);
+}
+
 /* The handler of the trap has taken it out. */
 static RTS_UI32 pass(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved, const SYS_DEBUG_STOP *stop)
 {
@@ -535,12 +542,12 @@ static RTS_UI32 pass(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved, const S
 
     get_registers(&at, frame, exc_return, saved);
     done = ThumbStep(&at);
-    if (done == THUMB_STRAIGHT) {
+    if (done == THUMB_STRAIGHT && has_next(frame)) {
         begin_step(frame);
         return exc_return;
     }
     tell_debugger(stop, RTSEXCPT_NOEXCEPTION);
-    if (done == THUMB_FAULT)
+    if (done != THUMB_DONE)
         return leave_try(RTSEXCPT_ACCESS_VIOLATION, frame->pc, stop->stack, frame->lr);
     put_registers(&at, frame, exc_return, saved);
     return exc_return;

@@ -44,6 +44,12 @@ void SysDebugRestore(uintptr_t address, RTS_UI32 original)
     store(address, original);
 }
 
+RTS_UI32 SysDebugTrapSize(uintptr_t address)
+{
+    RTS_UNUSED(address);
+    return sizeof(RTS_UI16);
+}
+
 static RTS_UI32 read_code(uintptr_t address)
 {
     return read_half(address) | (RiscvSize(address) == 4 ? read_half(address + 2) << 16 : 0);

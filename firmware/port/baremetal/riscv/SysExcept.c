@@ -369,12 +369,12 @@ static bool end_step(const FRAME *frame)
 static void pass(FRAME *frame, RTS_UI32 *saved, const SYS_DEBUG_STOP *stop)
 {
     RISCV_STEP done = RiscvStep(frame, saved);
-    if (done == RISCV_STRAIGHT) {
+    if (done == RISCV_STRAIGHT && SysExceptIsCode(frame->pc + RiscvSize(frame->pc) + 1)) {
         begin_step(frame);
         return;
     }
     tell_debugger(stop, RTSEXCPT_NOEXCEPTION);
-    if (done == RISCV_FAULT)
+    if (done != RISCV_DONE)
         leave(RTSEXCPT_ILLEGAL_INSTRUCTION, frame->pc, frame->sp, frame->ra);
 }
 
