@@ -303,6 +303,76 @@ class Breaking:
                 return
         pytest.fail("the program does not run")
 
+    def test_a_task_halts_at_the_statement_after_a_change(self, plc: Controller) -> None:
+        debugger = plc.breakpoints
+        start = plc.read("Main.word")
+        made = debugger.watch("Main.word", hits=2)
+        found = halt(debugger)
+        assert (found.reason, place(found)) == ("data breakpoint", ("Main", 31))
+        assert plc.read("Main.word") >= start + 2
+        (changed,) = found.changed
+        assert changed.breakpoint == made
+        assert int(changed.new[3:], 16) == int(changed.old[3:], 16) + 1 == plc.read("Main.word")
+        assert debugger.granularity == "each statement"
+        debugger.clear(made.number)
+        assert debugger.watched() == []
+        debugger.go()
+        self.wait(debugger)
+
+    def test_several_variables_are_compared_bits_and_members_too(self, plc: Controller) -> None:
+        debugger = plc.breakpoints
+        for name in ("Main.counter.n", "Main.word.1", "Other.n"):
+            debugger.watch(name)
+        seen = {}
+        for _ in range(100):
+            found = halt(debugger)
+            for changed in found.changed:
+                seen[changed.breakpoint.name] = place(found)
+            debugger.go()
+            if len(seen) == 3:
+                break
+        assert (seen["Main.counter.n"], seen["Main.word.1"]) == (("Counter", 16), ("Main", 31))
+        assert "Other.n" in seen
+
+    def test_a_change_counts_if_its_condition_is_true(self, plc: Controller) -> None:
+        debugger = plc.breakpoints
+        debugger.watch("Main.k", condition="Main.k = 3")
+        found = halt(debugger)
+        assert plc.read("Main.k") == 3
+        assert [c.new for c in found.changed] == ["3"]
+
+    def test_a_variable_that_the_tool_writes_has_changed_too(self, plc: Controller) -> None:
+        debugger = plc.breakpoints
+        debugger.watch("Main.divisor")
+        self.wait(debugger)
+        plc.write({"Main.divisor": 2})
+        found = halt(debugger)
+        assert [str(c) for c in found.changed] == ["Main.divisor: 1 -> 2"]
+
+    def test_a_member_of_the_instance_of_a_call_is_compared(self, plc: Controller) -> None:
+        debugger = plc.breakpoints
+        number = debugger.set(FILE, 14).number
+        found = halt(debugger)
+        debugger.clear(number)
+        made = debugger.watch(found.halted.in_area("n", found.calls[0]))
+        assert made.name == "Main.counter.n"
+        debugger.go()
+        assert place(halt(debugger)) == ("Counter", 16)
+        with pytest.raises(UsageError, match="twice is a variable of a call, which ends with it"):
+            found.halted.in_area("twice", found.calls[0])
+
+    def test_what_cannot_be_compared_is_refused(self, plc: Controller) -> None:
+        debugger = plc.breakpoints
+        with pytest.raises(UsageError, match=r"Main\.counter is a .*Name a part of it"):
+            debugger.watch("Main.counter")
+        with pytest.raises(UsageError):
+            debugger.watch("Main.nothing")
+        for name in ("Main.k", "Main.on", "Main.total", "Main.cycles"):
+            debugger.watch(name)
+        with pytest.raises(DeviceError):
+            debugger.watch("Main.speed")
+        assert len(debugger.watched()) == 4
+
     def test_breakpoints_end_with_the_debugger(self, plc: Controller) -> None:
         debugger = plc.breakpoints
         debugger.set(FILE, 15)

@@ -9,6 +9,9 @@
  * An exception halts as well while a debugger is attached, before it unwinds. Initialisation code, and a single cycle that
  * main runs, meet no breakpoint.
  *
+ * A data breakpoint is a variable that is compared at traps, which the debugger sets at the statements of the program: the
+ * task that finds it changed halts before that statement.
+ *
  * A debugger steps by temporary traps at all places where the step may lead. It is attached from AppBpAttach on until
  * AppBpDetach, or until it has asked nothing for BP_ALIVE_MS: then all traps are taken out, and the task goes on.
  *
@@ -92,6 +95,14 @@ RTS_RESULT AppBpClear(RTS_UI32 offset);
 void AppBpClearAll(void);
 /* In the order in which they were set. False after the last one. */
 bool AppBpGet(RTS_UI32 index, BP_BREAKPOINT *breakpoint);
+
+/* Ends the data breakpoints. */
+void AppBpClearWatches(void);
+/* A task halts when this variable differs from what it is now, or was at the last halt for it. ERR_INVALID_STATE,
+ * ERR_APP_NOT_LOADED; ERR_PARAMETER: no such variable; ERR_NOMEMORY above BP_WATCHES. */
+RTS_RESULT AppBpAddWatch(const APP_PLACE *place);
+/* They are compared before this instruction, too; errors as AppBpSet. */
+RTS_RESULT AppBpAddWatchTrap(RTS_UI32 offset);
 
 /* Forgets the temporary traps, and adds one; errors as AppBpSet. */
 void AppBpClearTemporary(void);

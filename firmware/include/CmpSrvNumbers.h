@@ -329,6 +329,7 @@ enum {
     SRV_BP_PAUSE = 0x68,
     SRV_BP_READ_STACK = 0x69,
     SRV_BP_WRITE_STACK = 0x6A,
+    SRV_BP_WATCH = 0x93,
     TAG_BP_KEEP = 0x02,
     TAG_BP_STATE = 0x03,
     TAG_BP_RECORD = 0x04,

@@ -367,6 +367,10 @@
 #ifndef BP_TRAPS
 #define BP_TRAPS (BP_MAX > 0 ? 4096 : 0)
 #endif
+/* Variables whose changes may halt a task at a time. */
+#ifndef BP_WATCHES
+#define BP_WATCHES (BP_MAX > 0 ? 4 : 0)
+#endif
 
 /* 0: tasks run one after the other, in one thread, so that none runs while another one is halted. */
 #ifndef BP_HOLDS_TASKS

@@ -492,6 +492,9 @@ class _DebuggedPlc:
     def hits(self) -> dict[int, int]:
         return breakpoint_services.read_hits(self._session)
 
+    def watch(self, places: Sequence[ForcedPlace], offsets: Sequence[int]) -> None:
+        breakpoint_services.watch(self._session, places, offsets)
+
     def temporary(self, offsets: Sequence[int]) -> None:
         breakpoint_services.set_temporary(self._session, offsets)
 

@@ -699,6 +699,13 @@ class _DebuggedSimulator:
             found[c.offset] = c.hits
         return found
 
+    def watch(self, places: Sequence[ForcedPlace], offsets: Sequence[int]) -> None:
+        self._lib.AppBpClearWatches()
+        for place in places:
+            _check(self._lib.AppBpAddWatch(self._sim._c_place(place)), "The variable cannot be compared")
+        for offset in offsets:
+            _check(self._lib.AppBpAddWatchTrap(offset), "The variable cannot be compared there")
+
     def temporary(self, offsets: Sequence[int]) -> None:
         self._lib.AppBpClearTemporary()
         for offset in offsets:

@@ -24,13 +24,18 @@
 #include "SysTime.h"
 
 /* Whose trap it is. */
-enum { TRAP_BREAKPOINT = 1, TRAP_TEMPORARY = 2 };
+enum { TRAP_BREAKPOINT = 1, TRAP_TEMPORARY = 2, TRAP_WATCH = 4 };
 
 typedef struct {
     RTS_UI32 offset;
     RTS_UI32 original;
     RTS_UI32 owners; /* TRAP_*; 0: none */
 } TRAP;
+
+typedef struct {
+    APP_PLACE place;
+    RTS_UI64 value; /* when it was compared last */
+} WATCH;
 
 #define NO_TASK 0xFFFFFFFFu
 #define NOTHING 0xFFFFFFFFu
@@ -45,6 +50,8 @@ static struct {
     RTS_UI32 crc; /* of the image that the breakpoints belong to */
     RTS_UI32 count;
     BP_BREAKPOINT list[BP_MAX];
+    RTS_UI32 watch_count;
+    WATCH watch[BP_WATCHES];
     RTS_UI32 trap_count;
     TRAP trap[BP_TRAPS];
     RTS_UI32 step_task;                  /* whose temporary traps; NO_TASK: any */
@@ -230,34 +237,39 @@ static bool compares(const BP_CONDITION *condition, RTS_UI64 value)
     return (found >> condition->relation & 1) != 0;
 }
 
-/* A pointer that leads nowhere makes no condition true. */
-static bool holds(const BP_CONDITION *condition)
+/* False if a pointer leads nowhere. */
+static bool read_place(const APP_PLACE *place, RTS_UI64 *value)
 {
     AREA_ADDRESS address;
-    RTS_UI64 value = 0;
     RTS_UI8 *at;
+
+    if (AppPlaceFind(place, &address, &at) != MONITORING_ERR_OK)
+        return false;
+    *value = 0;
+    memcpy(value, at, place->size);
+    if (place->mask != PLACE_ALL_BITS)
+        *value = (*value & place->mask) != 0;
+    return true;
+}
+
+static bool holds(const BP_CONDITION *condition)
+{
+    RTS_UI64 value;
 
     if (condition->relation == BP_ALWAYS)
         return true;
-    if (AppPlaceFind(&condition->place, &address, &at) != MONITORING_ERR_OK)
-        return false;
-    memcpy(&value, at, condition->place.size);
-    if (condition->place.mask != PLACE_ALL_BITS)
-        value = (value & condition->place.mask) != 0;
-    return compares(condition, value);
+    return read_place(&condition->place, &value) && compares(condition, value);
 }
 
 static bool is_valid(const BP_CONDITION *condition)
 {
-    AREA_ADDRESS address;
-    RTS_UI8 *at;
+    RTS_UI64 value;
     bool is_real = condition->kind == BP_REAL;
 
     if (condition->relation == BP_ALWAYS)
         return true;
     if (condition->relation > BP_GREATER_EQUAL || condition->kind > BP_REAL ||
-        AppPlaceCheck(&condition->place) != MONITORING_ERR_OK ||
-        AppPlaceFind(&condition->place, &address, &at) != MONITORING_ERR_OK)
+        AppPlaceCheck(&condition->place) != MONITORING_ERR_OK || !read_place(&condition->place, &value))
         return false;
     return !is_real || condition->place.size >= sizeof(float);
 }
@@ -275,6 +287,22 @@ static BP_BREAKPOINT *find_breakpoint(RTS_UI32 offset)
     return NULL;
 }
 
+/* With the lock: each change is seen once. */
+static bool is_changed(void)
+{
+    bool changed = false;
+    RTS_UI64 value;
+    RTS_UI32 i;
+
+    for (i = 0; i < bp.watch_count; i++) {
+        if (!read_place(&bp.watch[i].place, &value) || value == bp.watch[i].value)
+            continue;
+        bp.watch[i].value = value;
+        changed = true;
+    }
+    return changed;
+}
+
 /* With the lock. */
 static bool is_hit(const TRAP *trap, RTS_UI32 task)
 {
@@ -283,6 +311,8 @@ static bool is_hit(const TRAP *trap, RTS_UI32 task)
 
     if (breakpoint != NULL && holds(&breakpoint->condition))
         halts = ++breakpoint->hits > breakpoint->skip;
+    if ((trap->owners & TRAP_WATCH) != 0 && is_changed())
+        halts = true;
     return halts || ((trap->owners & TRAP_TEMPORARY) != 0 && (bp.step_task == NO_TASK || bp.step_task == task));
 }
 
@@ -464,7 +494,8 @@ static void check_image(void)
 static void forget_list(void)
 {
     bp.count = 0;
-    remove_owner(TRAP_BREAKPOINT | TRAP_TEMPORARY);
+    bp.watch_count = 0;
+    remove_owner(TRAP_BREAKPOINT | TRAP_TEMPORARY | TRAP_WATCH);
 }
 
 void AppBpClearAll(void)
@@ -592,7 +623,7 @@ bool AppBpGet(RTS_UI32 index, BP_BREAKPOINT *breakpoint)
     return true;
 }
 
-/* ---- steps ---- */
+/* ---- traps that are no breakpoints ---- */
 
 void AppBpClearTemporary(void)
 {
@@ -603,7 +634,7 @@ void AppBpClearTemporary(void)
 }
 
 /* A trap that is out while its task stands on it is no danger: the task is halted. */
-RTS_RESULT AppBpAddTemporary(RTS_UI32 offset)
+static RTS_RESULT add_checked(RTS_UI32 offset, RTS_UI32 owner)
 {
     RTS_RESULT result = check_place(offset);
     RTS_UI32 lock;
@@ -611,10 +642,62 @@ RTS_RESULT AppBpAddTemporary(RTS_UI32 offset)
     if (result != ERR_OK)
         return result;
     lock = SysLockEnter();
-    result = add_trap(offset, TRAP_TEMPORARY);
+    result = add_trap(offset, owner);
     SysLockLeave(lock);
     return result;
 }
+
+RTS_RESULT AppBpAddTemporary(RTS_UI32 offset)
+{
+    return add_checked(offset, TRAP_TEMPORARY);
+}
+
+/* ---- data breakpoints ---- */
+
+void AppBpClearWatches(void)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    bp.watch_count = 0;
+    remove_owner(TRAP_WATCH);
+    SysLockLeave(lock);
+}
+
+/* With the lock. */
+static RTS_RESULT add_watch(const APP_PLACE *place)
+{
+    WATCH *watch = &bp.watch[bp.watch_count];
+
+    if (bp.watch_count == BP_WATCHES)
+        return ERR_NOMEMORY;
+    if (!read_place(place, &watch->value))
+        return ERR_PARAMETER;
+    watch->place = *place;
+    bp.watch_count++;
+    return ERR_OK;
+}
+
+RTS_RESULT AppBpAddWatch(const APP_PLACE *place)
+{
+    RTS_RESULT result = check_debugger();
+    RTS_UI32 lock;
+
+    if (result == ERR_OK && AppPlaceCheck(place) != MONITORING_ERR_OK)
+        result = ERR_PARAMETER;
+    if (result != ERR_OK)
+        return result;
+    lock = SysLockEnter();
+    result = add_watch(place);
+    SysLockLeave(lock);
+    return result;
+}
+
+RTS_RESULT AppBpAddWatchTrap(RTS_UI32 offset)
+{
+    return add_checked(offset, TRAP_WATCH);
+}
+
+/* ---- steps ---- */
 
 /* Another task may have to cause it. */
 static bool waits_for_event(RTS_UI32 task)

@@ -106,16 +106,24 @@ static void read_record(const BP_RECORD *wire, BP_BREAKPOINT *breakpoint)
         place->offset[i] = BytesGet32(wire->offset + 4 * i);
 }
 
+static RTS_RESULT find_record(SRV_REQUEST *request, BP_BREAKPOINT *breakpoint)
+{
+    BTAG record;
+    RTS_RESULT result = BTagFind(&request->tags, TAG_BP_RECORD, sizeof(BP_RECORD), sizeof(BP_RECORD), &record);
+
+    if (result == ERR_OK)
+        read_record((const BP_RECORD *)record.data, breakpoint);
+    return result;
+}
+
 static RTS_RESULT set(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     BP_BREAKPOINT breakpoint;
-    BTAG record;
-    RTS_RESULT result = BTagFind(&request->tags, TAG_BP_RECORD, sizeof(BP_RECORD), sizeof(BP_RECORD), &record);
+    RTS_RESULT result = find_record(request, &breakpoint);
 
     if (result != ERR_OK)
         return result;
     AppBpAlive();
-    read_record((const BP_RECORD *)record.data, &breakpoint);
     if (breakpoint.condition.place.pointers > PLACE_POINTERS)
         return reply_result(reply, ERR_PARAMETER);
     result = OperationMay(OPERATION_BP);
@@ -158,26 +166,72 @@ static RTS_RESULT list(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 /* ---- steps ---- */
 
+static RTS_RESULT find_offsets(SRV_REQUEST *request, BTAG *offsets, RTS_UI32 *more)
+{
+    RTS_RESULT result = BTagFind(&request->tags, TAG_BP_OFFSETS, sizeof(RTS_UI32), request->tags.size, offsets);
+
+    if (result == ERR_OK)
+        result = BTagFindOptional(&request->tags, TAG_BP_MORE, more);
+    return result == ERR_OK && offsets->size % sizeof(RTS_UI32) != 0 ? (RTS_RESULT)ERR_SIZE_MISMATCH : result;
+}
+
+/* Up to the first that is refused. */
+static RTS_RESULT add_traps(const BTAG *offsets, RTS_RESULT (*add)(RTS_UI32 offset))
+{
+    RTS_RESULT result = ERR_OK;
+    RTS_UI32 i;
+
+    for (i = 0; i < offsets->size && result == ERR_OK; i += sizeof(RTS_UI32))
+        result = add(BytesGet32(offsets->data + i));
+    return result;
+}
+
 /* Without TAG_BP_MORE the traps of before are forgotten. */
 static RTS_RESULT temporary(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     BTAG offsets;
     RTS_UI32 more = 0;
-    RTS_UI32 i;
-    RTS_RESULT result = BTagFind(&request->tags, TAG_BP_OFFSETS, sizeof(RTS_UI32), request->tags.size, &offsets);
+    RTS_RESULT result = find_offsets(request, &offsets, &more);
 
-    if (result == ERR_OK)
-        result = BTagFindOptional(&request->tags, TAG_BP_MORE, &more);
-    if (result == ERR_OK && offsets.size % sizeof(RTS_UI32) != 0)
-        result = ERR_SIZE_MISMATCH;
     if (result != ERR_OK)
         return result;
     AppBpAlive();
     if (!more)
         AppBpClearTemporary();
-    for (i = 0; i < offsets.size && result == ERR_OK; i += sizeof(RTS_UI32))
-        result = AppBpAddTemporary(BytesGet32(offsets.data + i));
-    return reply_result(reply, result);
+    return reply_result(reply, add_traps(&offsets, AppBpAddTemporary));
+}
+
+static RTS_RESULT add_watch(SRV_REQUEST *request)
+{
+    BP_BREAKPOINT breakpoint;
+    RTS_RESULT result = find_record(request, &breakpoint);
+
+    if (result != ERR_OK)
+        return result == ERR_L7_TAG_MISSING ? (RTS_RESULT)ERR_OK : result;
+    return breakpoint.condition.place.pointers > PLACE_POINTERS ? (RTS_RESULT)ERR_PARAMETER
+                                                                : AppBpAddWatch(&breakpoint.condition.place);
+}
+
+/* A variable, if there is one, and traps, if there are some. Without TAG_BP_MORE those of before are forgotten. */
+static RTS_RESULT watch(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    BTAG offsets;
+    RTS_UI32 more = 0;
+    RTS_RESULT result = find_offsets(request, &offsets, &more);
+
+    if (result == ERR_L7_TAG_MISSING) {
+        offsets.size = 0;
+        result = BTagFindOptional(&request->tags, TAG_BP_MORE, &more);
+    }
+    if (result != ERR_OK)
+        return result;
+    AppBpAlive();
+    if (!more)
+        AppBpClearWatches();
+    result = OperationMay(OPERATION_BP);
+    if (result == ERR_OK)
+        result = add_watch(request);
+    return reply_result(reply, result == ERR_OK ? add_traps(&offsets, AppBpAddWatchTrap) : result);
 }
 
 /* The serial number is that of the halt: a request that is repeated does not end the next one. */
@@ -258,6 +312,7 @@ static const SRV_SERVICE services[] = {
     {SRV_BP_PAUSE, RIGHT_WRITE, pause_tasks},
     {SRV_BP_READ_STACK, RIGHT_WRITE, read_stack},
     {SRV_BP_WRITE_STACK, RIGHT_WRITE, write_stack},
+    {SRV_BP_WATCH, RIGHT_WRITE, watch},
 };
 
 RTS_RESULT CmpAppBPSrv_Hook(CMP_HOOK hook)

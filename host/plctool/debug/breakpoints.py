@@ -10,15 +10,17 @@ import re
 from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from plctool.core import exception_name, lib
 from plctool.debug.expressions import NAME, check_expression
-from plctool.debug.forced import ForcedPlace, place_of
+from plctool.debug.forced import ForcedPlace, name_forced, place_of
 from plctool.debug.halted import BpStatus, Call, Halted, Memory
 from plctool.debug.statements import CodeOfLine, Statements
 from plctool.debug.symbols import SymbolTable
+from plctool.debug.variables import Symbol
+from plctool.debug.watches import Changed, DataBreakpoint, Watches, check_watchable
 from plctool.errors import DeviceError, PlcError, UsageError
 from plctool.iec.types import Elementary, Kind, base_of
 
@@ -57,13 +59,15 @@ class Breakpoint:
 
 @dataclass(frozen=True)
 class Halt:
-    """Why and where a task halted. `reason`: breakpoint, step, pause or exception; `exception` is its name."""
+    """Why and where a task halted. `reason`: breakpoint, data breakpoint, step, pause or exception; `exception` is its
+    name; `changed`: the variables of data breakpoints."""
 
     reason: str
     task: str
     halted: Halted
     breakpoints: list[Breakpoint] = field(default_factory=list)
     exception: str = ""
+    changed: list[Changed] = field(default_factory=list)
 
     @property
     def calls(self) -> list[Call]:
@@ -74,7 +78,7 @@ class Halt:
         where = (
             f"{self.calls[0].pou}, {self.calls[0].file}:{self.calls[0].line}" if self.calls else "code without a line"
         )
-        what = f"exception {self.exception}" if self.exception else self.reason
+        what = f"exception {self.exception}" if self.exception else ", ".join(map(str, self.changed)) or self.reason
         return f"{self.task} halted ({what}): {where}"
 
 
@@ -97,6 +101,9 @@ class Target(Memory, Protocol):
 
     def hits(self) -> dict[int, int]:
         """How often each breakpoint was met, by its offset."""
+
+    def watch(self, places: Sequence[ForcedPlace], offsets: Sequence[int]) -> None:
+        """A task that finds one of these changed, at one of these offsets, halts. In place of all of before."""
 
     def temporary(self, offsets: Sequence[int]) -> None: ...
 
@@ -131,6 +138,7 @@ class Debugger:
         self._loaded: tuple[SymbolTable, Statements] | None = None
         self._temporary: frozenset[int] = frozenset()
         self._counts: dict[int, int] = {}  # of true conditions that only this checks, by breakpoint
+        self._watches = Watches()
         target.attach(keep)
 
     def close(self) -> None:
@@ -139,6 +147,7 @@ class Debugger:
         with suppress(PlcError):
             self._target.detach()
         self._breakpoints.clear()
+        self._watches = Watches()
 
     @property
     def table(self) -> SymbolTable:
@@ -174,6 +183,41 @@ class Debugger:
         self._breakpoints[made.number] = made
         return made
 
+    def watch(self, what: str | Symbol, *, condition: str = "", hits: int = 1) -> DataBreakpoint:
+        """Halts when a variable has changed: at the next place where the controller compares it (`granularity`). A name
+        is one of a program or a global one. Raises UsageError for what is not compared, DeviceError if the controller
+        has no room."""
+        symbol = self.table.resolve(what) if isinstance(what, str) else what
+        check_watchable(symbol)
+        if not isinstance(what, str):  # a member of an instance: by its name in the program
+            symbol = next(s for s, _ in name_forced([place_of(symbol)], self.table.variables.values()).values())
+        if hits < 1:
+            raise UsageError(f"A breakpoint halts from the first hit on, or a later one, not from {hits}.", "hits")
+        if condition:
+            check_expression(condition)
+        self._number += 1
+        made = DataBreakpoint(self._number, symbol, condition, hits)
+        self._watches.listed[made.number] = made
+        try:
+            self._install_watches()
+        except PlcError:
+            del self._watches.listed[made.number]
+            self._install_watches()
+            raise
+        return made
+
+    def _install_watches(self) -> None:
+        self._watches.install(self._target, self.statements, self._target.status())
+
+    @property
+    def granularity(self) -> str:
+        """Where the controller compares the variables of data breakpoints."""
+        return self._watches.granularity
+
+    def watched(self) -> list[tuple[DataBreakpoint, int]]:
+        """The data breakpoints, and how many changes of each were seen."""
+        return [(b, self._watches.counts.get(b.number, 0)) for b in self._watches.listed.values()]
+
     def _install(self, made: Breakpoint) -> None:
         skip = made.hits - 1 if self._halts_at_once(made) else 0
         for offset in made.offsets:
@@ -186,6 +230,9 @@ class Debugger:
 
     def clear(self, number: int) -> None:
         """Ends a breakpoint. Raises UsageError if there is none of this number."""
+        if self._watches.listed.pop(number, None) is not None:
+            self._install_watches()
+            return
         if number not in self._breakpoints:
             raise UsageError(f"There is no breakpoint {number}.", "no-breakpoint")
         gone = self._breakpoints.pop(number)
@@ -198,7 +245,7 @@ class Debugger:
                     self._target.clear(offset)
 
     def clear_all(self) -> None:
-        for number in list(self._breakpoints):
+        for number in [*self._breakpoints, *self._watches.listed]:
             self.clear(number)
 
     def list(self) -> list[tuple[Breakpoint, int]]:
@@ -223,6 +270,12 @@ class Debugger:
                 )
                 self._install(made)
                 self._breakpoints[made.number] = made
+        for watch in list(self._watches.listed.values()):
+            try:
+                self._watches.listed[watch.number] = replace(watch, symbol=self.table.resolve(watch.name))
+            except UsageError:
+                del self._watches.listed[watch.number]
+        self._install_watches()
 
     def _by_device(self, condition: str) -> DeviceCondition | None:
         """`variable operator constant`, if the controller can compare that."""
@@ -280,12 +333,30 @@ class Debugger:
             return Halt("exception", task, halted, [], exception_name(status.code))
         here = [b for b in self._breakpoints.values() if status.code_offset in b.offsets]
         hit = [b for b in here if self._is_hit(b, halted)]
-        if hit:
-            return Halt("breakpoint", task, halted, hit)
+        compared = status.code_offset in self._watches.traps
+        changed = [c for c in self._watches.changed(halted) if self._is_wanted(c, halted)] if compared else []
+        if hit or changed:
+            return Halt("breakpoint" if hit else "data breakpoint", task, halted, hit, changed=changed)
         temporary = self._temporary if self._asked else frozenset()
         if status.code_offset in temporary:
             return Halt(self._asked, task, halted)
-        return None if here or not self._asked else Halt(self._asked, task, halted)
+        return None if here or compared or not self._asked else Halt(self._asked, task, halted)
+
+    def _is_wanted(self, changed: Changed, halted: Halted) -> bool:
+        """Counts a change, and checks the condition and the hits."""
+        b, counts = changed.breakpoint, self._watches.counts
+        if b.condition and not self._holds(b.number, b.condition, halted):
+            return False
+        counts[b.number] = counts.get(b.number, 0) + 1
+        return counts[b.number] >= b.hits
+
+    def _holds(self, number: int, condition: str, halted: Halted) -> bool:
+        """True also of a condition that cannot be evaluated: the output says why."""
+        try:
+            return bool(halted.evaluate(condition, halted.calls[0] if halted.calls else None))
+        except PlcError as error:
+            self.output(f"Breakpoint {number}: {error}")
+            return True
 
     def _is_hit(self, b: Breakpoint, halted: Halted) -> bool:
         call = halted.calls[0] if halted.calls else None
@@ -389,7 +460,8 @@ class Debugger:
         return [b for b in self.statements.beginnings if begin <= b < end] or self.statements.beginnings
 
     def _set_temporary(self, offsets: AbstractSet[int], status: BpStatus) -> None:
-        if len(offsets) + status.breakpoints > status.traps:
+        used = status.breakpoints + len(self._watches.traps - offsets)
+        if len(offsets) + used > status.traps:
             raise DeviceError(
                 f"This step may lead to {len(offsets)} places, and the controller has room for {status.traps}; "
                 "set a breakpoint and go on instead.",
@@ -404,7 +476,7 @@ class Debugger:
             return
         status = self._target.status()
         every = self.statements.stops
-        most = status.traps - status.breakpoints
+        most = status.traps - status.breakpoints - len(self._watches.traps - every)
         self._set_temporary(every if len(every) <= most else set(self.statements.beginnings), status)
         self._asked = "pause"
         with suppress(DeviceError):  # it has halted meanwhile

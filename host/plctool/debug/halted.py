@@ -149,6 +149,19 @@ class Halted:
                 return walk(root, first + text[len(first) :], len(first), self._units)
         return self._table.resolve(text)
 
+    def in_area(self, path: str, call: Call | None) -> Symbol:
+        """What a name means in a call, as a variable that stays when the call returns. Raises UsageError."""
+        return self.symbol_in_area(self.resolve(path, call))
+
+    def symbol_in_area(self, symbol: Symbol) -> Symbol:
+        """The same for a variable that was resolved: pointers that begin on the stack are followed."""
+        found = self._found(symbol)
+        if found is None:
+            raise UsageError(f"{symbol.name} cannot be reached: a pointer leads to no variable.", "no-target")
+        if found.area == STACK:
+            raise UsageError(f"{symbol.name} is a variable of a call, which ends with it.", "on-stack")
+        return found
+
     def read(self, symbols: Sequence[Symbol]) -> list[bytes | None]:
         """Their bytes; None where a pointer leads to no variable."""
         found = [self._found(symbol) for symbol in symbols]

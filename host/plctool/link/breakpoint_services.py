@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 from plctool.core import lib
 from plctool.debug.breakpoints import DeviceCondition
+from plctool.debug.forced import ForcedPlace
 from plctool.debug.halted import BpStatus
 from plctool.errors import DeviceError
 from plctool.link import bintag, l7
@@ -89,6 +90,10 @@ def status(session: Session) -> BpStatus:
 
 def set_breakpoint(session: Session, offset: int, skip: int, condition: DeviceCondition | None) -> None:
     """Sets one, in place of the one at its offset."""
+    _do(session, lib.SRV_BP_SET, "breakpoint", _record(offset, skip, condition))
+
+
+def _record(offset: int, skip: int, condition: DeviceCondition | None) -> bintag.Tag:
     place = condition.place if condition else None
     hops = place.hops if place else ()
     content = _RECORD.pack(
@@ -104,7 +109,7 @@ def set_breakpoint(session: Session, offset: int, skip: int, condition: DeviceCo
         offset=_OFFSETS.pack(*([place.offset if place else 0, *hops] + [0] * 4)[:4]),
         value=int.from_bytes(place.value if place else b"", "little"),
     )
-    _do(session, lib.SRV_BP_SET, "breakpoint", bintag.raw(lib.TAG_BP_RECORD, content))
+    return bintag.raw(lib.TAG_BP_RECORD, content)
 
 
 def clear_breakpoint(session: Session, offset: int) -> None:
@@ -125,11 +130,32 @@ def read_hits(session: Session) -> dict[int, int]:
 
 def set_temporary(session: Session, offsets: Sequence[int]) -> None:
     """The temporary traps from now on."""
+    for at, tag in _parts(session, offsets):
+        _do(session, lib.SRV_BP_TEMPORARY, "step", tag, bintag.u32(lib.TAG_BP_MORE, int(at > 0)))
+
+
+def _parts(session: Session, offsets: Sequence[int]) -> Iterator[tuple[int, bintag.Tag]]:
+    """As many as fit into a message, and the index of the first."""
     most = (session.connection.buffer_size - _OVERHEAD) // 4
     for at in range(0, len(offsets), most):
         part = offsets[at : at + most]
-        tags = [bintag.raw(lib.TAG_BP_OFFSETS, struct.pack(f"<{len(part)}I", *part))]
-        _do(session, lib.SRV_BP_TEMPORARY, "step", *tags, bintag.u32(lib.TAG_BP_MORE, int(at > 0)))
+        yield at, bintag.raw(lib.TAG_BP_OFFSETS, struct.pack(f"<{len(part)}I", *part))
+
+
+def watch(session: Session, places: Sequence[ForcedPlace], offsets: Sequence[int]) -> None:
+    """The variables that are compared from now on, and where. Raises DeviceError for firmware that does not."""
+    more = bintag.u32(lib.TAG_BP_MORE, 1)
+    try:
+        _do(session, lib.SRV_BP_WATCH, "data breakpoint", bintag.u32(lib.TAG_BP_MORE, 0))
+    except DeviceError:
+        if places:
+            raise
+        return  # firmware without them has none to end
+    for place in places:
+        record = _record(0, 0, DeviceCondition(place, lib.BP_ALWAYS, 0))
+        _do(session, lib.SRV_BP_WATCH, "data breakpoint", record, more)
+    for _, tag in _parts(session, offsets):
+        _do(session, lib.SRV_BP_WATCH, "data breakpoint", tag, more)
 
 
 def go(session: Session, how: int, serial: int) -> None:

@@ -30,6 +30,7 @@ _SLICE = 0.1  # seconds that the program runs between two looks for Ctrl-C
 
 HELP = """\
 b [FILE:]LINE [if EXPRESSION] [hits N] [log TEXT]  halt at a line; log writes TEXT with {EXPRESSION} instead
+v NAME [if EXPRESSION] [hits N]  halt when a variable has changed
 d N | d all      end a breakpoint
 i                list the breakpoints
 c [SECONDS]      go on until a halt, or so long; Ctrl-C pauses
@@ -170,6 +171,18 @@ class Terminal:
         made = self._debugger.set(file, line, condition=given.get("if", ""), hits=int(hits), log=given.get("log", ""))
         say(f"breakpoint {made.number}: {Path(made.file).name}:{made.line}")
 
+    def _watch(self, text: str) -> None:
+        name, *options = _OPTIONS.split(text)
+        given = dict(zip(options[::2], options[1::2], strict=True))
+        hits = given.get("hits", "1")
+        if not name or not hits.isdigit() or "log" in given:
+            raise UsageError("Write for example: v Main.speed if Main.speed > 5 hits 2", "usage")
+        halt = self._debugger.halt
+        call = halt.calls[self._call] if halt and halt.calls else None
+        symbol = halt.halted.in_area(name, call) if halt else self._debugger.table.resolve(name)
+        made = self._debugger.watch(symbol, condition=given.get("if", ""), hits=int(hits))
+        say(f"breakpoint {made.number}: {made.name}, compared before {self._debugger.granularity}")
+
     def _delete(self, text: str) -> None:
         if text == "all":
             self._debugger.clear_all()
@@ -182,6 +195,9 @@ class Terminal:
         for b, hits in self._debugger.list():
             options = [f"if {b.condition}"] * bool(b.condition) + [f"log {b.log}"] * bool(b.log)
             say(" ".join([f"{b.number}: {Path(b.file).name}:{b.line}", *options, f"({hits} hits)"]))
+        for watch, changes in self._debugger.watched():
+            options = [f"if {watch.condition}"] * bool(watch.condition)
+            say(" ".join([f"{watch.number}: {watch.name}", *options, f"({changes} changes)"]))
 
     # ---- going on ----
 
@@ -306,6 +322,7 @@ def _source_line(file: str, line: int) -> str:
 
 _COMMANDS: dict[str, Callable[[Terminal, str], None]] = {
     "b": Terminal._break,
+    "v": Terminal._watch,
     "d": Terminal._delete,
     "i": Terminal._list,
     "c": Terminal._continue,
