@@ -287,6 +287,24 @@ bool AppBpGet(RTS_UI32 index, BP_BREAKPOINT *breakpoint)
     return true;
 }
 
+void AppBpClearWatches(void)
+{
+    fakes.bp.watches = fakes.bp.watch_traps = 0;
+}
+
+RTS_RESULT AppBpAddWatch(const APP_PLACE *place)
+{
+    fakes.bp.watch = *place;
+    fakes.bp.watches++;
+    return fakes.bp.result;
+}
+
+RTS_RESULT AppBpAddWatchTrap(RTS_UI32 offset)
+{
+    fakes.bp.watch_traps += offset;
+    return fakes.bp.result;
+}
+
 void AppBpClearTemporary(void)
 {
     fakes.bp.temporary_count = 0;

@@ -78,6 +78,8 @@ typedef struct {
         RTS_UI32 count;
         RTS_UI32 temporary[64];
         RTS_UI32 temporary_count;
+        APP_PLACE watch;
+        RTS_UI32 watches, watch_traps;
         RTS_UI32 how, gone_on, paused, attached, kept, detached, alive, cleared;
         RTS_UI8 stack[64];
     } bp;

@@ -109,6 +109,30 @@ static void temporary_traps_replace_those_of_before_unless_more_come(void)
     CHECK_EQUAL(call(SRV_BP_TEMPORARY), ERR_SIZE_MISMATCH);
 }
 
+static void variables_to_compare_arrive_with_or_without_their_traps(void)
+{
+    BP_RECORD record = {{0}, {0}, {0}, 0, 0, {0}, 1, 1, 4, 0xFF, {8, 0, 0, 0, 12}, {0}};
+
+    setup();
+    begin();
+    BTagWrite(&writer, TAG_BP_RECORD, BTAG_ALIGN_0, &record, sizeof record);
+    CHECK_EQUAL(call(SRV_BP_WATCH), ERR_OK);
+    CHECK_EQUAL(fakes.bp.watches, 1);
+    CHECK_EQUAL(fakes.bp.watch.offset[1], 12);
+    CHECK_EQUAL(fakes.bp.watch_traps, 0);
+    begin();
+    BTagWrite(&writer, TAG_BP_OFFSETS, BTAG_ALIGN_0, "\x01\0\0\0\x02\0\0\0", 8);
+    BTagWrite32(&writer, TAG_BP_MORE, 1);
+    CHECK_EQUAL(call(SRV_BP_WATCH), ERR_OK);
+    CHECK_EQUAL(fakes.bp.watches, 1);
+    CHECK_EQUAL(fakes.bp.watch_traps, 3);
+    record.pointers = PLACE_POINTERS + 1;
+    begin();
+    BTagWrite(&writer, TAG_BP_RECORD, BTAG_ALIGN_0, &record, sizeof record);
+    CHECK_EQUAL(call(SRV_BP_WATCH), ERR_PARAMETER);
+    CHECK_EQUAL(fakes.bp.watches + fakes.bp.watch_traps, 0);
+}
+
 static RTS_UI32 go(RTS_UI32 how, RTS_UI32 serial)
 {
     begin();
@@ -184,6 +208,7 @@ int main(void)
     RUN(a_breakpoint_arrives_with_its_condition);
     RUN(a_bad_breakpoint_is_refused);
     RUN(temporary_traps_replace_those_of_before_unless_more_come);
+    RUN(variables_to_compare_arrive_with_or_without_their_traps);
     RUN(a_request_to_go_on_is_for_one_halt);
     RUN(the_stack_is_read_and_written_within_its_bounds);
     RUN(one_breakpoint_is_cleared_or_all);

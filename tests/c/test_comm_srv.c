@@ -186,6 +186,7 @@ static void changing_services_need_a_login(void)
         {SG_APPLICATION_BP, SRV_BP_WRITE_STACK},
         {SG_APPLICATION_BP, SRV_BP_READ_STACK},
         {SG_APPLICATION_BP, SRV_BP_TEMPORARY},
+        {SG_APPLICATION_BP, SRV_BP_WATCH},
 #endif
     };
     static const RTS_UI32 sessions[] = {0, 1, L7_SESSION_INITIAL, 0x80000000, 0xFFFFFFFF};
