@@ -554,7 +554,7 @@ def test_a_list_of_globals_has_the_name_in_the_file_of_twincat(tmp_path: Path) -
         assert plc.read("Main.n") == 5
 
 
-@pytest.mark.parametrize("tag", ["NWL", "SFC"])
+@pytest.mark.parametrize("tag", ["LD", "SFC"])
 def test_a_diagram_of_twincat_says_how_it_can_be_read(tmp_path: Path, tag: str) -> None:
     path = tmp_path / "A.TcPOU"
     path.write_text(MAIN.replace("<ST>", f"<{tag}>").replace("</ST>", f"</{tag}>"))

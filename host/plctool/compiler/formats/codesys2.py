@@ -1,7 +1,8 @@
 """Exports of CODESYS 2.3 and TwinCAT 2 (.EXP): units in Structured Text, and sections that describe the project.
 
-Tasks become a CONFIGURATION and the names in the hardware configuration become globals at their addresses. Libraries,
-visualisations and settings of the editor are left out and named. A body in another language is refused by name.
+LD and FBD become statements. Tasks become a CONFIGURATION and the names in the hardware configuration become globals at
+their addresses. Libraries, visualisations and settings of the editor are left out and named. A body in another language
+is refused by name.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -10,10 +11,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 
 from plctool.compiler.base.source import Source
 from plctool.compiler.formats import il_files
+from plctool.compiler.formats.codesys2_networks import Line, read_networks
+from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
+from plctool.compiler.formats.plcopen_result_types import parameters, parameters_of, written_type
 from plctool.compiler.formats.text import Findings, Part, Place, Text
+from plctool.compiler.formats.tree_bodies import translate_networks, types_of, units_of
+from plctool.compiler.formats.twincat import REFUSED
+from plctool.compiler.syntax import ast
 
 _BLOCK_IN_ONE_WORD = "FUNCTIONBLOCK"  # in exports of some systems made from CODESYS 2.3
 _ENDS = {
@@ -26,6 +34,10 @@ _SECTIONS = frozenset(("LIBRARY", "VISUALISATION", "PLC_CONFIGURATION", "RESOURC
 _TASKS = frozenset(("RESOURCE", "TASK", "TASK_CONFIGURATION"))
 
 _WORD = re.compile(r"\s*(\w+)[ \t]*(\w*)")
+_BODY_END = re.compile(r"^[ \t]*(?:END_)?ACTION\b", re.MULTILINE | re.IGNORECASE)
+_ACTION = re.compile(r"\bACTION[ \t]+(\w+)[ \t]*:?", re.IGNORECASE)
+_DECLARED = re.compile(r"\(\*\s*@END_DECLARATION")
+_NETWORKS = frozenset(("LD", "FBD"))
 _OUTSIDE = re.compile(r"\(\*|'(?:\$.|[^'$\n])*'|\"(?:\$.|[^\"$\n])*\"")
 _INSIDE = re.compile(r"\(\*|\*\)")
 _NESTED = re.compile(r"\(\*\s*@NESTEDCOMMENTS\s*:=\s*'(\w+)'\s*\*\)", re.IGNORECASE)
@@ -65,6 +77,7 @@ class _Export:
         self._text = text
         self._edits: list[_Edit] = []
         self._findings = Findings()
+        self._next_id = 1  # of networks, so that no two need variables of the same name
         self._masked, self._plain = self._without_comments()
 
     def source(self) -> Source:
@@ -178,20 +191,87 @@ class _Export:
         return [f"{span.kind} {span.name}".strip() if span.kind == "VISUALISATION" else span.kind]
 
     def _other_language(self, span: _Span) -> None:
-        """Refuses a body that is a diagram, and translates one that is a list of instructions."""
-        match = _DIAGRAM.search(self._masked, span.start, span.end)
-        if match is not None:
-            self._refuse(span, match.start(), match.start(1) - 1, match[1])
+        """Translates bodies that are networks or lists of instructions, and refuses other diagrams."""
+        at, drawn = span.start, False
+        while (match := _DIAGRAM.search(self._masked, at, span.end)) is not None:
+            at, drawn = self._body_end(span, match.end()), True
+            if match[1] in _NETWORKS:
+                self._networks(span, match, at)
+            else:
+                self._findings.refuse(self._place(match.start(1) - 1), span.name or span.kind, match[1])
+                self._edits.append((match.start(), at, "\n"))
+        if drawn:
             return
         for start, end in il_files.bodies(self._plain, span.start, span.end):
             made = il_files.statements(self._text, self._plain, (start, end), self._place(start), self._findings)
             self._edits.append((start, end, made))
 
-    def _refuse(self, span: _Span, start: int, at: int, language: str) -> None:
-        """Leaves out a body that begins at `start`."""
-        self._findings.refuse(self._place(at), span.name or span.kind, language)
-        end = span.end - len(_ENDS[span.kind])
-        self._edits.append((start, max(start, end), "\n"))
+    def _body_end(self, span: _Span, at: int) -> int:
+        """Where a body ends: before the next action, or the end of its own."""
+        end = max(at, span.end - len(_ENDS[span.kind]))
+        following = _BODY_END.search(self._masked, at, end)
+        return end if following is None else following.start()
+
+    # ---- networks ----
+
+    def _networks(self, span: _Span, match: re.Match[str], end: int) -> None:
+        """Writes LD or FBD as statements; a finding if they have no translation."""
+        action = next(reversed(list(_ACTION.finditer(self._masked, span.start, match.start()))), None)
+        name = span.name if action is None else f"{span.name}.{action[1]}"
+        made, start = Body(), match.start()
+        try:
+            body = read_networks(match[1], self._lines(match.end(), end), self._parameters, first=self._next_id)
+            self._next_id = body.next_id
+            keeps = span.kind in ("PROGRAM", "FUNCTION_BLOCK", _BLOCK_IN_ONE_WORD)
+            unit = Unit(name, keeps, self._types | types_of(self._declarations(span)), dict(self._outputs))
+            translate_networks(body.body, unit, made)
+        except NotTranslatedError as error:
+            self._findings.add(error.at, "language", REFUSED.format(name, error), error.needs)
+            made = Body()
+        self._edits.append((start, end, [("\n", self._place(start)), *made.parts]))
+        if made.variables:
+            declared = _DECLARED.search(self._text, span.start, start)
+            at = start if declared is None else declared.start()
+            lines = [(f"VAR {n} : {spec}; END_VAR\n", place) for n, (spec, place) in made.variables.items()]
+            self._edits.append((at, at, [*lines]))
+
+    def _lines(self, start: int, end: int) -> list[Line]:
+        first = self._place(start)
+        found = []
+        for number, whole in enumerate(self._plain[start:end].split("\n")):
+            column = len(whole) - len(whole.lstrip()) + (first.column if number == 0 else 1)
+            found.append(Line(whole.strip(), Place(first.line + number, column)))
+        return found
+
+    def _declarations(self, span: _Span) -> list[ast.PouDecl]:
+        """The unit of a span, as far as it is declared."""
+        declared = _DECLARED.search(self._text, span.start, span.end) or _DIAGRAM.search(
+            self._masked, span.start, span.end
+        )
+        end = span.end if declared is None else declared.start()
+        return units_of(f"{self._plain[span.start : end]}\n{_ENDS[span.kind]}")
+
+    @cached_property
+    def _units(self) -> dict[str, ast.PouDecl]:
+        """All units of the file, by case-folded name."""
+        spans = [span for span in self._spans() if span.kind in ("PROGRAM", "FUNCTION_BLOCK", "FUNCTION")]
+        return {unit.name.casefold(): unit for span in spans for unit in self._declarations(span)}
+
+    @cached_property
+    def _types(self) -> dict[str, str]:
+        """Types of the global variables of the file."""
+        spans = [span for span in self._spans() if span.kind == "VAR_GLOBAL"]
+        inside = "\n".join(self._plain[s.start : s.end].replace("VAR_GLOBAL", "VAR", 1) for s in spans)
+        return types_of(units_of(f"PROGRAM _\n{inside}\nEND_PROGRAM")) if spans else {}
+
+    @cached_property
+    def _outputs(self) -> dict[str, dict[str, str]]:
+        """Types of the outputs of all units, by case-folded name."""
+        return {name: types_of([unit]) | {"": written_type(unit.result)} for name, unit in self._units.items()}
+
+    def _parameters(self, kind: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        unit = self._units.get(kind.casefold())
+        return parameters(kind) if unit is None else parameters_of(unit)
 
     # ---- what sections become ----
 

@@ -45,7 +45,7 @@ _TRIGGERS = {"rising": "R_TRIG", "falling": "F_TRIG"}
 
 class Network:
     """The networks of one body. `inline`: they are one expression, so nothing in them may need a statement. `free`: it
-    is a CFC."""
+    is a CFC. A block that is computed="here" is computed in its turn, even if nothing reads it."""
 
     def __init__(self, element: Element, unit: Unit, body: Body, *, inline: bool = False, free: bool = False) -> None:
         self._inline = inline
@@ -122,7 +122,7 @@ class Network:
     def _execute(self, element: Element) -> None:
         self._now = self._number(element) if self._free else 0
         if element.tag == "block":
-            self._called(element)
+            self._called(element, wanted=element.get("computed") == "here")
         elif element.tag == "return":
             self._body.line(f"IF {self._power(element)} THEN RETURN; END_IF;", element.at)
         elif element.tag in _WAYS:
@@ -269,8 +269,13 @@ class Network:
             self._call_function(block, key)
         self._busy.discard(key)
         self._now = before
+        enable = "" if _instance(block) else self._done.get(f"{key}.EN", "")
         for output, target in named:
-            self._body.line(f"{target} := {self._output(block, output.get('formalParameter'))};", output.at)
+            value = self._output(block, output.get("formalParameter"))
+            when = enable if output.get("formalParameter").upper() != "ENO" else ""
+            self._body.line(
+                f"IF {when} THEN {target} := {value}; END_IF;" if when else f"{target} := {value};", output.at
+            )
 
     def _is_kept(self, block: Element) -> bool:
         """Whether the result of a function is there in the next cycle. Notes that it is needed then."""

@@ -25,6 +25,7 @@ _LOGIC = frozenset(("AND", "OR", "XOR"))
 _ARITHMETIC = frozenset(("ADD", "SUB", "MUL", "DIV", "MOD"))
 _CHOOSERS = frozenset(("SEL", "MUX"))  # the first input says which of the others
 _OF_ALL = _LOGIC | _ARITHMETIC | _CHOOSERS | {"MAX", "MIN", "LIMIT"}
+_OPERATORS = COMPARISONS | _OF_FIRST | _OF_ALL
 _PATH = re.compile(r"\w+(?:\[[^\[\]]*\])?(?:\.\w+(?:\[[^\[\]]*\])?)*")
 _PART = re.compile(r"(\w+)(\[[^\[\]]*\])?(?:\.|$)")
 _ARRAY = re.compile(r"ARRAY\[[^\[\]]*\] OF (.*)")
@@ -56,7 +57,9 @@ class ResultTypes:
         self._busy: list[Element] = []
 
     def of_function(self, block: Element, depth: int = 0) -> str:
-        """The type of the result of a function of the standard library."""
+        """The type of the result of a function of the standard library, or as the file says it."""
+        if block.get("resultType"):
+            return block.get("resultType")
         name = without_library(block.get("typeName")).upper()
         if name in COMPARISONS:
             return "BOOL"
@@ -166,7 +169,7 @@ class ResultTypes:
         if element.tag in ("contact", "coil", "leftPowerRail"):
             return "BOOL"
         if element.tag in ("inVariable", "inOutVariable"):
-            return self._of_expression((element.child("expression") or element).text)
+            return self._of_expression((element.child("expression") or element).text) or element.get("type")
         if element.tag == "connector":
             return self._of_input(element, depth + 1) if depth <= 100 else ""
         if element.tag != "block":
@@ -237,6 +240,11 @@ def _common(name: str, types: list[Elementary]) -> Elementary | None:
     return result
 
 
+def is_operator(name: str) -> bool:
+    """True if a function is one whose types follow from its arguments."""
+    return name.upper() in _OPERATORS or _CONVERSION.fullmatch(name.upper()) is not None
+
+
 @cache
 def declared(name: str) -> dict[str, str]:
     """The types of inputs and outputs of a unit of the standard library, by case-folded name, and of its result: ""."""
@@ -248,6 +256,31 @@ def declared(name: str) -> dict[str, str]:
                     found |= {n.casefold(): _written(d.type) for d in block.decls for _, n in d.names}
             found[""] = _written(unit.result)
     return found
+
+
+@cache
+def parameters(name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The names of inputs and outputs of a unit of the standard library, in order; () if it has none."""
+    for unit in standard_library().parse(without_library(name).casefold(), Diagnostics()):
+        if isinstance(unit, ast.PouDecl):
+            return parameters_of(unit)
+    return (), ()
+
+
+def parameters_of(unit: ast.PouDecl) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The names of inputs and outputs of a unit, in order."""
+    kinds = (ast.Section.VAR_INPUT, ast.Section.VAR_IN_OUT), (ast.Section.VAR_OUTPUT,)
+    inputs, outputs = (
+        tuple(n for b in unit.blocks if b.keyword in kind for d in b.decls for _, n in d.names) for kind in kinds
+    )
+    return inputs, outputs
+
+
+def written_type(spec: ast.TypeSpec | None) -> str:
+    """A type as networks need it; "" for what they do not use."""
+    if isinstance(spec, ast.ArraySpec):
+        return f"ARRAY[] OF {written_type(spec.element)}"
+    return _written(spec)
 
 
 def _written(spec: ast.TypeSpec | None) -> str:

@@ -8,15 +8,19 @@ from __future__ import annotations
 import re
 
 from plctool.compiler.base.source import Source
+from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
 from plctool.compiler.formats.text import Findings, Text
+from plctool.compiler.formats.tree_bodies import Types, translate_networks, types_of, units_of
+from plctool.compiler.formats.twincat_networks import read_networks
 from plctool.compiler.formats.units import unit_keyword
 from plctool.compiler.formats.xml_tree import Element, XmlError, read_xml
 from plctool.iec.tasks import LOWEST_PRIORITY
 
 _TEXT = frozenset(("ST", "STNonEdit"))
 _MEMBERS = {"Method": "METHOD", "Property": "PROPERTY", "Action": "ACTION"}
-_DRAWN = {"NWL": "LD, FBD or IL", "SFC": "SFC", "LD": "LD", "FBD": "FBD"}
+_DRAWN = frozenset(("SFC", "LD", "FBD"))
 _EXPORT = "export the project as PLCopen XML, of which SFC, LD and FBD are read"
+REFUSED = "the diagram {} cannot be compiled: {}"
 
 
 def read_object(path: str, text: str) -> Source:
@@ -36,6 +40,8 @@ class _Object:
     def __init__(self, text: Text, findings: Findings) -> None:
         self._text = text
         self._findings = findings
+        self._types: Types = {}  # of the variables of the unit
+        self._next_id = 1  # of its networks, so that no two need variables of the same name
 
     def read(self, part: Element) -> None:
         if part.tag == "Task":
@@ -47,25 +53,34 @@ class _Object:
         declaration = part.child("Declaration")
         if declaration is None:
             return
+        keyword = unit_keyword("".join(chunk.text for chunk in declaration.chunks))
+        drawn_inside = next(part.every("NWL"), None) is not None
+        text = "".join(chunk.text for chunk in declaration.chunks)
+        self._types = types_of(units_of(f"{text}\nEND_{keyword}")) if drawn_inside else {}
+        keeps = keyword in ("FUNCTION_BLOCK", "PROGRAM")
+        body = self._networks(part, part.get("Name"), self._types, keeps=keeps)
+        actions = {
+            id(action): self._networks(action, f"{part.get('Name')}.{action.get('Name')}", self._types, keeps=keeps)
+            for action in part.all("Action")
+        }
         self._text.copied(declaration.chunks)
         self._text.made("\n", part.at)
-        self._body(part, part.get("Name"))
+        for drawn in (body, *actions.values()):
+            drawn.write_variables(self._text)
+        self._body(part, part.get("Name"), body)
         for member in part.all(*_MEMBERS):
-            self._member(member, part.get("Name"))
+            self._member(member, part.get("Name"), actions.get(id(member)))
         if part.tag in ("POU", "Itf"):
-            keyword = unit_keyword("".join(chunk.text for chunk in declaration.chunks))
             self._text.made(f"\nEND_{keyword}\n", part.at)
 
-    def _member(self, member: Element, owner: str) -> None:
+    def _member(self, member: Element, owner: str, action: Body | None) -> None:
         keyword, name = _MEMBERS[member.tag], f"{owner}.{member.get('Name')}"
-        declaration = member.child("Declaration")
         self._text.made("\n", member.at)
-        if member.tag == "Action":
+        if action is not None:
             self._text.made(f"ACTION {member.get('Name')}:\n", member.at)
-        elif declaration is not None:
-            self._text.copied(declaration.chunks)
-            self._text.made("\n", member.at)
-        self._body(member, name)
+            self._body(member, name, action)
+        else:
+            self._declared_body(member, name)
         for accessor in member.all("Get", "Set"):
             self._accessor(accessor, f"{name}.{accessor.tag}")
         self._text.made(f"\nEND_{keyword}\n", member.at)
@@ -73,20 +88,43 @@ class _Object:
     def _accessor(self, accessor: Element, name: str) -> None:
         keyword = accessor.tag.upper()
         self._text.made(f"{keyword}\n", accessor.at)
-        declaration = accessor.child("Declaration")
-        if declaration is not None:
-            self._text.copied(declaration.chunks)
-            self._text.made("\n", accessor.at)
-        self._body(accessor, name)
+        self._declared_body(accessor, name)
         self._text.made(f"\nEND_{keyword}\n", accessor.at)
 
-    def _body(self, part: Element, name: str) -> None:
+    def _declared_body(self, part: Element, name: str) -> None:
+        """Declaration and body of a method, property or accessor."""
+        declaration = part.child("Declaration")
+        chunks = [] if declaration is None else declaration.chunks
+        text = "".join(chunk.text for chunk in chunks)
+        own = types_of(units_of(_inside(text))) if next(part.every("NWL"), None) is not None else {}
+        body = self._networks(part, name, self._types | own, keeps=False)
+        if declaration is not None:
+            self._text.copied(chunks)
+            self._text.made("\n", part.at)
+        body.write_variables(self._text)
+        self._body(part, name, body)
+
+    def _networks(self, part: Element, name: str, types: Types, *, keeps: bool) -> Body:
+        """The statements of LD and FBD; none, and a finding, if they have no translation."""
+        made = Body()
+        for archive in [nwl for implementation in part.all("Implementation") for nwl in implementation.all("NWL")]:
+            try:
+                elements = read_networks(archive, first=self._next_id)
+                self._next_id = elements.next_id
+                translate_networks(elements.body, Unit(name, keeps, types, {}), made)
+            except NotTranslatedError as error:
+                self._findings.add(error.at, "language", REFUSED.format(name, error), error.needs)
+                return Body()
+        return made
+
+    def _body(self, part: Element, name: str, drawn: Body) -> None:
+        drawn.write(self._text)
         for implementation in part.all("Implementation"):
             for body in implementation.children:
                 if body.tag in _TEXT:
                     self._text.copied(body.chunks)
                 elif body.tag in _DRAWN:
-                    self._findings.refuse(body.at, name, _DRAWN[body.tag], _EXPORT)
+                    self._findings.refuse(body.at, name, body.tag, _EXPORT)
                 elif body.tag in ("CFC", "UML", "IL"):
                     self._findings.refuse(body.at, name, body.tag)
 
@@ -107,6 +145,12 @@ class _Object:
         for call in programs:
             self._text.made(f"PROGRAM {call.text} WITH {name} : {call.text};\n", call.at)
         self._text.made("END_CONFIGURATION\n", task.at)
+
+
+def _inside(declaration: str) -> str:
+    """The declaration of a method or accessor as that of a function, for its variables."""
+    blocks = declaration[declaration.upper().find("VAR") :] if "VAR" in declaration.upper() else ""
+    return f"FUNCTION _\n{blocks}\nEND_FUNCTION"
 
 
 def identifier(name: str) -> str:
