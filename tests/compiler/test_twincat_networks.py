@@ -167,6 +167,22 @@ def test_a_method_with_en_is_called_by_name(tmp_path: Path) -> None:
         assert plc.read("Main.n") == 8
 
 
+def test_functions_without_a_known_type_are_called(tmp_path: Path) -> None:
+    (tmp_path / "Note.st").write_text(
+        "VAR_GLOBAL seen : INT; END_VAR\nFUNCTION Note : INT\nVAR_INPUT x : INT; END_VAR\nseen := seen + x;\n"
+        "Note := x;\nEND_FUNCTION\nFUNCTION Plain\nVAR_INPUT x : INT; END_VAR\nseen := seen + x;\nEND_FUNCTION\n"
+    )
+    alone = item(box("Note", {"x": given("1")}, {":": ""}, call="Function"))
+    enabling = assign(item(box("Note", {"x": given("10")}, {"ENO:BOOL": "", ":": ""}, call="Function")), ("o", 0))
+    plain = item(box("Plain", {"x": given("100")}, call="Function"))
+    path = tmp_path / "Main.TcPOU"
+    path.write_text(unit("PROGRAM Main\nVAR o : BOOL; END_VAR", archive(network(alone, enabling, plain))))
+    built = compile_sources([tmp_path])
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        assert (plc.read("seen"), plc.read("Main.o")) == (111, True)
+
+
 @pytest.mark.parametrize(
     ("items", "message"),
     [

@@ -1,4 +1,4 @@
-"""Networks of LD, FBD and CFC as SVG: values flow from left to right, networks stand below each other.
+"""Diagrams as SVG. Networks of LD, FBD and CFC: values flow from left to right, networks stand below each other.
 
 The places in the file are not used: exports of CODESYS and TwinCAT have none.
 
@@ -13,7 +13,10 @@ from html import escape
 
 from plctool.compiler.formats.plcopen_graph import RAILS, networks
 from plctool.compiler.formats.xml_tree import Element
+from plctool.doc.chart import ChartPicture
 from plctool.doc.diagram import text_at, width_of
+from plctool.doc.drawn import ChartBody, Diagram
+from plctool.doc.monitor import Monitor
 from plctool.errors import UsageError
 
 _ROW = 20  # pixels
@@ -28,10 +31,12 @@ _LETTERS = {"set": "S", "reset": "R", "rising": "P", "falling": "N"}
 
 @dataclass
 class _Pin:
-    """An input or output: its name, whether it is negated, and what it is connected to: local id and output."""
+    """An input or output: its name, whether it is negated, the variable to which an output goes, and what an input is
+    connected to: local id and output."""
 
     name: str
     negated: bool
+    target: str = ""
     sources: list[tuple[str, str]] = field(default_factory=list)
 
 
@@ -75,6 +80,11 @@ class _Node:
         return max(width_of(self.text), _SYMBOL)
 
     @property
+    def after(self) -> float:
+        """The width of the variables to which its outputs go."""
+        return max((width_of(pin.target) + 10 for pin in self.outputs if pin.target), default=0)
+
+    @property
     def height(self) -> float:
         rows = max(len(self.inputs), len(self.outputs)) + 2 if self.is_block else 2
         return rows * _ROW
@@ -84,26 +94,33 @@ class _Node:
         return self.y + (row + 2.5 if self.is_block else 1.5) * _ROW
 
 
-def picture(name: str, body: Element) -> str:
-    """Returns the diagram of a body. `name`: the label of the picture for screen readers. Raises UsageError if it is
-    nested too deeply."""
+def picture(name: str, diagram: Diagram, monitor: Monitor | None = None) -> str:
+    """Returns the picture of a diagram. `name`: its label for screen readers. `monitor`: the values that it shows.
+    Raises UsageError if it is nested too deeply."""
     try:
-        return _picture(name, body)
+        return _picture(name, diagram.body, monitor or Monitor())
     except RecursionError:
         raise UsageError(f"{name} is nested too deeply to be drawn; cut it into networks.", "no-diagram") from None
 
 
-def _picture(name: str, body: Element) -> str:
+def _picture(name: str, body: Element | ChartBody, monitor: Monitor) -> str:
+    if isinstance(body, ChartBody):
+        chart = ChartPicture(body, monitor)
+        return _svg(name, list(chart.parts()), chart.width, chart.height)
     parts: list[str] = []
     top = width = 10.0
     for network in networks([e for e in body.children if e.get("localId")]):
-        drawing = _Network(network, top)
+        drawing = _Network(network, top, monitor)
         if drawing.nodes:
             parts += drawing.parts()
             top, width = drawing.bottom + _BELOW, max(width, drawing.right)
+    return _svg(name, parts, width, top)
+
+
+def _svg(name: str, parts: list[str], width: float, height: float) -> str:
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="diagram" width="{width + 20:.0f}" height="{top:.0f}" '
-        f'viewBox="0 0 {width + 20:.0f} {top:.0f}" role="img" aria-label="{escape(name, quote=True)}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="diagram" width="{width + 20:.0f}" height="{height:.0f}" '
+        f'viewBox="0 0 {width + 20:.0f} {height:.0f}" role="img" aria-label="{escape(name, quote=True)}" '
         'font-family="monospace" font-size="12" fill="currentColor" stroke="none">'
     )
     return "\n".join([head, *parts, "</svg>\n"])
@@ -122,13 +139,16 @@ def _variables(block: Element, which: str) -> list[Element]:
 
 def _pin(element: Element) -> _Pin:
     connections = [(c.get("refLocalId"), c.get("formalParameter")) for c in element.every("connection")]
-    return _Pin(element.get("formalParameter"), element.get("negated") == "true", connections)
+    written = element.child("connectionPointOut", "expression")
+    target = "" if written is None else written.text
+    return _Pin(element.get("formalParameter"), element.get("negated") == "true", target, connections)
 
 
 class _Network:
     """The drawing of one network below `top`."""
 
-    def __init__(self, elements: list[Element], top: float) -> None:
+    def __init__(self, elements: list[Element], top: float, monitor: Monitor) -> None:
+        self._monitor = monitor
         self.nodes = {e.get("localId"): _node(e) for e in elements if e.tag in _DRAWN}
         self._rails = {e.get("localId") for e in elements if e.tag in RAILS}
         self._top = top
@@ -150,7 +170,7 @@ class _Network:
     @property
     def right(self) -> float:
         """Where it ends."""
-        return max(node.x + node.width for node in self.nodes.values())
+        return max(node.x + node.width + node.after for node in self.nodes.values())
 
     def _sources(self, node: _Node) -> list[_Node]:
         return [self.nodes[key] for pin in node.inputs for key, _ in pin.sources if key in self.nodes]
@@ -196,8 +216,25 @@ class _Network:
             for row, pin in enumerate(node.inputs):
                 yield from self._lines(node, row, pin)
             yield from _drawn(node)
+            yield from self._values(node)
         if any(self._from_rail(node) for node in self.nodes.values()):
             yield f'<path d="M{_RAIL} {self._top:.0f}V{self.bottom:.0f}" stroke="currentColor" stroke-width="3"/>'
+
+    def _values(self, node: _Node) -> Iterator[str]:
+        """The values of an element, or of the pins of a block."""
+        local_id = node.element.get("localId")
+        if not node.is_block:
+            yield from self._value(local_id, "", node.x + node.width / 2, node.pin_y(0) + 20, "middle")
+            return
+        for side, x, anchor in ((node.inputs, node.x - 6, "end"), (node.outputs, node.x + node.width + 6, "start")):
+            for row, pin in enumerate(side):
+                yield from self._value(local_id, pin.name, x, node.pin_y(row) - 4, anchor)
+
+    def _value(self, local_id: str, pin: str, x: float, y: float, anchor: str) -> Iterator[str]:
+        name = self._monitor.names.get((local_id, pin))
+        if name is not None:
+            more = f'class="value" fill="#06c" font-size="10" data-variable="{escape(name, quote=True)}"'
+            yield text_at(x, y, self._monitor.values.get(name, ""), anchor, more)
 
     def _from_rail(self, node: _Node) -> bool:
         return any(key not in self.nodes for pin in node.inputs for key, _ in pin.sources)
@@ -268,5 +305,7 @@ def _block(node: _Node) -> Iterator[str]:
     for side, x, anchor, inside in ((node.inputs, node.x, "start", 6), (node.outputs, node.x + node.width, "end", -6)):
         for row, pin in enumerate(side):
             yield text_at(x + inside, node.pin_y(row) + 4, pin.name, anchor)
+            if pin.target:
+                yield text_at(x + 6, node.pin_y(row) + 12, pin.target, "start")
             if pin.negated:
                 yield f'<circle cx="{x:.0f}" cy="{node.pin_y(row):.0f}" r="3" fill="white" stroke="currentColor"/>'

@@ -12,13 +12,16 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from plctool.controller import Controller
+from plctool.debug.symbols import SymbolTable
 from plctool.errors import PlcError, UsageError
+from plctool.ui.drawings import Drawings
 from plctool.ui.live import Live, Wanted
 from plctool.ui.messages import Request, id_of, parse
 from plctool.ui.operating import ONLY_SHOWS, OperatorPage
 from plctool.ui.variables import Tree
 
 MAX_BROWSERS = 16
+_NO_SYMBOLS = "The symbols of the program are not known."
 _TRY_AGAIN_LATER = 1013  # of RFC 6455's registry of close codes
 _TOO_MANY = f"{MAX_BROWSERS} pages are open already; close one."
 
@@ -29,6 +32,8 @@ class Hub:
 
     def __init__(self, page: OperatorPage | None = None) -> None:
         self.live: Live  # set before the first browser comes
+        self.drawings = Drawings([])
+        self.table: SymbolTable | None = None
         self.page = page
         self.topics: dict[str, Any] = {} if page is None else {"page": page.document()}
         self.values: dict[str, Any] = {}
@@ -39,7 +44,7 @@ class Hub:
         if topic == "values":
             self.values = content
         elif topic == "symbols":
-            table = content["table"]
+            table = self.table = content["table"]
             self.tree = None if table is None else Tree(table)
             self.values = {}
             self._replace(topic, {name: value for name, value in content.items() if name != "table"})
@@ -147,6 +152,10 @@ class Browser:
             return await asyncio.to_thread(self._tree().children, fields["path"], fields["start"])
         if request.verb == "search":
             return await asyncio.to_thread(self._tree().search, fields["text"])
+        if request.verb == "diagrams":
+            return await asyncio.to_thread(self._hub.drawings.listed, self._table())
+        if request.verb == "diagram":
+            return await asyncio.to_thread(self._hub.drawings.picture, self._table(), fields["name"])
         if request.verb not in _OPERATIONS:
             raise UsageError("Only an operators' page has elements; start 'plctool ui' with --page.", "bad-message")
         return await self._do(lambda plc: _OPERATIONS[request.verb](plc, **fields))
@@ -188,8 +197,13 @@ class Browser:
 
     def _tree(self) -> Tree:
         if self._hub.tree is None:
-            raise UsageError("The symbols of the program are not known.", "no-symbols")
+            raise UsageError(_NO_SYMBOLS, "no-symbols")
         return self._hub.tree
+
+    def _table(self) -> SymbolTable:
+        if self._hub.table is None:
+            raise UsageError(_NO_SYMBOLS, "no-symbols")
+        return self._hub.table
 
 
 def _write(plc: Controller, name: str, text: str) -> None:

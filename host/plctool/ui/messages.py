@@ -29,6 +29,8 @@ _FIELDS: dict[str, tuple[str, ...]] = {
     "stop": (),
     "reset": (),
     "acknowledge": ("name",),
+    "diagrams": (),
+    "diagram": ("name",),
     "operate": ("element", "text"),
 }
 

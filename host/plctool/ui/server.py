@@ -22,6 +22,7 @@ from plctool.controller import Controller
 from plctool.errors import PlcError, UsageError
 from plctool.ui.access import ADDRESS, App, Guard, new_token
 from plctool.ui.browsers import MAX_BROWSERS, Hub
+from plctool.ui.drawings import Drawings
 from plctool.ui.live import Live, Target
 from plctool.ui.messages import MAX_MESSAGE
 from plctool.ui.operating import OperatorPage
@@ -97,6 +98,7 @@ class _Page:
         self._listening = listening
         self._started = threading.Event()
         self.live = hub.live = Live(target, self._publish)
+        hub.drawings = Drawings(target.folders)
         config = uvicorn.Config(
             cast("Any", app),
             http=_Connection,

@@ -43,7 +43,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
     "programs and images": (
         Row("fmt", "fmt", "format Structured Text: one style, the program stays the same"),
         Row("doc", "doc", "write pages of a library or program from its comments, with diagrams"),
-        Row("render", "render", "draw a unit in LD, FBD or CFC as SVG"),
+        Row("render", "render", "draw a unit in LD, FBD, CFC or SFC as SVG, with values"),
         Row("symbols", "images", "list the variables of an image with their types"),
         Row("info", "images", "describe an image, a .bin or .hex of 'plctool image', or what a device has"),
         Row("image", "images", "write what a production programmer burns: a flash with its program"),

@@ -21,6 +21,7 @@ from plctool.compiler.formats.plcopen_result_types import parameters, parameters
 from plctool.compiler.formats.text import Findings, Part, Place, Text
 from plctool.compiler.formats.tree_bodies import translate_networks, types_of, units_of
 from plctool.compiler.formats.twincat import REFUSED
+from plctool.compiler.formats.xml_tree import Element
 from plctool.compiler.syntax import ast
 
 _BLOCK_IN_ONE_WORD = "FUNCTIONBLOCK"  # in exports of some systems made from CODESYS 2.3
@@ -71,8 +72,19 @@ def read_export(path: str, text: str) -> Source:
     return _Export(path, text).source()
 
 
+def drawn_bodies(path: str, text: str) -> dict[str, Element]:
+    """Returns the bodies in LD and FBD of a file, by the name of the unit, or UNIT.ACTION."""
+    export = _Export(path, text, contacts=True)
+    export.source()
+    return export.drawn
+
+
 class _Export:
-    def __init__(self, path: str, text: str) -> None:
+    """`contacts`: as in Elements."""
+
+    def __init__(self, path: str, text: str, *, contacts: bool = False) -> None:
+        self._contacts = contacts
+        self.drawn: dict[str, Element] = {}
         self._path = path
         self._text = text
         self._edits: list[_Edit] = []
@@ -220,8 +232,12 @@ class _Export:
         name = span.name if action is None else f"{span.name}.{action[1]}"
         made, start = Body(), match.start()
         try:
-            body = read_networks(match[1], self._lines(match.end(), end), self._parameters, first=self._next_id)
+            lines = self._lines(match.end(), end)
+            body = read_networks(
+                match[1], lines, self._parameters, contacts=self._contacts and match[1] == "LD", first=self._next_id
+            )
             self._next_id = body.next_id
+            self.drawn[name] = body.body
             keeps = span.kind in ("PROGRAM", "FUNCTION_BLOCK", _BLOCK_IN_ONE_WORD)
             unit = Unit(name, keeps, self._types | types_of(self._declarations(span)), dict(self._outputs))
             translate_networks(body.body, unit, made)
@@ -232,8 +248,8 @@ class _Export:
         if made.variables:
             declared = _DECLARED.search(self._text, span.start, start)
             at = start if declared is None else declared.start()
-            lines = [(f"VAR {n} : {spec}; END_VAR\n", place) for n, (spec, place) in made.variables.items()]
-            self._edits.append((at, at, [*lines]))
+            declared_here = [(f"VAR {n} : {spec}; END_VAR\n", place) for n, (spec, place) in made.variables.items()]
+            self._edits.append((at, at, [*declared_here]))
 
     def _lines(self, start: int, end: int) -> list[Line]:
         first = self._place(start)

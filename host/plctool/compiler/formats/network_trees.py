@@ -118,13 +118,15 @@ class _Wire:
 @dataclass
 class Elements:
     """Builds a body of PLCopen XML. `contacts`: AND and OR of a ladder become contacts, as they are drawn; they are
-    compiled as functions, so that several coils get the value of the same moment. `first`: the first local id."""
+    compiled as functions, so that several coils get the value of the same moment. An element has the same local id in
+    both. `first`: the first local id."""
 
     tag: str
     at: Place
     contacts: bool = False
     first: int = 1
     _root: Element = field(init=False)
+    _count: int = 0
     _rail: _Wire | None = None
     _branches: dict[str, list[_Wire]] = field(default_factory=dict)
 
@@ -139,7 +141,7 @@ class Elements:
     @property
     def next_id(self) -> int:
         """The next local id."""
-        return self.first + len(self._root.children)
+        return self.first + self._count
 
     def add(self, network: TreeNetwork) -> None:
         """Adds a network. Raises NotTranslatedError."""
@@ -149,6 +151,7 @@ class Elements:
         for item in network.items:
             if isinstance(item, Box):
                 self._box(item)
+                self._root.children[-1].attributes["computed"] = "here"
             elif isinstance(item, Definition):
                 self._branches[item.number] = self._wires(_once(item.value))
                 self._root.children[-1].attributes["computed"] = "here"
@@ -162,7 +165,7 @@ class Elements:
         special = any(t.negated or t.storage for t in item.targets)
         if len(item.targets) > 1 and (special or (isinstance(value, Operand) and (value.negated or value.edge))):
             value = _once(value, "BOOL")
-        wires = self._wires(value)
+        wires = self._plain(value) if value is not item.value else self._wires(value)
         for target in item.targets:
             self._target(target, wires)
 
@@ -201,7 +204,8 @@ class Elements:
 
     def _left_rail(self, at: Place) -> _Wire:
         if self._rail is None:
-            self._rail = self._element("leftPowerRail", at, {})
+            self._rail = _Wire("0")
+            self._root.children.insert(0, Element("leftPowerRail", {"localId": "0"}, at))
         return self._rail
 
     def _box(self, box: Box) -> _Wire:
@@ -243,13 +247,17 @@ class Elements:
             return self._plain(tree)
         values = [value for _, value in tree.inputs if value is not None]
         if tree.kind == "OR":
-            return [wire for value in values for wire in self._contacts(value, sources)]
-        for value in values:
-            sources = self._contacts(value, sources)
-        return sources
+            found = [wire for value in values for wire in self._contacts(value, sources)]
+        else:
+            found = sources
+            for value in values:
+                found = self._contacts(value, found)
+        self._count += 1  # the local id of its function
+        return found
 
     def _element(self, tag: str, at: Place, attributes: dict[str, str], children: list[Element] | None = None) -> _Wire:
         local_id = str(self.next_id)
+        self._count += 1
         self._root.children.append(Element(tag, {"localId": local_id} | attributes, at, children or []))
         return _Wire(local_id)
 

@@ -245,7 +245,7 @@ class Network:
         elif _instance(block):
             value = f"{_instance(block)}.{formal}"
         else:
-            value = self._done.get(block.get("localId"), _result(block))
+            value = self._done.get(block.get("localId"), result_variable(block))
         return value if output is None else self._modified(output, value)
 
     def _called(self, block: Element, *, wanted: bool = False) -> None:
@@ -282,7 +282,7 @@ class Network:
         own = self._unit.blocks.get(block.get("typeName").casefold())
         spec = self._types.of_function(block) if own is None else own.get("", "")
         if spec and self._unit.keeps:
-            self._body.variables[_result(block)] = (spec, block.at)
+            self._body.variables[result_variable(block)] = (spec, block.at)
         return bool(spec) and self._unit.keeps
 
     def _may_act(self, name: str) -> bool:
@@ -301,7 +301,7 @@ class Network:
                 found.append((item.get("formalParameter"), value))
             elif value != "TRUE":
                 self._needs_statement(block, f"{block.get('typeName')} with EN")
-                enable = f"_TMP_EN{key}"
+                enable = enable_variable(block)
                 self._body.variables[enable] = ("BOOL", block.at)
                 self._body.line(f"{enable} := {value};", block.at)
                 self._done[f"{key}.EN"] = enable
@@ -344,10 +344,11 @@ class Network:
             raise NotTranslatedError(block.at, f"the type of the result of {name} is not known", needs)
         if not spec:
             self._done[key] = call
-            if not later and not named and self._may_act(name):
+            only_enabled = bool(used) and {u.upper() for u in used} == {"ENO"}
+            if only_enabled or (not later and not named and (block.get("computed") or self._may_act(name))):
                 self._body.line(f"{call};", block.at)
             return
-        result = _result(block)
+        result = result_variable(block)
         self._body.variables[result] = (spec, block.at)
         if enable and name.upper() in COMPARISONS and not _has_output(block, "ENO"):
             call, enable = f"{enable} AND {_operand(call)}", ""  # in a rung, as a contact
@@ -417,9 +418,14 @@ def _parameters(block: Element, which: str) -> list[Element]:
     return [v for part in block.all(which) for v in part.all("variable")]
 
 
-def _result(block: Element) -> str:
+def result_variable(block: Element) -> str:
     """The variable with the result of a function."""
     return f"_TMP_{block.get('typeName').rpartition('.')[2]}{block.get('localId')}_OUT"
+
+
+def enable_variable(block: Element) -> str:
+    """The variable with the EN of a block."""
+    return f"_TMP_EN{block.get('localId')}"
 
 
 def _call_type(block: Element) -> str:

@@ -36,6 +36,24 @@ def read_object(path: str, text: str) -> Source:
     return made.source(path, text, name=name, findings=findings.all)
 
 
+def drawn_bodies(text: str) -> dict[str, Element]:
+    """Returns the bodies in LD and FBD of a file, by the name of the unit, or UNIT.MEMBER. Raises XmlError and
+    NotTranslatedError."""
+    found, next_id = dict[str, Element](), 1
+    for unit in read_xml(text).all("POU"):
+        for part in sorted([unit, *unit.all("Action"), *unit.all("Method", "Property")], key=_order_of_ids):
+            for archive in [nwl for implementation in part.all("Implementation") for nwl in implementation.all("NWL")]:
+                name = unit.get("Name") if part is unit else f"{unit.get('Name')}.{part.get('Name')}"
+                elements = read_networks(archive, contacts=True, first=next_id)
+                found[name], next_id = elements.body, elements.next_id
+    return found
+
+
+def _order_of_ids(part: Element) -> int:
+    """The order in which bodies get their local ids: the unit, its actions, what is declared in it."""
+    return {"POU": 0, "Action": 1}.get(part.tag, 2)
+
+
 class _Object:
     def __init__(self, text: Text, findings: Findings) -> None:
         self._text = text

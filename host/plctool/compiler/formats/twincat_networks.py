@@ -29,7 +29,6 @@ _NEGATION, _SET, _JUMP, _RETURN, _RISING, _FALLING = 1, 2, 4, 8, 16, 32
 _STORAGE = {0: (False, ""), _NEGATION: (True, ""), _SET: (False, "set"), _SET | _NEGATION: (False, "reset")}
 _EDGES = {0: "", _RISING: "rising", _FALLING: "falling"}
 _OPEN = "???"  # what the editor writes for an operand that is missing
-_SOLE = frozenset(("AND", "OR", "XOR", "NOT"))  # boxes whose one output is not stored
 
 
 def read_networks(archive: Element, *, contacts: bool = False, first: int = 1) -> Elements:
@@ -153,7 +152,8 @@ def _outputs(box: Element, kind: str) -> list[Output]:
         raise NotTranslatedError(box.at, f"the outputs of {kind} have no names")
     targets = ["" if item.tag == "n" else _written(item) for item in items]
     found = []
-    for number, name in enumerate(names or ([""] if items or kind.upper() in _SOLE else [])):
+    is_call = _value(box, "CallType") in ("Method", "Function")  # one without outputs has no result
+    for number, name in enumerate(names or ([] if is_call and not items else [""])):
         type_ = types[number] if number < len(types) and types[number].isidentifier() else ""
         found.append(Output(name, targets[number] if number < len(targets) else "", type_))
     return found

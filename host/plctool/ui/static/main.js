@@ -1,13 +1,14 @@
 // The page: connects what plctool sends with what is shown.
 
 import { Connection } from "./connection.js";
+import { Diagrams } from "./diagrams.js";
 import { AskDialog, EditDialog } from "./dialogs.js";
 import { byId, element, setText } from "./dom.js";
 import { MAX_PLOTTED, Plot } from "./plot.js";
 import { Tree } from "./tree.js";
 import { alarmsView, exceptionView, ioView, logView, tasksView } from "./views.js";
 
-const VIEWS = ["variables", "tasks", "log", "alarms", "io"];
+const VIEWS = ["variables", "diagrams", "tasks", "log", "alarms", "io"];
 const SEARCH_MS = 150;
 const STATES = { run: "Running", stop: "Stopped", exception: "Exception", none: "No program", "stop on breakpoint": "Halted" };
 
@@ -26,6 +27,8 @@ const tree = new Tree(byId("tree"), {
   search: (text) => connection.ask("search", { text }),
   on: { edit: (row, value) => edit.open(row, value), plot: (row) => togglePlot(row.name), shown: show },
 });
+
+const diagrams = new Diagrams(byId("diagrams"), connection, () => show());
 
 // ---- what plctool sends ----
 
@@ -85,6 +88,8 @@ function showState() {
 
 function showSymbols(content) {
   asked = "";
+  diagrams.forget();
+  if (view === "diagrams") diagrams.load();
   if (content.crc) tree.reload().catch((error) => tree.clear(error.message));
   else tree.clear(content.message);
 }
@@ -97,6 +102,7 @@ function showReading({ whole, problem }) {
 function showValues(values) {
   tree.update(values);
   plot.update(values);
+  diagrams.update(values);
   for (const [name, [text, forced, , error]] of Object.entries(values)) {
     for (const cell of channelValues.get(name) ?? []) showChannel(cell, text, forced, error);
   }
@@ -108,8 +114,9 @@ function showValues(values) {
 function show() {
   const names = new Set(plot.names);
   if (view === "variables") tree.shownNames.forEach((name) => names.add(name));
+  if (view === "diagrams") diagrams.names.slice(0, 300).forEach((name) => names.add(name));
   if (view === "io") [...channelValues.keys()].slice(0, 300).forEach((name) => names.add(name));
-  const wanted = document.hidden ? { names: [], views: [] } : { names: [...names].sort(), views: view === "variables" ? [] : [view] };
+  const wanted = document.hidden ? { names: [], views: [] } : { names: [...names].sort(), views: ["variables", "diagrams"].includes(view) ? [] : [view] };
   const text = JSON.stringify(wanted);
   if (text === asked) return;
   asked = text;
@@ -159,6 +166,7 @@ function choose(name) {
     tab.tabIndex = other === name ? 0 : -1;
   }
   if (name === "variables") plot.draw();
+  if (name === "diagrams") diagrams.load();
   show();
 }
 
