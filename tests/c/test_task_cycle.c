@@ -367,6 +367,7 @@ static void the_supervisor_sees_the_limits_of_running_code_only(void)
 
 static RTS_I64 look_ns;
 static RTS_UI32 looked;
+static RTS_UI32 long_us; /* of a cycle that nothing looks at */
 static bool break_expected;
 
 static void *look(void *unused)
@@ -384,6 +385,10 @@ static void supervise(RTS_UI32 us)
     time_t start = time(NULL);
     pthread_t thread;
 
+    if (long_us != 0) {
+        burn(long_us);
+        return;
+    }
     look_ns = SimNow() + (RTS_I64)us * 1000;
     SysAtomicStore(&looked, 0);
     CHECK(pthread_create(&thread, NULL, look, NULL) == 0);
@@ -426,6 +431,40 @@ static void the_supervisor_breaks_a_cycle_beyond_time_times_sensitivity(void)
         CHECK_EQUAL(app_exception(), (i == 0 ? RTSEXCPT_NOEXCEPTION : RTSEXCPT_WATCHDOG));
         CHECK_EQUAL(read_u32(APP_AREA_DATA, 0), 1 - i);
     }
+}
+
+static void the_supervisor_breaks_the_cycle_that_completes_a_series_where_it_becomes_too_long(void)
+{
+    static const RTS_UI32 us[] = {3000, 3001};
+    RTS_UI32 i;
+
+    for (i = 0; i < 2; i++) {
+        CDL_TASK *task = begin_supervised(us[i], i == 1);
+        task->watchdog_us = 3000;
+        task->watchdog_sensitivity = 3;
+        load();
+        long_us = 3001;
+        CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
+        CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
+        long_us = 0;
+        CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1 - i);
+        CHECK_EQUAL(app_exception(), (i == 0 ? RTSEXCPT_NOEXCEPTION : RTSEXCPT_WATCHDOG));
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, 0), 3 - i); /* broken in the midst */
+    }
+}
+
+static void the_supervisor_leaves_a_series_alone_that_one_cycle_does_not_complete(void)
+{
+    CDL_TASK *task = begin_supervised(9000, false);
+
+    task->watchdog_us = 3000;
+    task->watchdog_sensitivity = 3;
+    load();
+    long_us = 3001;
+    CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
+    long_us = 0;
+    CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
 }
 
 static void the_supervisor_breaks_a_task_without_watchdog_after_the_default(void)
@@ -672,6 +711,8 @@ int main(void)
     RUN(reset_gives_the_watchdog_its_count_back);
     RUN(the_supervisor_sees_the_limits_of_running_code_only);
     RUN(the_supervisor_breaks_a_cycle_beyond_time_times_sensitivity);
+    RUN(the_supervisor_breaks_the_cycle_that_completes_a_series_where_it_becomes_too_long);
+    RUN(the_supervisor_leaves_a_series_alone_that_one_cycle_does_not_complete);
     RUN(the_supervisor_breaks_a_task_without_watchdog_after_the_default);
     RUN(only_the_later_of_two_loops_is_broken_and_the_other_cycle_finishes);
     RUN(of_two_endless_loops_both_are_broken_one_limit_after_the_other);

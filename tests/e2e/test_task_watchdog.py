@@ -65,6 +65,18 @@ def test_a_task_that_exceeds_its_watchdog_stops_where_it_was(tool, plcrt, eventu
     assert counted(tool, plcrt) == before  # the other task starts no new cycle
 
 
+def test_a_series_of_long_cycles_names_the_program_and_line(tool, plcrt, eventually):
+    work = "n := n * 3 + i;\n    END_FOR"
+    text = PROGRAM.replace("{properties}", "WATCHDOG := T#10ms, SENSITIVITY := 10").replace("2000000000", "limit")
+    text = text.replace("n, i : DINT;", "n, i : DINT; limit : DINT := 160_000_000;", 1)
+    assert work in text  # some 50 ms of it
+    tool.ok("flash", "--port", plcrt.port, str(tool.build("series", text)))
+    tool.ok("write", "--port", plcrt.port, "Main.slow=TRUE")
+    fault = eventually(lambda: exception(tool, plcrt))
+    assert (fault["name"], fault["task"], fault["pou"]) == ("WATCHDOG", "Fast", "Main")
+    assert fault["line"] in range(6, 12)
+
+
 def test_a_loop_in_a_single_cycle_is_broken_as_well(tool, plcrt):
     started(tool, plcrt, "WATCHDOG := T#100ms")
     tool.ok("stop", "--port", plcrt.port)

@@ -30,6 +30,7 @@ typedef struct {
 #if IEC_TASK_CALLS
     RTS_UI32 is_lifted; /* for this cycle */
     RTS_UI32 more_ns;   /* for this cycle: how long it was lifted */
+    bool ends_series;   /* of long cycles, if this one is long as well */
 #endif
 } GUARD;
 
@@ -113,6 +114,8 @@ bool IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *out)
     out->start_ns = guard->start_ns;
     out->limit_ns = guard->limit_ns;
 #if IEC_TASK_CALLS
+    if (guard->ends_series)
+        out->limit_ns = tasks.list[index].watchdog_ns; /* aborted where it becomes too long, it has a location */
     out->limit_ns += SysAtomicLoad(&guard->more_ns);
     if (SysAtomicLoad(&guard->is_lifted) && out->limit_ns < LIFTED_NS)
         out->limit_ns = LIFTED_NS;
@@ -387,6 +390,7 @@ static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
 #if IEC_TASK_CALLS
     task->guard.is_lifted = false;
     task->guard.more_ns = 0;
+    task->guard.ends_series = task->exceeded != 0 && task->exceeded + 1 == task->sensitivity;
 #endif
     guard_begin(&task->guard, start_ns);
 #if ONLINE_CHANGE && !RTS_ONE_CORE && BP_HOLDS_TASKS
