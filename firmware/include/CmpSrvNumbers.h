@@ -211,6 +211,7 @@ enum {
     SRV_APP_GET_AREA_ADDRESS = 0x38,
     SRV_APP_READ_TASK_INFO = 0x70,     /* own */
     SRV_APP_READ_TASK_LATENESS = 0x74, /* own */
+    SRV_APP_READ_REGISTERS = 0xA7,     /* own */
     TAG_APP_LOGOUT = 0x00,
     TAG_APP_LOGIN_NAME = 0x01,
     TAG_APP_DESCRIPTOR = 0x81,
@@ -226,6 +227,7 @@ enum {
     TAG_APP_IMAGE = 0x41,          /* own */
     TAG_APP_CALLS = 0x42,          /* own */
     TAG_APP_FORBIDDEN = 0x43,      /* own; OperationForbidden() (CmpOperationControl.h), left out when it is 0 */
+    TAG_APP_REGISTERS = 0x7B,      /* own; u32 EXCEPT_REGISTERS_*, then a word each, of APP_POINTER_SIZE bytes */
     TAG_APP_REASON = 0x48,         /* own; beside TAG_SERVICE_RESULT: why a component denied it */
     TAG_APP_LIST = 0x81,
     TAG_APP_LIST_RANGE = 0x01,

@@ -91,6 +91,25 @@ typedef struct {
 const EXCEPT_TRACE *SysExceptGetTrace(void);
 #endif
 
+/* Which registers the processor has, and their order. The host has the names (debug/registers.py). */
+enum {
+    EXCEPT_REGISTERS_ARMV7M = 1,  /* r0 .. r12, sp, lr, pc, xpsr, cfsr, fault address */
+    EXCEPT_REGISTERS_RISCV32 = 2, /* ra, sp, t0 .. t6, a0 .. a7, s0 .. s11, pc, mcause, mtval */
+    EXCEPT_REGISTERS_X86_64 = 3,  /* rax, rbx, rcx, rdx, rsi, rdi, rbp, rsp, r8 .. r15, rip, eflags, fault address */
+    EXCEPT_REGISTERS_AARCH64 = 4, /* x0 .. x30, sp, pc, pstate, fault address */
+    EXCEPT_REGISTERS_ARM = 5,     /* r0 .. r12, sp, lr, pc, cpsr, fault address */
+};
+
+#if EXCEPT_REGISTERS > 0
+typedef struct {
+    RTS_UI32 kind; /* EXCEPT_REGISTERS_*; 0: not known, as of an error that the program or the runtime found */
+    uintptr_t value[EXCEPT_REGISTERS];
+} EXCEPT_FRAME;
+
+/* The registers at the fault that stopped the application. From main. */
+const EXCEPT_FRAME *SysExceptGetRegisters(void);
+#endif
+
 #ifndef RTS_CFFI
 
 /*
@@ -148,6 +167,11 @@ void SysExceptForgetTrace(void);
 #define SysExceptTrace(address, stack, end, link) ((void)(address), (void)(stack), (void)(end), (void)(link))
 #define SysExceptKeepTrace(address) ((void)(address))
 #define SysExceptForgetTrace() ((void)0)
+#endif
+
+#if EXCEPT_REGISTERS > 0
+/* Notes the registers of the fault for which SysExceptTrace is called next, with the same stack. In its context. */
+void SysExceptNoteRegisters(const uintptr_t *stack, RTS_UI32 kind, const uintptr_t values[EXCEPT_REGISTERS]);
 #endif
 
 #endif

@@ -40,6 +40,12 @@
 #define EXCEPT_MAX_CALLS 16
 #endif
 
+/* Registers of the processor that are kept of a fault (EXCEPT_REGISTERS_* in SysExcept.h): as many as the port has, a word
+ * each. It needs EXCEPT_MAX_CALLS; on bare metal also BP_MAX, with which faults save all registers. 0: none. */
+#ifndef EXCEPT_REGISTERS
+#define EXCEPT_REGISTERS 0
+#endif
+
 /* RAM of each area in bytes. The retain area may have none: then nothing of CmpRetain is in use. */
 #ifndef APP_DATA_SIZE
 #define APP_DATA_SIZE 4096

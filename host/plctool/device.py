@@ -17,6 +17,7 @@ from plctool.debug.breakpoints import Debugger, DeviceCondition
 from plctool.debug.forced import ForcedPlace, ForceList
 from plctool.debug.halted import BpStatus
 from plctool.debug.recording import Recording
+from plctool.debug.registers import Registers
 from plctool.debug.symbols import SymbolTable, load_symbols
 from plctool.debug.variables import Change, Reading, Symbol, unreachable
 from plctool.errors import DeviceError, LinkError, UsageError, did_you_mean
@@ -380,6 +381,11 @@ class Plc(Controller):
     def pointer_size(self) -> int:
         """Bytes of an address on the processor of the controller."""
         return services.pointer_size(self._session)
+
+    def registers(self) -> Registers | None:
+        """The registers of the processor at the fault that stopped the program. None without fault, as of an error that
+        the program or the runtime found, and if the firmware does not keep them."""
+        return services.read_registers(self._session, self.pointer_size())
 
     # ---- traces ----
 

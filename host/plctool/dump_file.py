@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from plctool.archives import ArchiveError, inflate
 from plctool.controller import ExceptionInfo
 from plctool.core import lib
-from plctool.debug.symbols import SymbolTable
+from plctool.debug.registers import Registers
+from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Reading, Symbol
 from plctool.errors import DeviceError, UsageError
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 _FORMAT = "plctool dump"
 _VERSION = 1
+_GZIP = b"\x1f\x8b"
 _MOST_BYTES = 256 << 20  # of a dump, unpacked
 _MOST_WORDS = 1024  # of its stack
 
@@ -52,6 +54,7 @@ class Dump:
     areas: list[AreaContent]
     symbols: SymbolTable
     pointer_size: int
+    registers: Registers | None
 
     def sample(self, names: Sequence[str]) -> Reading:
         """Variables by name, as `Controller.sample` has them. Raises UsageError, DeviceError as that does."""
@@ -121,6 +124,7 @@ def take_dump(plc: Plc) -> Dump:
         [AreaContent(*content) for content in plc.areas(table)],
         table,
         plc.pointer_size(),
+        None if status.exception is None else plc.registers(),
     )
 
 
@@ -150,23 +154,28 @@ def save(dump: Dump) -> bytes:
             {"area": a.area, "address": a.address, "data": base64.b64encode(a.data).decode()} for a in dump.areas
         ],
         "pointer_size": dump.pointer_size,
+        "registers": None
+        if dump.registers is None
+        else {"kind": dump.registers.kind, "values": list(dump.registers.values)},
         "symbols": dump.symbols.to_json(),
     }
     return gzip.compress(json.dumps(document).encode(), mtime=0)
 
 
-def load(path: Path) -> Dump:
-    """Reads a file. Raises UsageError for one that is not a dump, or is damaged."""
+def load(path: Path, symbols: Path | None = None) -> Dump:
+    """Reads a file. Raises UsageError for one that is not a dump, or is damaged. `symbols`: the symbol file, or the
+    image, of a dump that plcrt wrote; without it they are looked for beside the dump and among those of images that
+    were built or flashed here."""
     try:
-        return parse(read_regular(path, _MOST_BYTES), str(path))
+        return parse(read_regular(path, _MOST_BYTES), str(path), symbols or path)
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}.", "bad-dump") from None
 
 
-def parse(data: bytes, name: str = "The file") -> Dump:
+def parse(data: bytes, name: str = "The file", beside: Path | None = None) -> Dump:
     """The same of its content."""
     try:
-        text = inflate(data, _MOST_BYTES, gzip=True)
+        text = inflate(data, _MOST_BYTES, gzip=True) if data.startswith(_GZIP) else data
         document = json.loads(text)
         if not isinstance(document, dict) or document.get("format") != _FORMAT:
             raise ValueError
@@ -175,14 +184,18 @@ def parse(data: bytes, name: str = "The file") -> Dump:
     if document.get("version") != _VERSION:
         raise UsageError(f"{name} is a dump of another version of plctool; update plctool.", "bad-dump")
     try:
-        return _dump(document, name)
+        return _dump(document, name, beside)
     except (KeyError, TypeError, ValueError, OverflowError, AttributeError, IndexError, RecursionError):
         raise UsageError(f"{name} is a damaged dump; take another one.", "bad-dump") from None
 
 
-def _dump(document: dict[str, Any], name: str) -> Dump:
-    table = SymbolTable.from_json(_text(document["symbols"]), name)
-    if table.image_crc != _number(document["image_crc"]):
+def _dump(document: dict[str, Any], name: str, beside: Path | None) -> Dump:
+    image_crc = _number(document["image_crc"])
+    if document["symbols"] is None:  # as plcrt writes it
+        table = find_symbols(image_crc, beside)
+    else:
+        table = SymbolTable.from_json(_text(document["symbols"]), name)
+    if table.image_crc != image_crc:
         raise ValueError
     pointer_size = _number(document["pointer_size"])
     if pointer_size not in (4, 8):
@@ -196,18 +209,28 @@ def _dump(document: dict[str, Any], name: str) -> Dump:
         [_area(area) for area in document["areas"]],
         table,
         pointer_size,
+        _registers(document["registers"], pointer_size),
     )
+
+
+def _registers(entry: dict[str, Any] | None, pointer_size: int) -> Registers | None:
+    if entry is None:
+        return None
+    return Registers.checked(_number(entry["kind"]), tuple(map(_number, entry["values"])), pointer_size)
 
 
 def _exception(entry: dict[str, Any]) -> AppException:
     words = {_number(distance): _number(target) for distance, target in entry["words"][:_MOST_WORDS]}
     link = None if entry["link"] is None else _number(entry["link"])
     offset = None if entry["code_offset"] is None else _number(entry["code_offset"])
-    return AppException(_number(entry["code"]), offset, _number(entry["task"], -1), Trace(words, link))
+    return AppException(_number(entry["code"]), offset, _number(entry["task"], lib.APP_IN_EVENT), Trace(words, link))
 
 
 def _area(entry: dict[str, Any]) -> AreaContent:
-    data = base64.b64decode(_text(entry["data"]), validate=True)
+    if "hex" in entry:  # as plcrt writes it
+        data = bytes.fromhex(_text(entry["hex"]))
+    else:
+        data = base64.b64decode(_text(entry["data"]), validate=True)
     return AreaContent(_number(entry["area"]), _number(entry["address"]), data)
 
 

@@ -51,6 +51,43 @@ static void a_return_has_a_call_before_it(void)
     CHECK(!SysExceptIsReturn(in_code(65)));
 }
 
+#if EXCEPT_REGISTERS > 0
+static void registers_are_those_of_the_exception_that_counts(void)
+{
+    static const uintptr_t values[EXCEPT_REGISTERS] = {11, 12}, others[EXCEPT_REGISTERS] = {21, 22};
+
+    setup();
+    CHECK_EQUAL(SysExceptGetRegisters()->kind, 0);
+    SysExceptNoteRegisters(stack, EXCEPT_REGISTERS_ARM, values);
+    SysExceptTrace(in_code(5), stack, stack + 4, 0);
+    SysExceptNoteRegisters(stack + 1, EXCEPT_REGISTERS_ARM, others);
+    SysExceptTrace(in_code(6), stack + 1, stack + 4, 0);
+    CHECK_EQUAL(SysExceptGetRegisters()->kind, EXCEPT_REGISTERS_ARM);
+    CHECK(memcmp(SysExceptGetRegisters()->value, values, sizeof values) == 0);
+    SysExceptForgetTrace();
+    CHECK_EQUAL(SysExceptGetRegisters()->kind, 0);
+}
+
+/* Two tasks fail at the same time: of one the registers come first, of the other one the trace. */
+static void registers_of_another_exception_are_not_shown(void)
+{
+    static const uintptr_t values[EXCEPT_REGISTERS] = {11, 12};
+
+    setup();
+    SysExceptNoteRegisters(stack, EXCEPT_REGISTERS_ARM, values);
+    SysExceptTrace(in_code(6), stack + 1, stack + 4, 0);
+    SysExceptTrace(in_code(5), stack, stack + 4, 0);
+    CHECK_EQUAL(SysExceptGetRegisters()->kind, 0);
+}
+
+static void an_error_without_fault_has_no_registers(void)
+{
+    setup();
+    SysExceptTrace(in_code(5), stack, stack + 4, 0);
+    CHECK_EQUAL(SysExceptGetRegisters()->kind, 0);
+}
+#endif
+
 static void the_link_register_is_distinguished(void)
 {
     const EXCEPT_TRACE *trace = SysExceptGetTrace();
@@ -126,6 +163,11 @@ int main(void)
     RUN(a_return_has_a_call_before_it);
     RUN(only_words_that_lead_into_the_code_are_kept);
     RUN(the_link_register_is_distinguished);
+#if EXCEPT_REGISTERS > 0
+    RUN(registers_are_those_of_the_exception_that_counts);
+    RUN(registers_of_another_exception_are_not_shown);
+    RUN(an_error_without_fault_has_no_registers);
+#endif
     RUN(a_full_trace_keeps_the_nearest);
     RUN(the_first_exception_counts_until_it_is_forgotten);
     RUN(the_trace_of_another_exception_is_not_kept);

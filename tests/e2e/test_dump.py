@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import copy
 import gzip
 import json
 import random
+import shutil
 import sys
 from pathlib import Path
 
 import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+import wild_store
 
 from plctool import connect
 from plctool.dump_file import load, parse
@@ -76,6 +82,76 @@ def test_variables_and_calls_are_read_without_the_device(tool, plcrt, dump, tmp_
     assert "division by zero at code offset" in out
 
 
+def test_the_registers_of_a_fault_are_shown(tool, plcrt, dump):
+    image = tool.build("wild", wild_store.PROGRAM)
+    with connect(f"tcp:{plcrt.tcp}") as plc:
+        plc.flash(image)
+        eventually(lambda: plc.status().exception)
+    tool.ok("dump", "--tcp", plcrt.tcp, "-o", "wild.dump")
+    found = tool.ok("inspect", "wild.dump")["registers"]
+    assert found["fault_address"] == wild_store.ADDRESS
+    assert wild_store.VALUE in found.values()
+    out = tool("inspect", "wild.dump").out
+    assert "registers:\n" in out
+    assert f"{wild_store.VALUE:x}" in out
+
+
+def test_plcrt_writes_a_dump_when_the_program_stops(tool, plcrt, tmp_path):
+    written = tmp_path / "own.dump"
+    plcrt.stop()
+    plcrt.options = ("--tcp", "0", "--dump", str(written))
+    plcrt.start()
+    image = tool.build("main", PROGRAM)
+    names = ["Main.n", "Main.head^.next^.value", "Main.name", "Main.list", "Main.r", "Main.kept", "Main.divide.*"]
+    with connect(f"tcp:{plcrt.tcp}") as plc:
+        plc.flash(image)
+        eventually(written.exists)
+        before, exception, registers = plc.read_all(names), plc.status().exception, plc.registers()
+        texts = [entry.text for entry in plc.log()]
+        identity, tasks = plc.identity(), plc.tasks()
+    assert f"A dump is in {written}" in texts
+    found = load(written)
+    assert found.sample(names).values == before
+    assert (found.explained(), found.registers, found.identity) == (exception, registers, identity)
+    assert [task.name for task in found.tasks] == [task.name for task in tasks]
+    assert any("division by zero" in entry.text for entry in found.log)
+    assert written.stat().st_mode & 0o777 == 0o600
+    plcrt.stop()
+    written.unlink()
+    plcrt.start()  # the exception of the earlier run is no new one
+    with connect(f"tcp:{plcrt.tcp}") as plc:
+        assert plc.status().exception
+    assert not written.exists()
+
+
+def test_a_dump_that_cannot_be_written_is_a_warning_and_the_program_stops_as_ever(tool, plcrt, tmp_path):
+    plcrt.stop()
+    plcrt.options = ("--tcp", "0", "--dump", str(tmp_path / "missing" / "own.dump"))
+    plcrt.start()
+    image = tool.build("main", PROGRAM)
+    with connect(f"tcp:{plcrt.tcp}") as plc:
+        plc.flash(image)
+        eventually(lambda: plc.status().exception)
+        eventually(lambda: any("The dump is not written to" in entry.text for entry in plc.log()))
+
+
+def test_a_dump_of_plcrt_needs_symbols_of_its_program(tool, plcrt, tmp_path):
+    written = tmp_path / "dumps" / "own.dump"
+    written.parent.mkdir()
+    plcrt.stop()
+    plcrt.options = ("--tcp", "0", "--dump", str(written))
+    plcrt.start()
+    image = tool.build("main", PROGRAM)
+    with connect(f"tcp:{plcrt.tcp}") as plc:
+        plc.flash(image)
+        eventually(written.exists)
+    image.with_suffix(".sym").rename(tmp_path / "moved.sym")
+    shutil.rmtree(tmp_path / "cache")  # of what was built and flashed here
+    done = tool("inspect", str(written), "Main.n")
+    assert (done.status, "symbol" in done.err) == (2, True), done.err
+    assert tool("inspect", str(written), "Main.n", "--symbols", "moved.sym").status == 0
+
+
 def test_what_the_dump_has_not_is_refused_as_by_read(tool, dump):
     for name, words in {
         "Main.x": "There is no variable Main.x",
@@ -118,7 +194,7 @@ def test_any_changed_dump_is_read_or_refused(dump):
             while isinstance(place[key], dict | list) and place[key] and chance.random() < 0.8:
                 place = place[key]
                 key = chance.choice(list(place)) if isinstance(place, dict) else chance.randrange(len(place))
-            place[key] = chance.choice(junk)
+            place[key] = copy.deepcopy(chance.choice(junk))
         try:
             found = parse(gzip.compress(json.dumps(changed).encode(), 1))
             found.explained()

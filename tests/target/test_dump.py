@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+import wild_store
 
 from plctool.device import Plc
 from plctool.dump_file import parse, save, take_dump
@@ -21,6 +28,20 @@ END_PROGRAM
 CONFIGURATION C RESOURCE R ON PLC TASK T(INTERVAL := T#10ms, PRIORITY := 1); PROGRAM Main WITH T : Main;
 END_RESOURCE END_CONFIGURATION
 """
+
+
+def test_a_dump_has_the_registers_of_a_fault(make_board, build):
+    with make_board("full") as board, Plc(Connection(board.line())) as plc:
+        plc.flash(build(wild_store.PROGRAM).path)
+        eventually(lambda: plc.raw_status().exception)
+        dump = parse(save(take_dump(plc)))
+        found = dump.registers.named()
+        assert wild_store.VALUE in found.values()
+        assert found["fault_address" if "fault_address" in found else "mtval"] == wild_store.ADDRESS
+        plc.reset("warm")
+        assert plc.registers() is None
+    place = dump.explained()
+    assert (place.name, place.line) == ("ACCESS_VIOLATION", wild_store.LINE)
 
 
 @pytest.mark.parametrize(("config", "follows_pointers"), [("full", True), ("standard", False)])

@@ -14,4 +14,13 @@
 #define APP_ENTRY_MODE_BIT 1
 #endif
 
+/* As many as SysExcept.c keeps of each. */
+#if defined(__linux__) && defined(__x86_64__)
+#define EXCEPT_REGISTERS 19
+#elif defined(__linux__) && defined(__aarch64__)
+#define EXCEPT_REGISTERS 35
+#elif defined(__linux__) && defined(__arm__)
+#define EXCEPT_REGISTERS 18
+#endif
+
 #endif

@@ -3,8 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The file is that of node_exporter's textfile collector: the text format of Prometheus, version 0.0.4. It is written
- * beside its place and then renamed, so a reader sees a whole one. The label "plc" is the name of the file without its
+ * The file is that of node_exporter's textfile collector: the text format of Prometheus, version 0.0.4. The label "plc" is the name of the file without its
  * ending, so the files of several controllers of one machine differ in it.
  */
 #define _GNU_SOURCE
@@ -16,18 +15,16 @@
 #include "CmpLog.h"
 #include "CmpRouterEmbedded.h"
 #include "LogReport.h"
+#include "NewFile.h"
 #include "Supervisor.h"
 #include "SysTarget.h"
 #include "SysTime.h"
 #include "rts_config.h"
 
 #include <errno.h>
-#include <fcntl.h>
-#include <limits.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -39,7 +36,6 @@ enum {
 
 static struct {
     const char *path;
-    char temporary[PATH_MAX];
     char plc[LABEL_SIZE];
     RTS_UI32 interval_ms;
     RTS_UI32 due_ms;
@@ -208,37 +204,13 @@ static void put_tasks(void)
 
 /* ---- the file ---- */
 
-/* Returns errno, 0 if all of the text was written. */
-static int write_text(int file)
-{
-    size_t done = 0;
-    while (done < metrics.size) {
-        ssize_t count = write(file, metrics.text + done, metrics.size - done);
-        if (count < 0 && errno != EINTR) {
-            return errno;
-        }
-        done += count > 0 ? (size_t)count : 0;
-    }
-    return fchmod(file, READABLE) == 0 ? 0 : errno;
-}
-
-/* The temporary file is a new one, so it is neither a link of another user nor a pipe that nothing reads. */
 static int write_file(void)
 {
-    (void)unlink(metrics.temporary);
-    int file = open(metrics.temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, READABLE);
+    int file = NewFileOpen(metrics.path, READABLE);
     if (file < 0) {
         return errno;
     }
-    int error = write_text(file);
-    error = close(file) != 0 && error == 0 ? errno : error;
-    if (error == 0 && rename(metrics.temporary, metrics.path) != 0) {
-        error = errno;
-    }
-    if (error != 0) {
-        (void)unlink(metrics.temporary);
-    }
-    return error;
+    return NewFileEnd(file, metrics.path, NewFileWrite(file, metrics.text, metrics.size));
 }
 
 static void note_result(int error)
@@ -260,7 +232,6 @@ void PortMetricsSet(const char *path, RTS_UI32 interval_s)
     metrics.path = path;
     metrics.interval_ms = interval_s * 1000;
     metrics.start_s = now.tv_sec;
-    (void)snprintf(metrics.temporary, sizeof(metrics.temporary), "%s.tmp", path);
     (void)snprintf(name, sizeof(name), "%s", slash != NULL ? slash + 1 : path);
     name[strcspn(name, ".")] = '\0';
     (void)as_label(name, metrics.plc);

@@ -11,7 +11,6 @@
 enum {
     METRICS_S = 15,            /* how often the file is written if the user does not say */
     METRICS_LONGEST_S = 86400, /* the longest interval */
-    METRICS_EXTRA = 8,         /* bytes that the name of the temporary file has more, with NUL */
 };
 
 /* Where the file is written, and how often [s]; NULL: nowhere. `path` stays. Before CMInit. */

@@ -23,6 +23,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 #include <ucontext.h>
 
@@ -155,6 +156,41 @@ static void leave(CONTEXT *context, RTS_UI32 code, PLACE place)
     context->exception.address = place.address;
     IecStackLeave(&context->stack);
 }
+
+/* Keeps the registers of the fault that leave() is called for next. `fault`: the address that could not be accessed. */
+#if defined(__x86_64__)
+static void note_registers(const CONTEXT *context, const void *ucontext, uintptr_t fault)
+{
+    static const RTS_UI8 order[EXCEPT_REGISTERS - 1] = {REG_RAX, REG_RBX, REG_RCX, REG_RDX, REG_RSI, REG_RDI,
+                                                        REG_RBP, REG_RSP, REG_R8,  REG_R9,  REG_R10, REG_R11,
+                                                        REG_R12, REG_R13, REG_R14, REG_R15, REG_RIP, REG_EFL};
+    const greg_t *registers = ((const ucontext_t *)ucontext)->uc_mcontext.gregs;
+    uintptr_t values[EXCEPT_REGISTERS];
+    for (size_t i = 0; i < RTS_COUNT(order); i++) {
+        values[i] = (uintptr_t)registers[order[i]];
+    }
+    values[RTS_COUNT(order)] = fault;
+    SysExceptNoteRegisters(readable(&context->stack, place_of(ucontext).stack), EXCEPT_REGISTERS_X86_64, values);
+}
+#elif defined(__aarch64__)
+static void note_registers(const CONTEXT *context, const void *ucontext, uintptr_t fault)
+{
+    enum { GENERAL = 31 };
+    const mcontext_t *at = &((const ucontext_t *)ucontext)->uc_mcontext;
+    uintptr_t values[EXCEPT_REGISTERS] = {[GENERAL] = at->sp, at->pc, at->pstate, fault};
+    memcpy(values, at->regs, GENERAL * sizeof(values[0]));
+    SysExceptNoteRegisters(readable(&context->stack, at->sp), EXCEPT_REGISTERS_AARCH64, values);
+}
+#else
+static void note_registers(const CONTEXT *context, const void *ucontext, uintptr_t fault)
+{
+    const mcontext_t *at = &((const ucontext_t *)ucontext)->uc_mcontext;
+    uintptr_t values[EXCEPT_REGISTERS] = {at->arm_r0, at->arm_r1, at->arm_r2, at->arm_r3, at->arm_r4,   at->arm_r5,
+                                          at->arm_r6, at->arm_r7, at->arm_r8, at->arm_r9, at->arm_r10,  at->arm_fp,
+                                          at->arm_ip, at->arm_sp, at->arm_lr, at->arm_pc, at->arm_cpsr, fault};
+    SysExceptNoteRegisters(readable(&context->stack, at->arm_sp), EXCEPT_REGISTERS_ARM, values);
+}
+#endif
 
 /* C code that IEC code called: the call that is nearest on the stack. */
 READS_STACK static uintptr_t last_return(const uintptr_t *word, const uintptr_t *end)
@@ -305,6 +341,8 @@ static void on_fault(int number, siginfo_t *info, void *ucontext)
         return;
     }
     if (begin_to_leave(context)) {
+        bool is_access = number == SIGSEGV || number == SIGBUS;
+        note_registers(context, ucontext, is_access ? (uintptr_t)info->si_addr : 0);
         leave(context, fault_code(context, signal, info), place_of(ucontext));
     }
     chain(signal, info, ucontext);
@@ -329,6 +367,7 @@ static void on_break(int number, siginfo_t *info, void *ucontext)
     const struct sigaction *previous = &find_signal(number)->previous;
     if (runs_iec_code(context) && is_broken(context) && begin_to_leave(context)) {
         abandon_step();
+        note_registers(context, ucontext, 0);
         leave(context, context->break_code, place_of(ucontext));
     }
     if ((previous->sa_flags & SA_SIGINFO) != 0) {

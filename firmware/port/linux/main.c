@@ -15,11 +15,13 @@
 #include "CmpScheduleTimer.h"
 #include "CmpSrvNumbers.h"
 #include "ConfigFile.h"
+#include "CoreDump.h"
 #include "IoConfig.h"
 #include "Modbus.h"
 #include "ModbusToolLine.h"
 #include "LogReport.h"
 #include "Metrics.h"
+#include "NewFile.h"
 #include "Supervisor.h"
 #include "SysExcept.h"
 #include "SysFileFlash.h"
@@ -57,6 +59,7 @@ typedef struct {
     char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
     RTS_UI32 event_count;
     bool mdns;
+    const char *dump;
     const char *metrics;
     RTS_UI32 metrics_s;
     bool alone;
@@ -68,7 +71,8 @@ static const char usage[] =
     "             [--udp ADDRESS[:PORT]] [--mdns] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
     "             [--tunnel PATH] [--tunnel-unit N] [--tunnel-baud N] [--tunnel-parity even|odd|none] "
     "[--tunnel-drive]\n"
-    "             [--board NAME] [--event NAME=PIPE]... [--metrics FILE] [--metrics-every SECONDS] [--config FILE]\n"
+    "             [--board NAME] [--event NAME=PIPE]... [--dump FILE] [--metrics FILE] [--metrics-every SECONDS]\n"
+    "             [--config FILE]\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
@@ -101,6 +105,9 @@ static const char usage[] =
     "  --board NAME    what device.toml calls this machine: programs with inputs and outputs of another board are "
     "refused\n"
     "  --event N=PIPE  each byte written into the named pipe is the external event N of tasks\n"
+    "  --dump FILE     writes variables, calls, registers and log to this file when the program stops with an "
+    "exception,\n"
+    "                  for plctool inspect: docs/dump.md\n"
     "  --metrics FILE  writes cycles, jitter, overruns, errors, load and state as text for Prometheus: "
     "docs/packages.md\n"
     "  --metrics-every SECONDS\n"
@@ -189,6 +196,7 @@ enum {
     OPTION_TUNNEL_BAUD,
     OPTION_TUNNEL_PARITY,
     OPTION_TUNNEL_DRIVE,
+    OPTION_DUMP,
     OPTION_METRICS,
     OPTION_METRICS_EVERY,
     OPTION_MDNS,
@@ -221,6 +229,7 @@ static const struct option long_options[] = {
     {"tunnel-parity", required_argument, NULL, OPTION_TUNNEL_PARITY},
     {"tunnel-drive", no_argument, NULL, OPTION_TUNNEL_DRIVE},
     {"mdns", no_argument, NULL, OPTION_MDNS},
+    {"dump", required_argument, NULL, OPTION_DUMP},
     {"metrics", required_argument, NULL, OPTION_METRICS},
     {"metrics-every", required_argument, NULL, OPTION_METRICS_EVERY},
     {"config", required_argument, NULL, OPTION_CONFIG},
@@ -307,10 +316,10 @@ static void parse_bit_rate(const char *text, PORT_CAN_OPTIONS *options)
 }
 
 /* The temporary file beside it has a longer name. */
-static const char *parse_metrics(const char *text)
+static const char *parse_new_file(const char *option, const char *text, const char *example)
 {
-    if (text[0] == '\0' || strlen(text) >= PATH_MAX - METRICS_EXTRA) {
-        refuse("--metrics '%.40s' is not the name of a file: give for example /run/plcrt/main.prom", text);
+    if (text[0] == '\0' || strlen(text) >= PATH_MAX - NEW_FILE_EXTRA) {
+        refuse("--%s '%.40s' is not the name of a file: give for example %s", option, text, example);
     }
     return text;
 }
@@ -393,8 +402,11 @@ static void take_option(OPTIONS *options, int option)
     case OPTION_MDNS:
         options->mdns = true;
         break;
+    case OPTION_DUMP:
+        options->dump = parse_new_file("dump", optarg, "/var/lib/plcrt/plc.dump");
+        break;
     case OPTION_METRICS:
-        options->metrics = parse_metrics(optarg);
+        options->metrics = parse_new_file("metrics", optarg, "/run/plcrt/main.prom");
         break;
     case OPTION_METRICS_EVERY:
         options->metrics_s = parse_seconds(optarg);
@@ -683,6 +695,7 @@ static int run(void)
     }
     log_restart();
     lock_memory();
+    CoreDumpBegin();
     if (PortIsUp()) {
         print_lines();
     }
@@ -805,6 +818,7 @@ int main(int argc, char **argv)
     }
     print_warnings(&options);
     ModbusToolLineSet(&options.tunnel);
+    CoreDumpSet(options.dump);
     if (options.metrics != NULL) {
         PortMetricsSet(options.metrics, options.metrics_s);
     }

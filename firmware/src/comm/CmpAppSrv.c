@@ -168,6 +168,15 @@ static RTS_RESULT release_force_list(SRV_REQUEST *request, BTAG_WRITER *reply)
 }
 #endif
 
+#if SRV_OTHER_CLIENTS || EXCEPT_REGISTERS > 0
+static void append_word(BTAG_WRITER *reply, uintptr_t word)
+{
+    BTagAppend32(reply, (RTS_UI32)word);
+    if (sizeof(word) > sizeof(RTS_UI32))
+        BTagAppend32(reply, (RTS_UI32)((RTS_UI64)word >> 32));
+}
+#endif
+
 #if SRV_OTHER_CLIENTS
 static RTS_RESULT single_cycle(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
@@ -199,13 +208,11 @@ static RTS_RESULT get_area_address(SRV_REQUEST *request, BTAG_WRITER *reply)
         result = check_app_session(request->client, session);
     if (result != ERR_OK)
         return result;
-    RTS_UI64 address = (uintptr_t)AppGetAreaAddress(area, 0, 1);
+    uintptr_t address = (uintptr_t)AppGetAreaAddress(area, 0, 1);
     if (address == 0)
         return ERR_APP_MAPPED_AREA_NOT_FOUND;
     BTagOpen(reply, TAG_APP_AREA_ADDRESS, BTAG_ALIGN_0);
-    BTagAppend32(reply, (RTS_UI32)address);
-    if (sizeof(uintptr_t) > sizeof(RTS_UI32))
-        BTagAppend32(reply, (RTS_UI32)(address >> 32));
+    append_word(reply, address);
     BTagClose(reply);
     return ERR_OK;
 }
@@ -282,6 +289,26 @@ static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
         BTagWrite32(reply, TAG_APP_OPERATION_MODE, DEV_MODE_DEBUG);
     return ERR_OK;
 }
+
+#if EXCEPT_REGISTERS > 0
+/* Without an element if they are not known. */
+static RTS_RESULT read_registers(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    const EXCEPT_FRAME *registers = SysExceptGetRegisters();
+    APP_STATUS status;
+
+    RTS_UNUSED(request);
+    AppGetStatus(&status);
+    if (status.exception.code == RTSEXCPT_NOEXCEPTION || registers->kind == 0)
+        return ERR_OK;
+    BTagOpen(reply, TAG_APP_REGISTERS, BTAG_ALIGN_0);
+    BTagAppend32(reply, registers->kind);
+    for (RTS_UI32 i = 0; i < EXCEPT_REGISTERS; i++)
+        append_word(reply, registers->value[i]);
+    BTagClose(reply);
+    return ERR_OK;
+}
+#endif
 
 #if SRV_INFORMATION
 static RTS_RESULT read_application_list(SRV_REQUEST *request, BTAG_WRITER *reply)
@@ -610,6 +637,9 @@ static const SRV_SERVICE services[] = {
 #if IEC_LATENESS
     {SRV_APP_READ_TASK_LATENESS, RIGHT_STATE, read_task_lateness},
 #endif
+#endif
+#if EXCEPT_REGISTERS > 0
+    {SRV_APP_READ_REGISTERS, RIGHT_VIEW, read_registers},
 #endif
 #if SRV_OTHER_CLIENTS
     {SRV_APP_DELETE, RIGHT_DOWNLOAD, delete_app},

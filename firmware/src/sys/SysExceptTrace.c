@@ -46,6 +46,12 @@ bool SysExceptIsReturn(uintptr_t word)
 static struct {
     RTS_UI32 claims;
     EXCEPT_TRACE trace;
+#if EXCEPT_REGISTERS > 0
+    RTS_UI32 register_claims;
+    const uintptr_t *stack;           /* of the trace */
+    const uintptr_t *registers_stack; /* the same, unless they are of another task's exception at this moment */
+    EXCEPT_FRAME registers;
+#endif
 } state;
 
 static void add_call(uintptr_t target, uintptr_t distance)
@@ -68,6 +74,9 @@ __attribute__((no_sanitize("address"))) void SysExceptTrace(uintptr_t address, c
     if (SysAtomicAdd(&state.claims, 1) != 0)
         return;
     state.trace.address = address;
+#if EXCEPT_REGISTERS > 0
+    state.stack = stack;
+#endif
     add_call(link, EXCEPT_LINK);
     for (word = stack; word < end && state.trace.count < EXCEPT_MAX_CALLS; word++)
         add_call(*word, (uintptr_t)word - (uintptr_t)stack);
@@ -77,6 +86,25 @@ const EXCEPT_TRACE *SysExceptGetTrace(void)
 {
     return &state.trace;
 }
+
+#if EXCEPT_REGISTERS > 0
+
+void SysExceptNoteRegisters(const uintptr_t *stack, RTS_UI32 kind, const uintptr_t values[EXCEPT_REGISTERS])
+{
+    if (SysAtomicAdd(&state.register_claims, 1) != 0)
+        return;
+    memcpy(state.registers.value, values, sizeof state.registers.value);
+    state.registers.kind = kind;
+    state.registers_stack = stack;
+}
+
+const EXCEPT_FRAME *SysExceptGetRegisters(void)
+{
+    static const EXCEPT_FRAME unknown;
+    return state.stack == state.registers_stack ? &state.registers : &unknown;
+}
+
+#endif
 
 void SysExceptKeepTrace(uintptr_t address)
 {

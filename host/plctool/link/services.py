@@ -12,6 +12,7 @@ from enum import StrEnum
 from functools import partial
 
 from plctool.core import error_name, exception_name, lib
+from plctool.debug.registers import Registers
 from plctool.debug.trace import Trace
 from plctool.errors import DeviceError
 from plctool.image.file import image_crc
@@ -367,6 +368,18 @@ def read_tasks(session: Session) -> list[TaskInfo]:
             name = content[_TASK.size :].split(b"\0", 1)[0].decode(errors="replace")
             tasks.append(TaskInfo(name, *_TASK.unpack(content)))
     return tasks
+
+
+def read_registers(session: Session, pointer_size: int) -> Registers | None:
+    """The registers of the processor at the fault that stopped the program; None if the device does not know them."""
+    try:
+        tags = session.recover(lambda: session.call(lib.SG_APPLICATION, lib.SRV_APP_READ_REGISTERS))
+    except DeviceError as error:
+        if error.result != lib.ERR_L7_UNKNOWNCMD:
+            raise
+        return None
+    content = tags.find(lib.TAG_APP_REGISTERS)
+    return None if content is None else Registers.of_words(content, pointer_size)
 
 
 def read_lateness(session: Session) -> list[list[Lateness]]:

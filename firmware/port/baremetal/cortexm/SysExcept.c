@@ -445,6 +445,9 @@ static struct {
     uintptr_t next;
     RTS_UI32 original;
     RTS_UI32 flags;
+    struct {
+        RTS_UI32 status, address;
+    } fault, halted_at; /* the newest one, and that of the halted task */
 } debug;
 
 static RTS_UI32 leave_try(RTS_UI32 code, RTS_UI32 address, uintptr_t stack, uintptr_t link);
@@ -494,6 +497,29 @@ static void put_registers(const THUMB_REGISTERS *at, FRAME *frame, RTS_UI32 exc_
     moved->xpsr = (at->flags & ~(RTS_UI32)(XPSR_ALIGNED | XPSR_THUMB)) | (at->r[15] & 1 ? XPSR_THUMB : 0) |
                   (below & 4 ? XPSR_ALIGNED : 0);
     set_process_stack(moved);
+}
+
+/* Notes the fault that is handled now. */
+static void note_fault(RTS_UI32 cfsr)
+{
+    enum { CFSR_BFARVALID = 1 << 15 };
+    debug.fault.status = cfsr;
+    debug.fault.address = cfsr & CFSR_MMARVALID ? SCB_MMFAR : cfsr & CFSR_BFARVALID ? SCB_BFAR : 0;
+}
+
+/* Keeps the registers of the fault that leave_try is called for next. */
+static void note_registers(const FRAME *frame, RTS_UI32 exc_return, const RTS_UI32 *saved)
+{
+    enum { GENERAL = 16 };
+    THUMB_REGISTERS at;
+    uintptr_t values[EXCEPT_REGISTERS];
+
+    get_registers(&at, frame, exc_return, saved);
+    memcpy(values, at.r, sizeof at.r);
+    values[GENERAL] = at.flags;
+    values[GENERAL + 1] = debug.fault.status;
+    values[GENERAL + 2] = debug.fault.address;
+    SysExceptNoteRegisters((const uintptr_t *)(uintptr_t)at.r[13], EXCEPT_REGISTERS_ARMV7M, values);
 }
 
 static void tell_debugger(const SYS_DEBUG_STOP *stop, RTS_UI32 code)
@@ -559,6 +585,8 @@ static RTS_UI32 halt(FRAME *frame, RTS_UI32 exc_return, const RTS_UI32 *saved, c
     debug.frame = frame;
     debug.first = state.top[-1].first;
     debug.exc_return = exc_return;
+    debug.halted_at.status = debug.fault.status;
+    debug.halted_at.address = debug.fault.address;
     memcpy(debug.saved, saved, sizeof debug.saved);
 #ifdef __ARM_FP
     __asm__ volatile("vstm %0, {s16-s31}" ::"r"(debug.fpu) : "memory"); /* the others are in the frame by that */
@@ -605,9 +633,12 @@ static RTS_UI32 resume(RTS_UI32 *saved)
 #endif
     stop.code = SYS_DEBUG_HALTED;
     goes_to = act(debug.handler(&stop), debug.frame, debug.exc_return, saved, &stop);
-    if (goes_to == 0)
-        return leave_try(debug.stop.code, debug.stop.address, debug.stop.stack, debug.stop.link);
-    return goes_to;
+    if (goes_to != 0)
+        return goes_to;
+    debug.fault.status = debug.halted_at.status;
+    debug.fault.address = debug.halted_at.address;
+    note_registers(debug.frame, debug.exc_return, saved);
+    return leave_try(debug.stop.code, debug.stop.address, debug.stop.stack, debug.stop.link);
 }
 
 bool SysDebugResume(RTS_EXCEPTION *exception)
@@ -673,6 +704,8 @@ static RTS_UI32 debug_fault(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved, 
 #define LOAD_THE_OTHERS "pop {r4-r11}\n\t"
 #else
 #define debug_fault(frame, exc_return, saved, code) ((void)(saved), 0)
+#define note_fault(cfsr) ((void)0)
+#define note_registers(frame, exc_return, saved) ((void)0)
 #define SAVE_THE_OTHERS ""
 #define LOAD_THE_OTHERS ""
 #endif
@@ -686,6 +719,7 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     const TRY *try = state.top - 1;
     RTS_UI32 code = is_overflow(cfsr, frame, stack_end(try)) ? RTSEXCPT_STACK_OVERFLOW : code_of(cfsr);
     uintptr_t address = address_of(cfsr, code, frame, try);
+    note_fault(cfsr);
     SCB_CFSR = cfsr;
     SCB_HFSR = SCB_HFSR;
     /* What could not be stacked stays pending: it belongs to the function that is left now. */
@@ -696,6 +730,7 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     goes_to = debug_fault(frame, exc_return, saved, code);
     if (goes_to != 0)
         return goes_to;
+    note_registers(frame, exc_return, saved);
     return leave_try(code, address, stack_before(frame, exc_return), frame->lr);
 }
 

@@ -10,6 +10,9 @@
 
 #define APP_ENTRY_MODE_BIT 1
 
+/* EXCEPT_REGISTERS_ARMV7M; what is saved for a debugger. */
+#define EXCEPT_REGISTERS (BP_MAX > 0 ? 19 : 0)
+
 /* Of RTS_IEC_STACK_SIZE these are not the program's [bytes]: what IecCall saves at most, the frame that the processor
  * pushes when the program is interrupted, larger with an FPU (BOARD_TARGET_ID), and the guard. */
 #define RTS_IEC_STACK_GUARD (RTS_IEC_UNPRIVILEGED ? 0 : 32)

@@ -330,11 +330,27 @@ static struct {
     uintptr_t next;
     RTS_UI32 original;
     RTS_UI32 interrupts;
+    RTS_UI32 cause, value; /* mcause and mtval of the halted task */
 } debug;
 
 void SysDebugSetHandler(PF_SYS_DEBUG handler)
 {
     debug.handler = handler;
+}
+
+/* Keeps the registers of the fault that leave() is called for next. */
+static void note_registers(const FRAME *frame, const RTS_UI32 *saved, RTS_UI32 cause, RTS_UI32 value)
+{
+    uintptr_t values[EXCEPT_REGISTERS] = {
+        frame->ra, frame->sp, frame->t0, frame->t1, frame->t2, frame->t3, frame->t4, frame->t5, frame->t6,
+        frame->a0, frame->a1, frame->a2, frame->a3, frame->a4, frame->a5, frame->a6, frame->a7,
+    };
+    enum { CALLER_SAVED = 17 };
+    memcpy(values + CALLER_SAVED, saved, SAVED * sizeof values[0]);
+    values[CALLER_SAVED + SAVED] = frame->pc;
+    values[CALLER_SAVED + SAVED + 1] = cause;
+    values[CALLER_SAVED + SAVED + 2] = value;
+    SysExceptNoteRegisters((const uintptr_t *)(uintptr_t)frame->sp, EXCEPT_REGISTERS_RISCV32, values);
 }
 
 static void tell_debugger(const SYS_DEBUG_STOP *stop, RTS_UI32 code)
@@ -383,6 +399,8 @@ __attribute__((noreturn)) static void halt(const FRAME *frame, const RTS_UI32 *s
     debug.stop = *stop;
     debug.frame = *frame;
     debug.slot = state.top[-1].slot;
+    debug.cause = CSR_READ("mcause");
+    debug.value = CSR_READ("mtval");
     memcpy(debug.saved, saved, sizeof debug.saved);
     leave(SYS_DEBUG_HALTED, frame->pc, 0, 0);
 }
@@ -413,8 +431,10 @@ static void resume(FRAME *frame, RTS_UI32 *saved)
     *frame = debug.frame;
     memcpy(saved, debug.saved, sizeof debug.saved);
     stop.code = SYS_DEBUG_HALTED;
-    if (!act(debug.handler(&stop), frame, saved, &stop))
+    if (!act(debug.handler(&stop), frame, saved, &stop)) {
+        note_registers(frame, saved, debug.cause, debug.value);
         leave(debug.stop.code, debug.stop.address, debug.stop.stack, debug.stop.link);
+    }
 }
 
 bool SysDebugResume(RTS_EXCEPTION *exception)
@@ -476,8 +496,10 @@ __attribute__((used)) void SysExceptFault(FRAME *frame, RTS_UI32 cause, RTS_UI32
 {
     TRY *try = state.top - 1;
     RTS_UI32 code = is_overflow(try, frame, cause) ? RTSEXCPT_STACK_OVERFLOW : code_of(cause);
-    if (!debug_fault(frame, saved, code))
+    if (!debug_fault(frame, saved, code)) {
+        note_registers(frame, saved, cause, CSR_READ("mtval"));
         leave(code, address_of(cause, code, frame), frame->sp, frame->ra);
+    }
 }
 
 #endif

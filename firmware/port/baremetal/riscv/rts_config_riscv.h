@@ -12,6 +12,9 @@
 #undef RTS_IEC_UNPRIVILEGED
 #define RTS_IEC_UNPRIVILEGED 1
 
+/* EXCEPT_REGISTERS_RISCV32; what is saved for a debugger. */
+#define EXCEPT_REGISTERS (BP_MAX > 0 ? 32 : 0)
+
 /* Of RTS_IEC_STACK_SIZE this is not the program's [bytes]: what IecCall saves. Traps are on the main stack. */
 #define RTS_IEC_STACK_LOST 16
 

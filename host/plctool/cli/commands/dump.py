@@ -24,9 +24,15 @@ def dump_arguments(dump: Parser) -> None:
 
 
 def inspect_arguments(inspect: Parser) -> None:
-    inspect.add_argument("dump", type=usable_path, metavar="FILE", help="what 'dump' wrote")
+    inspect.add_argument("dump", type=usable_path, metavar="FILE", help="what 'dump' wrote, or plcrt with --dump")
     inspect.add_argument(
         "names", nargs="*", type=utf8, metavar="NAME", help="variables, also patterns such as 'Main.*'"
+    )
+    inspect.add_argument(
+        "--symbols",
+        type=usable_path,
+        metavar="FILE.sym",
+        help="of a dump of plcrt, if they are not found automatically",
     )
     inspect.add_argument("--log", action="store_true", help="print the log of the controller as well")
     inspect.set_defaults(action=_inspect)
@@ -56,13 +62,14 @@ def _inspect(args: argparse.Namespace) -> int:
     from plctool.controller_documents import exception_document
     from plctool.dump_file import load
 
-    found = load(args.dump)
+    found = load(args.dump, args.symbols)
     stopped = found.explained()
     reading = found.sample(args.names)
     document: dict[str, Any] = {
         "device": vars(found.identity),
         "image_crc": f"{found.image_crc:08X}",
         "exception": None if stopped is None else exception_document(stopped),
+        "registers": None if found.registers is None else found.registers.named(),
         "tasks": [vars(task) for task in found.tasks],
         "values": reading.values,
         "log": [vars(entry) for entry in found.log],
@@ -78,6 +85,7 @@ def _inspect(args: argparse.Namespace) -> int:
                 f"  at {stopped.pou}, {stopped.file}:{stopped.line}" + (f": {stopped.detail}" if stopped.detail else "")
             )
             lines += [f"  called from {call.pou}, {call.file}:{call.line}" for call in stopped.calls]
+        lines += ["registers:", *found.registers.lines()] if found.registers else []
         lines += [f"{name} = {text}" for name, text in texts.items()]
         if args.log:
             lines += [f"{e['time_ns'] / 1e9:12.6f} s  {e['component']}: {e['text']}" for e in document["log"]]
