@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from online_programs import built
@@ -128,12 +128,45 @@ class Changing:
         n = plc.read("Main.n")
         self.wait(plc, lambda: plc.read("Main.n") > n)
 
+    def test_what_grew_moves_with_its_values_and_pointers_follow(self, plc: Controller, tmp_path: Path) -> None:
+        plc.write({"Main.d.own": 400, "Main.d.base": 5, "Main.fixed": -7, "Main.kept": -77, "Main.text": "now"})
+        plc.write({"Main.list[1]": 10, "Main.list[4]": 40})
+        self.wait(plc, lambda: plc.read("Main.seen") == 405)
+        self.change(plc, tmp_path, grown(BODY))
+        assert str(plc.status().state) == "run"
+        names = ("Main.d.own", "Main.d.base", "Main.d.more", "Main.fixed", "Main.kept", "Main.text", "Main.list")
+        expected = [400, 5, 2.5, -7, -77, "now", [1, 10, 3, 2, 40, 1, 1]]
+        assert list(plc.read(*names).values()) == expected
+        assert plc.read("Main.p^") == -7
+        n = plc.read("Main.n")
+        plc.write({"Main.d.own": 500, "Main.fixed": 8})
+        self.wait(plc, lambda: plc.read("Main.seen") == 505 and plc.read("Main.p^") == 8 and plc.read("Main.n") > n)
+        self.change(plc, tmp_path, grown(BODY).replace("more : LREAL := 2.5; ", ""))
+        assert plc.read("Main.d.own", "Main.d.base") == {"Main.d.own": 500, "Main.d.base": 5}
+        self.wait(plc, lambda: plc.read("Main.seen") == 505)
+
+    def test_pointer_to_what_is_removed_is_named_and_nothing_moves(self, plc: Controller, tmp_path: Path) -> None:
+        self.change(plc, tmp_path, program(BODY, VARIABLES + "VAR q : POINTER TO DINT := ADR(n); END_VAR"))
+        crc = plc.status().image_crc
+        bad = grown(BODY, VARIABLES.replace("fixed : DINT := 7;", "").replace(" := ADR(fixed)", ""))
+        result = self.built(plc, tmp_path, bad)
+        with pytest.raises(DeviceError, match=r"Main\.p leads to Main\.fixed, which is removed"):
+            plc.change(result.image)
+        assert (plc.status().image_crc, str(plc.status().state)) == (crc, "run")
+        assert plc.read("Main.p^") == 7
+        self.wait(plc, lambda: plc.read("Main.seen") == 41)
+
     def test_hostile_steps_are_refused_one_by_one(self, plc: Controller, tmp_path: Path) -> None:
-        """Every bound of every number in the list."""
-        variables = VARIABLES + "VAR a : ARRAY[0..40] OF DINT := [41(6)]; END_VAR VAR RETAIN r : LINT; END_VAR"
-        result = self.built(plc, tmp_path, program(BODY, variables))
+        """Every bound of every number in the list, of steps of all kinds."""
+        text = grown(
+            BODY, VARIABLES.replace("gone : LINT := 5;", ""), "VAR a : ARRAY[0..40] OF DINT := [41(6)]; END_VAR"
+        )
+        result = self.built(plc, tmp_path, text)
         image = parse_image(result.image)
-        assert image.change is not None and len(image.change.steps) >= 2
+        assert image.change is not None
+        kinds = {step.kind for step in image.change.steps}
+        wanted = "MOVE", "GONE", "LEAD", "CLEAR", "PUT", "SIGN"
+        assert kinds >= {getattr(lib, f"CDL_CHANGE_{kind}") for kind in wanted}
         crc, refused = plc.status().image_crc, 0
         for data in mutated(result.image, image):
             plc.add_symbols(result.symbols)
@@ -141,21 +174,53 @@ class Changing:
                 plc.change(data, unchecked=True)
             assert plc.status().image_crc == crc
             refused += 1
-        assert refused > 10
+        assert refused > 40
         plc.change(result.image)
 
 
+def grown(body: str, variables: str = VARIABLES, more: str = "") -> str:
+    """The program with more in a block, an array, a text and numbers."""
+    variables = variables.replace("fixed : DINT", "fixed : LINT").replace("kept : DINT", "kept : LINT")
+    variables = variables.replace("STRING[20]", "STRING[60]").replace("p : POINTER TO DINT := ADR(fixed)", POINTER)
+    variables = variables.replace("ARRAY[1..4] OF INT := [4, 3, 2, 1]", "ARRAY[0..6] OF INT := [7(1)]")
+    return program(body, variables + more, BLOCKS.replace("VAR base", "VAR more : LREAL := 2.5; base"))
+
+
+POINTER = "p : POINTER TO DINT"  # as it is in VARIABLES, which leads to a number that has become wider
+
+
+class Fault(NamedTuple):
+    """Values of a number in a step that cannot be right: where it is, its size, and those."""
+
+    offset: int
+    size: int
+    values: tuple[int, ...]
+
+
 def mutated(data: bytes, image: Image) -> list[bytes]:
-    """Images with one number of their list of steps out of bounds."""
+    """Images with one number of their list of steps out of bounds: of one step of each kind, and its neighbours."""
     assert image.change is not None
-    found = []
-    numbers = (("to", 0, 4, (0x7FFFFFF0, 0xFFFFFFFF)), ("size", 4, 4, (0x7FFFFFF0, 0xFFFFFFFC)),
-               ("kind", 12, 1, (3, 255)), ("area", 13, 1, (5, 6, 255)))  # fmt: skip
+    huge = (0x7FFFFFF0, 0xFFFFFFFC)
+    to, source = Fault(0, 4, huge), Fault(8, 4, huge)
+    area, source_area = Fault(13, 1, (5, 6, 255)), Fault(14, 1, (5, 6, 255))
+    every = [Fault(4, 4, huge), Fault(12, 1, (9, 255))]
+    old = {lib.CDL_CHANGE_GONE: [], lib.CDL_CHANGE_LEAD: [Fault(0, 4, (0, 7)), Fault(13, 1, (1, 0x81))]}
+    both = (lib.CDL_CHANGE_MOVE, lib.CDL_CHANGE_FOLLOW, lib.CDL_CHANGE_COPY)
+    found, seen = [], set()
     at = data.index(image.code) + image.change.place
     for step in image.change.steps:
-        for _, offset, size, wrong in numbers:
-            found += [with_bytes(data, at + offset, value.to_bytes(size, "little")) for value in wrong]
+        if step.kind in old:
+            faults = [source, source_area, *old[step.kind]]
+        else:
+            faults = [to, area] + [source, source_area] * (step.kind in both)
+        for fault in [*every, *faults] if step.kind not in seen else ():
+            found += [with_bytes(data, at + fault.offset, v.to_bytes(fault.size, "little")) for v in fault.values]
+        seen.add(step.kind)
         at += 16 + len(step.data) + -len(step.data) % 4
+    first, second = image.change.steps[:2]
+    assert second.kind <= lib.CDL_CHANGE_GONE and first.source_area == second.source_area
+    at = data.index(image.code) + image.change.place
+    found.append(with_bytes(data, at + 8, second.source.to_bytes(4, "little")))  # both about the same bytes
     return found
 
 

@@ -215,7 +215,7 @@ typedef struct {
 
 /*
  * An online change (AppChange.h). The image takes the place of that with the CRC `base` between two cycles. Variables that
- * both have are at the same places; steps at `offset` of the code do the rest, and `init` is called then.
+ * both have are at the same places, or steps at `offset` of the code move them; then `init` is called.
  */
 typedef struct {
     RTS_UI32 base;
@@ -230,11 +230,22 @@ static const RTS_UI32 CDL_CHANGE_NO_INIT;
 #define CDL_CHANGE_NO_INIT 0xFFFFFFFFu
 #endif
 
-/* What becomes of `size` bytes at `to` of an area. */
+/* What becomes of `size` bytes. The new ones are at `to` of `area`, those of the image that ran at `from` of `from_area`.
+ * First come the steps with kinds up to CDL_CHANGE_GONE, in ascending order of `from_area` and `from`, none over another:
+ * they say where pointers lead on. What is moved has another place than all that the old image has. An instance and its
+ * first member begin at the same place, and may move to different ones: CDL_CHANGE_OBJECTS in the `from_area` of a
+ * CDL_CHANGE_FOLLOW is for pointers to instances only, which have it in `area`. */
 enum {
-    CDL_CHANGE_CLEAR = 0,
-    CDL_CHANGE_PUT = 1,  /* they follow, padded to a multiple of 4 */
-    CDL_CHANGE_MOVE = 2, /* they are at `from` of `from_area` */
+    CDL_CHANGE_MOVE = 0,   /* they are copied, and pointers to them lead to the copy */
+    CDL_CHANGE_FOLLOW = 1, /* pointers to them lead to the new ones */
+    CDL_CHANGE_GONE = 2,   /* no pointer may lead there */
+    CDL_CHANGE_LEAD = 3,   /* pointers of the old image, in distances of `to` bytes */
+    CDL_CHANGE_FORGET = 4, /* the same; those that lead to what is gone become 0 */
+    CDL_CHANGE_COPY = 5,   /* they are copied */
+    CDL_CHANGE_CLEAR = 6,
+    CDL_CHANGE_PUT = 7,  /* they follow, padded to a multiple of 4 */
+    CDL_CHANGE_SIGN = 8, /* they get the sign of the number before them */
+    CDL_CHANGE_OBJECTS = 0x80,
 };
 typedef struct {
     RTS_UI32 to;

@@ -6,6 +6,7 @@ each does its own way is abstract.
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -31,7 +32,7 @@ from plctool.debug.alarms import (
     variables_of,
 )
 from plctool.debug.breakpoints import Debugger
-from plctool.debug.forced import ForcedPlace, ForceList, name_forced, place_of
+from plctool.debug.forced import ForcedPlace, ForceList, name_at, name_forced, place_of
 from plctool.debug.kept_changes import KeptChanges, kept_changes
 from plctool.debug.recipes import (
     Difference,
@@ -59,6 +60,7 @@ from plctool.debug.symbols import (
 from plctool.debug.variables import Change, Reading, Symbol
 from plctool.errors import DeviceError, UsageError, with_article
 from plctool.files import write_atomically
+from plctool.iec.areas import Area
 from plctool.iec.types import ArrayType, StringType, StructType
 from plctool.image.file import image_crc, parse_image, read_program
 from plctool.link.monitoring import Contents
@@ -82,6 +84,15 @@ RESET_OPTIONS = {
 
 OPERATIONS = ("online change", "download", "stop", "breakpoint", "write", "force", "reset")
 """What a program may forbid, by the number OPERATION_* (CmpOperationControl.h)."""
+
+_DANGLES = re.compile(r"pointer \(area (\d+), (\d+)\) leads to what is removed \(area (\d+), (\d+)\)")
+
+
+def _is_at(table: SymbolTable, name: str, place: object) -> bool:
+    """True if a program has a variable of that name at that place."""
+    with suppress(UsageError):
+        return table.resolve(name).place == place
+    return False
 
 
 @dataclass(frozen=True)
@@ -271,28 +282,69 @@ class Controller(ABC):
             if status.state is AppState.HALTED:
                 raise DeviceError("A debugger has halted the program; let it go on first.", "halted")
             self.end_debugging()  # its breakpoints are in the old code
-            released, ended = self._release_removed(status.image_crc, image_crc(data))
+            forced, ended = self._release_removed(status.image_crc, image_crc(data))
             begin = self._now()
-            self._change(data, lambda done: progress(done, len(data)))
+            try:
+                self._change(data, lambda done: progress(done, len(data)))
+            except DeviceError as error:
+                self._force_again(forced)
+                raise self._with_names(error, status.image_crc) from None
             seconds = self._now() - begin
             now = self.raw_status()
             if now.image_crc != image_crc(data):
                 raise went_down()
+            released = self._force_again(forced)
         return ChangeResult(len(data), seconds, now.state, released, ended)
 
-    def _release_removed(self, before: int, after: int) -> tuple[list[str], list[str]]:
-        """Ends the force and the traces of variables that the new program does not have; returns the names of both."""
+    def _with_names(self, error: DeviceError, crc: int) -> DeviceError:
+        """The refusal of an online change with the names of the variables that it is about."""
+        found = _DANGLES.search(error.message)
+        table = self._tables.get(crc)
+        if found is None or table is None:
+            return error
+        numbers = [int(number) for number in found.groups()]
+        variables = list(table.variables.values())
+        pointer = name_at(numbers[0], numbers[1], int(lib.APP_POINTER_SIZE), variables)
+        gone = "the old code" if numbers[2] == Area.CODE.value else name_at(numbers[2], numbers[3], 1, variables)
+        return DeviceError(
+            f"No online change: {pointer} leads to {gone}, which is removed. Set {pointer} to another variable or to 0 "
+            "first, or download the program with 'plctool flash'.",
+            error.code,
+        )
+
+    def _release_removed(self, before: int, after: int) -> tuple[dict[str, Any], list[str]]:
+        """Ends the force and the traces of variables that the new program does not have, or has at another place.
+        Returns the forced values, and the names of the traces."""
         try:
             had, has = (self._tables.get(crc) or find_symbols(crc) for crc in (before, after))
         except UsageError:
-            return [], []
-        removed = [s for name, s in had.variables.items() if name not in has.variables]
-        places = []
+            return {}, []
+        removed = [s for name, s in had.variables.items() if not _is_at(has, name, s.place)]
+        released: dict[str, tuple[Symbol, bytes]] = {}
         with suppress(DeviceError):
-            places = [place for place in self._read_forces().places if any(place.overlaps(s) for s in removed)]
+            variables = list(had.variables.values())
+            places = []
+            for place in self._read_forces().places:
+                named = name_forced([place], variables)
+                known = any(_is_at(had, name, symbol.place) for name, (symbol, _) in named.items())
+                if known and not all(_is_at(has, name, symbol.place) for name, (symbol, _) in named.items()):
+                    places.append(place)
+                    released |= named
             if places:
                 self._unforce(had, places)
-        return list(name_forced(places, list(had.variables.values()))), self._end_traces_of(removed)
+        return {name: symbol.decode(content) for name, (symbol, content) in released.items()}, self._end_traces_of(
+            removed
+        )
+
+    def _force_again(self, values: Mapping[str, Any]) -> list[str]:
+        """Forces variables that have moved; returns those that cannot be, such as removed ones."""
+        failed = []
+        for name, value in values.items():
+            try:
+                self.force({name: value})
+            except (DeviceError, UsageError):
+                failed.append(name)
+        return failed
 
     def _end_traces_of(self, removed: Sequence[Symbol]) -> list[str]:
         ended = []

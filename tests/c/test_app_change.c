@@ -6,13 +6,21 @@
  * A device runs application 1 (proven), whose variables have values by now. Application 2 takes its place while it runs, goes
  * on, proves itself, is stopped and started again.
  */
+#include "AppAddress.h"
 #include "AppException.h"
 #include "AppState.h"
 #include "CmpEventMgr.h"
 #include "app_image.h"
 #include "test.h"
 
-enum { NEW_OFFSET = 32, NEW_VALUE = 0x1234 };
+enum {
+    NEW_OFFSET = 32,
+    NEW_VALUE = 0x1234,
+    POINTER_OFFSET = 8, /* leads to what moves */
+    OLD_PLACE = 16,
+    NEW_PLACE = 48,
+    MOVED_VALUE = 77,
+};
 
 static APP_BYTES images[4]; /* [step]; 0 unused */
 static RTS_UI32 cuts;
@@ -24,6 +32,13 @@ static void emit_step(APP_SPEC *spec, RTS_UI8 kind, RTS_UI8 area, RTS_UI32 to, R
     emit(spec, (const char *)&step, sizeof step);
 }
 
+static void emit_move(APP_SPEC *spec, RTS_UI8 kind, RTS_UI32 from, RTS_UI32 to, RTS_UI32 size)
+{
+    CDL_CHANGE_STEP step = {to, size, from, kind, APP_AREA_DATA, APP_AREA_DATA, 0};
+
+    emit(spec, (const char *)&step, sizeof step);
+}
+
 /* The counter that counts by `step`, in place of another one; a new variable gets NEW_VALUE. */
 static void spec_change(APP_SPEC *spec, RTS_UI32 step, const APP_BYTES *base)
 {
@@ -31,10 +46,29 @@ static void spec_change(APP_SPEC *spec, RTS_UI32 step, const APP_BYTES *base)
     while (spec->code_size % 4 != 0)
         emit_ret(spec);
     spec->change = (CDL_CHANGE){image_crc(base), CDL_CHANGE_NO_INIT, here(spec), 0};
+    emit_move(spec, CDL_CHANGE_MOVE, OLD_PLACE, NEW_PLACE, 8);
+    emit_move(spec, CDL_CHANGE_LEAD, POINTER_OFFSET, 8, APP_POINTER_SIZE);
     emit_step(spec, CDL_CHANGE_CLEAR, APP_AREA_DATA, NEW_OFFSET, 8);
     emit_step(spec, CDL_CHANGE_PUT, APP_AREA_DATA, NEW_OFFSET, 2);
     emit_u32(spec, NEW_VALUE);
     spec->change.size = here(spec) - spec->change.offset;
+}
+
+/* The program would have set its pointer. */
+static void set_pointer(RTS_UI32 offset)
+{
+    uintptr_t pointer = (uintptr_t)AppGetAreaAddress(APP_AREA_DATA, 0, 64) + offset;
+
+    memcpy(AppGetAreaAddress(APP_AREA_DATA, 0, 64) + POINTER_OFFSET, &pointer, sizeof pointer);
+    AppGetAreaAddress(APP_AREA_DATA, 0, 64)[offset] = MOVED_VALUE;
+}
+
+static RTS_UI32 pointer_leads_to(void)
+{
+    uintptr_t pointer;
+
+    memcpy(&pointer, AppGetAreaAddress(APP_AREA_DATA, 0, 64) + POINTER_OFFSET, sizeof pointer);
+    return (RTS_UI32)(pointer - (uintptr_t)AppGetAreaAddress(APP_AREA_DATA, 0, 64));
 }
 
 static RTS_RESULT change_to(const APP_BYTES *image)
@@ -89,7 +123,10 @@ static void variables_go_on_in_the_new_code(void)
     prepare(8, 0xFF, 512);
     start_again();
     counter = read_u32(APP_AREA_DATA, COUNTER_OFFSET);
+    set_pointer(OLD_PLACE + 4);
     CHECK_EQUAL(change_to(&images[2]), ERR_OK);
+    CHECK_EQUAL(pointer_leads_to(), NEW_PLACE + 4);
+    CHECK_EQUAL(AppGetAreaAddress(APP_AREA_DATA, 0, 64)[NEW_PLACE + 4], MOVED_VALUE);
     CHECK_EQUAL(app_state(), AS_RUN);
     CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), counter);
     CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1); /* set by the initialisation of the old one only */
@@ -163,8 +200,10 @@ static void a_fault_at_any_operation_leaves_one_of_both_running(void)
         RTS_RESULT result;
         start_again();
         counter = read_u32(APP_AREA_DATA, COUNTER_OFFSET);
+        set_pointer(OLD_PLACE);
         SimFlashCut(k, SIM_FAULT);
         result = change_to(&images[2]);
+        CHECK_EQUAL(pointer_leads_to(), (result == ERR_OK ? NEW_PLACE : OLD_PLACE));
         CHECK_EQUAL(app_state(), AS_RUN);
         CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), counter);
         SimFlashCut(0, 0);
@@ -234,7 +273,6 @@ static void each_number_of_the_list_is_checked(void)
         step->size = wrong[i];
         CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
         spec = good;
-        step->kind = CDL_CHANGE_MOVE;
         step->from = wrong[i];
         CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
     }
@@ -245,7 +283,6 @@ static void each_number_of_the_list_is_checked(void)
     spec.change.size -= 4; /* a step ends within its data */
     CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
     spec = good;
-    step->kind = CDL_CHANGE_MOVE;
     step->from_area = APP_AREA_CODE;
     CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
     CHECK_EQUAL(check_whole(), 1);

@@ -8,6 +8,10 @@ from typing import Any
 import pytest
 
 PROGRAM = "PROGRAM Main\nVAR x : DINT; END_VAR\nx := x + 1;\nEND_PROGRAM\n"
+TASK = (
+    "CONFIGURATION C RESOURCE R ON PLC TASK T(INTERVAL := T#5ms, PRIORITY := 1); PROGRAM Main WITH T : Main;\n"
+    "END_RESOURCE END_CONFIGURATION\n"
+)
 
 
 @pytest.fixture(autouse=True)
@@ -36,12 +40,22 @@ def test_image_of_a_change_names_the_image_that_it_replaces(tool: Any, scratch: 
 
 
 def test_impossible_change_is_refused_in_words(tool: Any, scratch: Path) -> None:
-    edit(scratch, "DINT", "REAL")
+    (scratch / "main.st").write_text(PROGRAM + TASK)
     done = tool("build", "main.st", "-o", "new.cdl", "--base", "old.cdl")
     assert done.status == 2
-    assert "No online change: Main.x was DINT, is REAL. Undo that, or download the program" in done.err
+    assert "No online change: task T is new; task Main is removed. Undo that, or download the program" in done.err
     assert not (scratch / "new.cdl").exists()
     assert tool("build", "main.st", "--base", "old.cdl", "--dry-run", "--json").json["problems"]
+
+
+def test_plan_says_what_moves_and_what_begins_anew(tool: Any, scratch: Path) -> None:
+    (scratch / "main.st").write_text(PROGRAM.replace("x : DINT", "list : ARRAY[1..3] OF INT; x : DINT"))
+    assert tool("build", "main.st", "-o", "old.cdl").status == 0
+    text = PROGRAM.replace("x : DINT", "list : ARRAY[1..5] OF INT; x : REAL").replace("x + 1", "x + 1.0")
+    (scratch / "main.st").write_text(text)
+    done = tool("build", "main.st", "-o", "new.cdl", "--base", "old.cdl", "--dry-run")
+    lines = ["  moved: Main.list", "  gets its initial value: Main.x was DINT, is REAL", "  extended: Main.list"]
+    assert done.out.splitlines()[1:] == lines
 
 
 def test_base_that_is_no_image_is_refused(tool: Any) -> None:

@@ -13,6 +13,7 @@ sys.path.append(str(Path(__file__).parents[1]))
 
 from online_programs import Source, built, edited, random_source
 
+from plctool.core import lib
 from plctool.debug.symbols import SymbolTable
 from plctool.image.file import parse_image
 
@@ -37,15 +38,17 @@ def test_any_edit_leaves_every_other_place_as_it_was(seed: int, tmp_path: Path) 
         after = built(tmp_path, source.text, before.symbols)
         assert after.change is not None and after.change.problems == []
         had, has = places(before.symbols), places(after.symbols)
-        assert {name: has[name] for name in has if name in had} == {name: had[name] for name in has if name in had}
-        assert sorted(v.name for v in after.change.new) == sorted(has.keys() - had.keys())
+        new = {v.name for v in after.change.new}
+        stay = (has.keys() & had.keys()) - new - set(after.change.moved)
+        assert {name: has[name][:2] for name in stay} == {name: had[name][:2] for name in stay}
+        assert has.keys() - had.keys() <= new
+        assert {why.partition(" was ")[0] for why in after.change.retyped} >= new & had.keys()
         assert sorted(after.change.removed) == sorted(had.keys() - has.keys())
         assert_apart(after.symbols)
         old = [(s.area, s.offset, s.offset + s.size) for s in before.symbols.variables.values()]
-        for v in after.change.new:  # the program that runs uses none of their places
-            assert not [o for o in old if o[0] == v.area.value and o[1] < v.offset + v.type.size and v.offset < o[2]], (
-                v.name
-            )
+        for name in new | set(after.change.moved):  # the program that runs uses none of their places
+            area, offset, _, size = has[name]
+            assert not [o for o in old if o[0] == area and o[1] < offset + size and offset < o[2]], name
         before = after
 
 
@@ -78,15 +81,6 @@ EXIT = "FUNCTION_BLOCK E METHOD FB_Exit : BOOL ; END_METHOD ; END_FUNCTION_BLOCK
 @pytest.mark.parametrize(
     ("before", "after", "problem"),
     [
-        (MAIN.format("x : INT;"), MAIN.format("x : DINT;"), "Main.x was INT, is DINT"),
-        (MAIN.format("x : STRING[5];"), MAIN.format("x : STRING[9];"), "Main.x: STRING[5] became STRING[9]"),
-        (BLOCK.format("a : DINT;"), BLOCK.format("a : DINT; c : DINT;"), "Main.b: B grew by 4 bytes"),
-        (BLOCK.format("a, c : INT;"), BLOCK.format("c, a : INT;"), "Main.b: in B, c is at another place"),
-        (BLOCK.format("a : DINT;"), BLOCK.format("a : REAL;"), "Main.b: B.a was DINT, is REAL"),
-        (
-            MAIN.format("x : DINT;"), MAIN.replace("VAR", "VAR RETAIN", 1).format("x : DINT;"),
-            "Main.x is in the retain area, before in the data area",
-        ),
         (
             EXIT + MAIN.format("e : E;"), EXIT + MAIN.format("f : INT;"),
             "Main.e is removed, and its FB_Exit would not run",
@@ -100,6 +94,37 @@ EXIT = "FUNCTION_BLOCK E METHOD FB_Exit : BOOL ; END_METHOD ; END_FUNCTION_BLOCK
 )  # fmt: skip
 def test_what_cannot_change_is_named(tmp_path: Path, before: str, after: str, problem: str) -> None:
     assert change_of(tmp_path, before, after) == [problem]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "moved", "retyped"),
+    [
+        (MAIN.format("x : INT;"), MAIN.format("x : DINT;"), ["Main.x"], []),
+        (MAIN.format("x : DINT;"), MAIN.format("x : INT;"), [], ["Main.x was DINT, is INT"]),
+        (MAIN.format("x : STRING[5];"), MAIN.format("x : STRING[9];"), ["Main.x"], []),
+        (BLOCK.format("a : DINT;"), BLOCK.format("a : DINT; c : DINT;"), ["Main.b"], []),
+        (BLOCK.format("a, c : INT;"), BLOCK.format("c, a : INT;"), ["Main.b"], []),
+        (BLOCK.format("a, c : DINT;"), BLOCK.format("a : DINT;"), [], []),
+        (BLOCK.format("a : DINT;"), BLOCK.format("a : REAL;"), [], ["Main.b: B.a was DINT, is REAL"]),
+        (MAIN.format("x : DINT;"), MAIN.replace("VAR", "VAR RETAIN", 1).format("x : DINT;"), ["Main.x"], []),
+    ],
+)
+def test_what_moves_and_what_begins_anew_is_named(
+    tmp_path: Path, before: str, after: str, moved: list[str], retyped: list[str]
+) -> None:
+    change = built(tmp_path, after, built(tmp_path, before).symbols).change
+    assert change is not None
+    assert (change.moved, change.retyped, change.problems) == (moved, retyped, [])
+
+
+def test_constant_that_changes_is_saved_for_the_way_back_and_another_one_costs_nothing(tmp_path: Path) -> None:
+    variables = "VAR n : INT; END_VAR VAR CONSTANT c : ARRAY[1..2] OF INT := [{}, 2]; END_VAR"
+    text = f"PROGRAM Main {variables} n := n + c[1 + n MOD 2]; END_PROGRAM"
+    base = built(tmp_path, text.format(1)).symbols
+    steps = parse_image(built(tmp_path, text.format(5), base).image).change
+    assert steps is not None and [s.kind for s in steps.steps] == [lib.CDL_CHANGE_COPY, lib.CDL_CHANGE_PUT]
+    same = parse_image(built(tmp_path, text.format(1).replace("n + c", "n - c"), base).image).change
+    assert same is not None and same.steps == ()
 
 
 def test_a_member_that_fits_into_a_gap_is_new_in_its_place(tmp_path: Path) -> None:

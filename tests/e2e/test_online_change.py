@@ -94,12 +94,10 @@ def test_edited_project_is_changed_in_the_program_that_runs(project: Path, plcrt
 
 
 def test_impossible_edit_is_refused_before_anything_is_sent(project: Path, plcrt: Plcrt, tool: Tool) -> None:
-    (project / "main.st").write_text(
-        program(BODY).replace("fixed : DINT", "fixed : LINT").replace("DINT := ADR", "LINT := ADR")
-    )
+    (project / "main.st").write_text(program(BODY).replace("T#5ms", "T#6ms"))
     done = tool("flash", "--online-change", "--tcp", plcrt.tcp)
     assert done.status == 2
-    assert "Main.fixed was DINT, is LINT" in done.err
+    assert "task T has another interval: 5000, now 6000" in done.err
     assert tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed")["values"] == {"Main.fixed": 7}
 
 
@@ -119,6 +117,13 @@ def test_force_of_a_removed_variable_ends_and_others_stay(project: Path, plcrt: 
     (project / "main.st").write_text(program(BODY).replace("gone : LINT := 5;", ""))
     assert tool.ok("flash", "--online-change", "--tcp", plcrt.tcp)["released"] == ["Main.gone"]
     assert list(tool.ok("forced", "--tcp", plcrt.tcp)["values"]) == ["Main.fixed"]
+
+
+def test_force_of_a_variable_that_moves_is_set_again(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    tool.ok("force", "--tcp", plcrt.tcp, "Main.list[2]=5", "Main.fixed=2")
+    (project / "main.st").write_text(program(BODY).replace("ARRAY[1..4] OF INT := [4", "ARRAY[0..4] OF INT := [0, 4"))
+    assert tool.ok("flash", "--online-change", "--tcp", plcrt.tcp)["released"] == []
+    assert tool.ok("forced", "--tcp", plcrt.tcp)["values"] == {"Main.fixed": 2, "Main.list[2]": 5}
 
 
 def test_trace_of_a_removed_variable_ends_and_others_stay(project: Path, plcrt: Plcrt, tool: Tool) -> None:

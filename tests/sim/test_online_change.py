@@ -13,7 +13,7 @@ import pytest
 sys.path.append(str(Path(__file__).parents[1]))
 
 from changing import Changing, program
-from online_programs import built, edited, random_source
+from online_programs import built, carried, edited, random_source
 
 from plctool import Simulator
 from plctool.controller import Controller
@@ -37,8 +37,19 @@ class TestSimulator(Changing):
 
 
 def values(plc: Simulator) -> dict[str, Any]:
-    names = [name for name in plc.symbols().variables if name != "Main.to"]
+    """All but pointers."""
+    names = [name for name in plc.symbols().variables if not name.startswith("Main.to")]
     return plc.read_all(names)
+
+
+def write_all(plc: Simulator, written: dict[str, Any]) -> None:
+    for name, value in written.items():
+        if isinstance(value, dict):
+            write_all(plc, {f"{name}.{member}": part for member, part in value.items()})
+        elif isinstance(value, list):
+            write_all(plc, {f"{name}[{index}]": part for index, part in enumerate(value, 1)})
+        else:
+            plc.write({name: value})
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -51,30 +62,33 @@ def test_a_changed_program_behaves_as_one_that_began_with_these_values(seed: int
     with Simulator(result.image, result.symbols) as plc:
         for n in range(3):
             plc.run_for(10 * random.randrange(1, 9))
-            before = values(plc)
+            before, had = values(plc), source.types
             source = edited(random, source, 100 * (n + 1))
             result = built(tmp_path, source.text, result.symbols)
             plc.add_symbols(result.symbols)
             plc.change(result.image)
             now = values(plc)
-            assert {k: v for k, v in now.items() if k in before} == {k: before[k] for k in now if k in before}
             (tmp_path / "fresh").mkdir(exist_ok=True)
             fresh = built(tmp_path / "fresh", source.text)
             with Simulator(fresh.image, fresh.symbols, start=False) as other:
                 other.restart()
                 initial = values(other)
-                assert {k: v for k, v in now.items() if k not in before} == {
-                    k: v for k, v in initial.items() if k not in before
+                assert now == {
+                    name: carried(name.removeprefix("Main."), before[name], value, had, source.types)
+                    if name in before
+                    else value
+                    for name, value in initial.items()
                 }
-                other.write({k: v for k, v in now.items() if not isinstance(v, list | dict)})
-                other.write({f"{k}.{m}": w for k, v in now.items() if isinstance(v, dict) for m, w in v.items()})
-                other.write({f"{k}[{i}]": w for k, v in now.items() if isinstance(v, list) for i, w in enumerate(v, 1)})
+                write_all(other, now)
                 assert values(other) == now
                 other.start()
                 plc.run_for(100)
                 other.run_for(100)
                 assert values(plc)["Main.block"] == values(other)["Main.block"]
                 assert plc.read("Main.to^") == plc.read("Main.cycles")
+            for line in source.lines:
+                place = f"Main.{line.name}" + "[1]" * ("ARRAY" in line.type)
+                assert plc.read(f"Main.to_{line.name}^") == plc.read(place)
 
 
 def test_ten_changes_in_a_row_lose_no_cycle(tmp_path: Path) -> None:

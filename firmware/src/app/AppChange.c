@@ -11,6 +11,7 @@
 
 #include "../cycle/AppAreas.h"
 #include "../load/AppFunctions.h"
+#include "AppAddress.h"
 #include "AppCommit.h"
 #include "AppEvents.h"
 #include "AppLife.h"
@@ -32,6 +33,10 @@ typedef struct {
     APP_TABLES tables;
     APP_IMAGE old;
     const RTS_UI8 *old_code;
+    RTS_UI32 led;          /* steps, from the first one, that say where pointers lead on */
+    AREA_ADDRESS dangling; /* the first pointer to something that is gone */
+    AREA_ADDRESS gone;     /* that */
+    bool dangles;
     RTS_UI32 exception; /* of what initialises */
 } CHANGE;
 
@@ -57,17 +62,57 @@ static bool is_in_area(const APP_IMAGE *image, RTS_UI32 area, RTS_UI32 offset, R
     return area < APP_AREA_CODE && offset <= image->area_size[area] && size <= image->area_size[area] - offset;
 }
 
+static bool is_led(const CDL_CHANGE_STEP *step)
+{
+    return step->kind <= CDL_CHANGE_GONE;
+}
+
+static bool is_pointers(const CDL_CHANGE_STEP *step)
+{
+    return step->kind == CDL_CHANGE_LEAD || step->kind == CDL_CHANGE_FORGET;
+}
+
+static bool is_copied(const CDL_CHANGE_STEP *step)
+{
+    return step->kind == CDL_CHANGE_MOVE || step->kind == CDL_CHANGE_COPY;
+}
+
+/* Checks the place that a step has in the image that runs. */
+static bool is_from(const CHANGE *change, const CDL_CHANGE_STEP *step)
+{
+    RTS_UI32 area = step->kind == CDL_CHANGE_FOLLOW ? step->from_area & ~(RTS_UI32)CDL_CHANGE_OBJECTS : step->from_area;
+
+    return is_in_area(&change->old, area, step->from, step->size);
+}
+
 static bool is_step(const CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI32 left)
 {
-    if (step->kind > CDL_CHANGE_MOVE || !is_in_area(change->image, step->area, step->to, step->size))
+    if (is_pointers(step))
+        return step->to >= APP_POINTER_SIZE && (step->area & ~CDL_CHANGE_OBJECTS) == 0 && is_from(change, step);
+    if (step->kind == CDL_CHANGE_GONE)
+        return is_from(change, step);
+    if (step->kind > CDL_CHANGE_SIGN || !is_in_area(change->image, step->area, step->to, step->size))
         return false;
-    if (step->kind == CDL_CHANGE_MOVE)
-        return is_in_area(&change->old, step->from_area, step->from, step->size);
+    if (is_copied(step) || step->kind == CDL_CHANGE_FOLLOW)
+        return is_from(change, step);
+    if (step->kind == CDL_CHANGE_SIGN)
+        return step->to > 0;
     return step->kind != CDL_CHANGE_PUT || data_size(step) <= left;
 }
 
+/* True if a step that leads pointers on is after the previous one. */
+static bool is_in_order(const CHANGE *change, const CDL_CHANGE_STEP *step)
+{
+    const CDL_CHANGE_STEP *last = step - 1;
+
+    if (step != first_step(change) + change->led)
+        return false;
+    return change->led == 0 || last->from_area < step->from_area ||
+           (last->from_area == step->from_area && last->from + last->size <= step->from);
+}
+
 /* Each step within its area and the code. */
-static bool are_steps(const CHANGE *change)
+static bool are_steps(CHANGE *change)
 {
     const CDL_CHANGE *place = &change->image->change;
     RTS_UI32 code_size = change->image->code.size;
@@ -80,21 +125,190 @@ static bool are_steps(const CHANGE *change)
     for (step = first_step(change); left > 0; step = next_step(step)) {
         if (left < sizeof *step || !is_step(change, step, left - (RTS_UI32)sizeof *step))
             return false;
+        if (is_led(step) && !is_in_order(change, step))
+            return false;
+        change->led += is_led(step);
         left -= (RTS_UI32)sizeof *step + data_size(step);
     }
     return true;
 }
 
-static void do_step(const CDL_CHANGE_STEP *step)
-{
-    RTS_UI8 *to = AppAreasGet(step->area) + step->to;
+/* ---- pointers ---- */
 
-    if (step->kind == CDL_CHANGE_CLEAR)
-        memset(to, 0, step->size);
+static RTS_UI8 *source_of(const CDL_CHANGE_STEP *step)
+{
+    return AppAreasGet(step->from_area & ~(RTS_UI32)CDL_CHANGE_OBJECTS) + step->from;
+}
+
+static RTS_UI8 *target_of(const CDL_CHANGE_STEP *step)
+{
+    return AppAreasGet(step->area) + step->to;
+}
+
+/* The areas may be anywhere in memory, so the place is compared with the one that the area has. */
+static bool leads_to(uintptr_t pointer, const RTS_UI8 *place, RTS_UI32 size)
+{
+    return pointer - (uintptr_t)place < size;
+}
+
+/* Returns the step whose part of the image that ran a pointer leads to; NULL: none. */
+static const CDL_CHANGE_STEP *find_step(const CHANGE *change, RTS_UI32 area, RTS_UI32 offset)
+{
+    const CDL_CHANGE_STEP *steps = first_step(change);
+    RTS_UI32 low = 0;
+    RTS_UI32 high = change->led;
+
+    while (low < high) {
+        RTS_UI32 middle = (low + high) / 2;
+        const CDL_CHANGE_STEP *step = &steps[middle];
+        if (step->from_area < area || (step->from_area == area && step->from + step->size <= offset))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < change->led && steps[low].from_area == area && steps[low].from <= offset ? &steps[low] : NULL;
+}
+
+/* Finds what a pointer leads to, and its step. `objects`: CDL_CHANGE_OBJECTS for a pointer to an instance. From `begin`,
+ * before the image that runs is another one. */
+static const CDL_CHANGE_STEP *follow(const CHANGE *change, uintptr_t pointer, RTS_UI32 objects, AREA_ADDRESS *address)
+{
+    const CDL_CHANGE_STEP *step = NULL;
+
+    if (!AppFindArea(pointer, &address->area, &address->offset))
+        address->area = APP_AREA_NONE;
+    if (objects != 0)
+        step = find_step(change, address->area | objects, address->offset);
+    return step != NULL ? step : find_step(change, address->area, address->offset);
+}
+
+static bool is_gone(const CDL_CHANGE_STEP *step, const AREA_ADDRESS *address)
+{
+    return address->area == APP_AREA_CODE || (step != NULL && step->kind == CDL_CHANGE_GONE);
+}
+
+/* Calls `handle` with each pointer of a step. */
+static void for_pointers(CHANGE *change, const CDL_CHANGE_STEP *step,
+                         void (*handle)(CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI8 *at))
+{
+    RTS_UI32 at;
+
+    for (at = 0; at < step->size && step->size - at >= APP_POINTER_SIZE; at += step->to) {
+        handle(change, step, source_of(step) + at);
+        if (step->size - at < step->to)
+            break;
+    }
+}
+
+static void check_pointer(CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI8 *at)
+{
+    const CDL_CHANGE_STEP *found;
+    uintptr_t pointer;
+
+    if (step->kind == CDL_CHANGE_FORGET || change->dangles)
+        return;
+    memcpy(&pointer, at, sizeof pointer);
+    found = follow(change, pointer, step->area, &change->gone);
+    if (!is_gone(found, &change->gone))
+        return;
+    change->dangles = true;
+    change->dangling.area = step->from_area;
+    change->dangling.offset = (RTS_UI32)(at - AppAreasGet(step->from_area));
+}
+
+static void lead_pointer(CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI8 *at)
+{
+    const CDL_CHANGE_STEP *found;
+    AREA_ADDRESS address;
+    uintptr_t pointer;
+
+    memcpy(&pointer, at, sizeof pointer);
+    found = follow(change, pointer, step->area, &address);
+    if (is_gone(found, &address))
+        pointer = 0;
+    else if (found != NULL)
+        pointer = pointer - (uintptr_t)source_of(found) + (uintptr_t)target_of(found);
+    memcpy(at, &pointer, sizeof pointer);
+}
+
+/* Returns the step that has led a pointer to where it is; NULL: none. */
+static const CDL_CHANGE_STEP *find_back(const CHANGE *change, uintptr_t pointer, RTS_UI32 objects)
+{
+    const CDL_CHANGE_STEP *found = NULL;
+    const CDL_CHANGE_STEP *step = first_step(change);
+    RTS_UI32 i;
+
+    for (i = 0; i < change->led; i++, step++) {
+        RTS_UI32 own = step->from_area & CDL_CHANGE_OBJECTS;
+        if (step->kind == CDL_CHANGE_GONE || !leads_to(pointer, target_of(step), step->size))
+            continue;
+        if (own == objects)
+            return step;
+        if (own == 0)
+            found = step;
+    }
+    return found;
+}
+
+static void lead_back(CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI8 *at)
+{
+    const CDL_CHANGE_STEP *found;
+    uintptr_t pointer;
+
+    memcpy(&pointer, at, sizeof pointer);
+    found = find_back(change, pointer, step->area);
+    if (found != NULL)
+        pointer = pointer - (uintptr_t)target_of(found) + (uintptr_t)source_of(found);
+    memcpy(at, &pointer, sizeof pointer);
+}
+
+/* ---- what steps do ---- */
+
+static void check_step(CHANGE *change, const CDL_CHANGE_STEP *step)
+{
+    if (is_pointers(step))
+        for_pointers(change, step, check_pointer);
+}
+
+static void lead_on(CHANGE *change, const CDL_CHANGE_STEP *step)
+{
+    if (is_pointers(step))
+        for_pointers(change, step, lead_pointer);
+}
+
+static void write_step(CHANGE *change, const CDL_CHANGE_STEP *step)
+{
+    RTS_UNUSED(change);
+    if (is_copied(step))
+        memmove(target_of(step), source_of(step), step->size);
+    else if (step->kind == CDL_CHANGE_CLEAR)
+        memset(target_of(step), 0, step->size);
     else if (step->kind == CDL_CHANGE_PUT)
-        memcpy(to, step + 1, step->size);
-    else
-        memmove(to, AppAreasGet(step->from_area) + step->from, step->size);
+        memcpy(target_of(step), step + 1, step->size);
+    else if (step->kind == CDL_CHANGE_SIGN)
+        memset(target_of(step), target_of(step)[-1] & 0x80 ? 0xFF : 0, step->size);
+}
+
+static void copy_back(CHANGE *change, const CDL_CHANGE_STEP *step)
+{
+    RTS_UNUSED(change);
+    if (is_copied(step))
+        memmove(source_of(step), target_of(step), step->size);
+}
+
+static void follow_back(CHANGE *change, const CDL_CHANGE_STEP *step)
+{
+    if (is_pointers(step))
+        for_pointers(change, step, lead_back);
+}
+
+static void for_steps(CHANGE *change, void (*handle)(CHANGE *change, const CDL_CHANGE_STEP *step))
+{
+    const RTS_UI8 *end = (const RTS_UI8 *)first_step(change) + change->image->change.size;
+    const CDL_CHANGE_STEP *step;
+
+    for (step = first_step(change); (const RTS_UI8 *)step < end; step = next_step(step))
+        handle(change, step);
 }
 
 /* ---- checks ---- */
@@ -137,7 +351,7 @@ static RTS_RESULT check_tasks(const CHANGE *change, APP_REFUSAL *refusal)
     return ERR_OK;
 }
 
-static RTS_RESULT check_all(const CHANGE *change, APP_REFUSAL *refusal)
+static RTS_RESULT check_all(CHANGE *change, APP_REFUSAL *refusal)
 {
 #if IO_MAX_CONNECTORS > 0
     if (change->image->io.size != 0 || change->old.io.size != 0)
@@ -150,22 +364,25 @@ static RTS_RESULT check_all(const CHANGE *change, APP_REFUSAL *refusal)
 
 /* ---- the exchange ---- */
 
-/* No task is in its cycle. */
+/* No task is in its cycle. Pointers lead on where they were, before what they are in is moved. */
 static void begin(void *arg)
 {
-    const CHANGE *change = arg;
-    const RTS_UI8 *end = (const RTS_UI8 *)first_step(change) + change->image->change.size;
-    const CDL_CHANGE_STEP *step;
+    CHANGE *change = arg;
 
-    for (step = first_step(change); (const RTS_UI8 *)step < end; step = next_step(step))
-        do_step(step);
+    for_steps(change, check_step);
+    if (change->dangles)
+        return;
+    for_steps(change, lead_on);
+    for_steps(change, write_step);
     AppExchange(change->image, change->code, &change->tables);
 }
 
 static void go_back(void *arg)
 {
-    const CHANGE *change = arg;
+    CHANGE *change = arg;
 
+    for_steps(change, copy_back);
+    for_steps(change, follow_back);
     AppExchange(&change->old, change->old_code, &change->tables);
 }
 
@@ -173,9 +390,9 @@ static void go_back(void *arg)
 static bool initialise(void *arg)
 {
     CHANGE *change = arg;
-    bool done = AppRunInit(change->image->change.init, &change->exception);
+    bool done = !change->dangles && AppRunInit(change->image->change.init, &change->exception);
 
-    if (!done && AppLoaderRead(&change->old, &change->tables) == ERR_OK)
+    if (!done && !change->dangles && AppLoaderRead(&change->old, &change->tables) == ERR_OK)
         go_back(change);
     return done;
 }
@@ -188,6 +405,10 @@ static RTS_RESULT exchange(CHANGE *change, APP_REFUSAL *refusal)
 
     if (result == ERR_TIMEOUT)
         return APP_REFUSE(refusal, result, "A task takes too long for its cycle; try again.");
+    if (change->dangles)
+        return APP_REFUSE(refusal, ERR_INVALID_REFERENCE,
+                          "A pointer (area %u, %u) leads to what is removed (area %u, %u).", U(change->dangling.area),
+                          U(change->dangling.offset), U(change->gone.area), U(change->gone.offset));
     if (result != ERR_OK)
         return APP_REFUSE(refusal, result, "The initial values of new variables failed (exception 0x%X).",
                           U(change->exception));

@@ -94,7 +94,8 @@ def live_change_text(document: dict[str, Any]) -> str:
     lines = [change_text(document)] if "kept" in document else []
     lines += [f"no longer forced, since it is removed: {name}" for name in document.get("released", ())]
     lines += [
-        f"trace {name or '(a tool)'} has ended, since a variable of it is removed" for name in document.get("ended", ())
+        f"trace {name or '(a tool)'} has ended, since a variable of it is removed or moves"
+        for name in document.get("ended", ())
     ]
     if "seconds" in document:
         lines.append(f"changed: {document['bytes']} bytes in {document['seconds']:.2f} s; state: {document['state']}")

@@ -20,6 +20,13 @@ if TYPE_CHECKING:
     from plctool.debug.symbols import SymbolTable
 
 _SHOWN = 20  # names of each kind
+_KINDS = {
+    "moved": "moved",
+    "retyped": "gets its initial value",
+    "new": "new",
+    "removed": "removed",
+    "extended": "extended",
+}
 
 
 def with_base(settings: Settings, args: argparse.Namespace) -> Settings:
@@ -48,14 +55,16 @@ def change_document(result: BuildResult) -> Document:
 
     change = result.change
     assert change is not None
-    image = parse_image(result.image).change
+    image, had = parse_image(result.image).change, change.previous.variables
     return {
         "base": f"{change.previous.crc:08X}",
         "kept": change.kept,
-        "new": [v.name for v in change.new if _is_of_user(v.name)],
+        "moved": change.moved,
+        "retyped": change.retyped,
+        "new": [v.name for v in change.new if _is_of_user(v.name) and v.name.casefold() not in had],
         "removed": [name for name in change.removed if _is_of_user(name)],
         "extended": list(dict.fromkeys(v.name for v, fresh in change.fresh if not fresh.was_in_register)),
-        "written": 0 if image is None else sum(step.size for step in image.steps),
+        "written": 0 if image is None else sum(step.size for step in image.steps if step.writes),
         "problems": change.problems,
     }
 
@@ -80,10 +89,10 @@ def change_text(document: dict[str, Any]) -> str:
         f"online change of {document['base']}: {counted(document['kept'], 'variable')} kept, "
         f"{len(document['new'])} new, {len(document['removed'])} removed; {document['written']} bytes are written"
     ]
-    for kind in ("new", "removed", "extended"):
-        lines += [f"  {kind}: {name}" for name in document[kind][:_SHOWN]]
+    for kind, title in _KINDS.items():
+        lines += [f"  {title}: {name}" for name in document[kind][:_SHOWN]]
         if len(document[kind]) > _SHOWN:
-            lines.append(f"  {kind}: and {len(document[kind]) - _SHOWN} more")
+            lines.append(f"  {title}: and {len(document[kind]) - _SHOWN} more")
     if document["problems"]:
         lines.append(_impossible(document["problems"]))
     return "\n".join(lines)

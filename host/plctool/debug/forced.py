@@ -101,6 +101,15 @@ def _target(pointer: Symbol, t: Type) -> Symbol:
     return followed
 
 
+def name_at(area: int, offset: int, size: int, variables: Iterable[Symbol]) -> str:
+    """The name of the variable, or of the part of it, that has `size` bytes from an offset on; else of the variable
+    around them, or the address."""
+    known = [s for s in variables if s.area == area and s.pointer is None and s.offset <= offset < s.offset + s.size]
+    parts = (_part(symbol, offset, size) for symbol in known)
+    found = next((part for part in parts if part is not None), known[0] if known else None)
+    return found.name if found is not None else f"{Area(area).name.lower()}+{offset}"
+
+
 def _parts_at(symbol: Symbol, place: ForcedPlace) -> Iterator[Symbol]:
     """The variable, or the part of it, that is forced."""
     if not place.is_bits:

@@ -127,7 +127,8 @@ class KeptVariable:
 
 @dataclass(frozen=True)
 class ChangeStep:
-    """A step of an online change: `size` bytes at `to` of an area become zero, `data`, or those at `source`."""
+    """A step of an online change (CDL_CHANGE_STEP): what becomes of `size` bytes at `to` of an area in the new program,
+    or at `source` of `source_area` in the old one."""
 
     kind: int
     area: int
@@ -136,6 +137,11 @@ class ChangeStep:
     source_area: int = 0
     source: int = 0
     data: bytes = b""
+
+    @property
+    def writes(self) -> bool:
+        """True if it writes its bytes into the memory of the new program."""
+        return bool(self.kind == lib.CDL_CHANGE_MOVE or self.kind >= lib.CDL_CHANGE_COPY)
 
 
 @dataclass(frozen=True)

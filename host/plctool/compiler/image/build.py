@@ -16,11 +16,11 @@ from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.stack import CallGraph, Frames
 from plctool.compiler.image.io_configuration import assign_tasks, configuration_of, io_document
-from plctool.compiler.image.online_change import check_facts, facts_of, steps_of
+from plctool.compiler.image.online_change import Steps, check_facts, constants_of, facts_of
 from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.compiler.syntax.library import is_standard
 from plctool.compiler.typed.kept import kept_parts, kept_variables
-from plctool.compiler.typed.nodes import External, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
+from plctool.compiler.typed.nodes import Direction, External, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
 from plctool.compiler.typed.online_change import OnlineChange
 from plctool.core import lib
 from plctool.debug.frames import INSTANCE
@@ -112,17 +112,19 @@ def _build(
     tasks = [_task(task, _entry(linked, name, target)) for task, name in zip(program.tasks, lowered.tasks, strict=True)]
     device_id = int(getattr(lib, target.device_id))
     symbols.online = facts_of(tasks, device_id, 0 if io is None else crc32(code[io[0] :]))
+    symbols.online["constants"] = constants_of(program.globals, program.defaults)
+    areas = {area.value: size for area, size in program.area_sizes.items() if area is not Area.CODE}
     changes = None
     if change is not None:
         check_facts(change, symbols.online, target.name)
         code += bytes(-len(code) % _CODE_ALIGN)
-        changes = _image_change(program, lowered, linked, target, change, len(code))
+        changes = _image_change(program, lowered, linked, target, change, len(code), areas)
         code += packed_steps(changes)
     symbols.kept = [KeptName(part.name, part.type, part.persistent, part.size) for part in kept]
     image = Image(
         device_id=device_id,
         code=code,
-        areas={area.value: size for area, size in program.area_sizes.items() if area is not Area.CODE},
+        areas=areas,
         functions={number: _entry(linked, name, target) for number, name in lowered.functions.items()},
         externals=[
             ExternalFunction(e.name, e.signature, e.version, slot * target.pointer_size)
@@ -147,11 +149,25 @@ def _build(
 
 
 def _image_change(
-    program: TypedProgram, lowered: Lowered, linked: Linked, target: Target, change: OnlineChange, place: int
+    program: TypedProgram,
+    lowered: Lowered,
+    linked: Linked,
+    target: Target,
+    change: OnlineChange,
+    place: int,
+    areas: dict[int, int],
 ) -> ImageChange:
     transient = {(pou.instance, v.offset) for pou, vs in lowered.transient.items() if pou.instance for v in vs}
+    passed = {
+        (pou.instance, p.variable.offset)
+        for pou in program.pous
+        if pou.instance is not None
+        for p in pou.parameters
+        if p.direction is Direction.IN_OUT
+    }
     init = _entry(linked, lowered.change_init, target) if lowered.change_init else None
-    return ImageChange(change.previous.crc, init, place, tuple(steps_of(change, program.defaults, transient)))
+    steps = Steps(change, program.defaults, transient, passed, areas).all()
+    return ImageChange(change.previous.crc, init, place, tuple(steps))
 
 
 def _needs(

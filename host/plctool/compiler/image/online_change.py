@@ -7,12 +7,16 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
+from zlib import crc32
 
 from plctool.compiler.codegen.lower_init import image_of
 from plctool.compiler.typed.nodes import StructInit, Variable
-from plctool.compiler.typed.online_change import OnlineChange, Previous, PreviousVariable
+from plctool.compiler.typed.online_change import Kept, OnlineChange, Previous, PreviousVariable
 from plctool.core import lib
 from plctool.debug.symbols import SymbolTable
 from plctool.errors import UsageError
@@ -90,18 +94,117 @@ def _text(value: object) -> str:
 # ---- steps ----
 
 
-def steps_of(
-    change: OnlineChange, defaults: dict[str, StructInit], transient: Collection[tuple[StructType, int]]
-) -> list[ChangeStep]:
-    """What the device does between two cycles. `transient`: members that are not in memory."""
-    steps: list[ChangeStep] = []
-    for variable in (*change.new, *change.constants):
-        steps += _initialise(variable, 0, image_of(defaults, variable.type, variable.initial))
-    for variable, fresh in change.fresh:
-        if fresh.owner is None or fresh.owner not in transient:
-            content = image_of(defaults, variable.type, variable.initial)[fresh.offset : fresh.offset + fresh.size]
-            steps += _initialise(variable, fresh.offset, content)
-    return steps
+Members = Collection[tuple[StructType, int]]
+
+
+@dataclass
+class Steps:
+    """Makes the steps that the device does between two cycles. `transient`: members that are not in memory; `passed`:
+    those that are VAR_IN_OUT, which have to lead somewhere only until the next call. `room`: the sizes of the areas,
+    which grow by what saves old constants."""
+
+    change: OnlineChange
+    defaults: dict[str, StructInit]
+    transient: Members
+    passed: Members
+    room: dict[int, int]
+
+    def all(self) -> list[ChangeStep]:
+        """All, in the order that the device wants."""
+        moves = sorted(self._led(), key=lambda step: (step.source_area, step.source))
+        pointers = self._pointers() if moves else []
+        return [*moves, *pointers, *self._fills(), *self._contents()]
+
+    def _led(self) -> Iterator[ChangeStep]:
+        for kept in self.change.parts:
+            if kept.moved:
+                kind = lib.CDL_CHANGE_FOLLOW if kept.variable.constant else lib.CDL_CHANGE_MOVE
+                for run in kept.runs:
+                    yield _from(kind, kept.before, run.source, run.size, kept.variable.area.value,
+                                kept.variable.offset + run.to)  # fmt: skip
+            yield from self._objects(kept)
+        for before, part in self.change.gone:
+            if before.area is not Area.MEMORY:  # an address may have more than one variable
+                yield _from(lib.CDL_CHANGE_GONE, before, part.offset, part.size)
+
+    @staticmethod
+    def _objects(kept: Kept) -> Iterator[ChangeStep]:
+        """The instances and structures whose beginning is not what is kept of their first member."""
+        starts = [run.source for run in kept.runs]
+        for source, to in kept.objects:
+            run = kept.runs[bisect_right(starts, source) - 1] if starts and starts[0] <= source else None
+            if run is not None and source < run.source + run.size and source - run.source == to - run.to:
+                continue
+            area, at = kept.variable.area.value, kept.variable.offset + to
+            step = _from(lib.CDL_CHANGE_FOLLOW, kept.before, source, 1, area, at)
+            yield replace(step, source_area=step.source_area | int(lib.CDL_CHANGE_OBJECTS))
+
+    def _pointers(self) -> Iterator[ChangeStep]:
+        for kept in self.change.parts:
+            in_memory = [p for p in kept.pointers if p.owner is None or p.owner not in self.transient]
+            for is_passed, to_object in product((False, True), repeat=2):
+                alike = [p for p in in_memory if (p.owner in self.passed, p.to_object) == (is_passed, to_object)]
+                kind = lib.CDL_CHANGE_FORGET if is_passed else lib.CDL_CHANGE_LEAD
+                for first, stride, count in _rows(sorted(p.offset for p in alike)):
+                    size = stride * (count - 1) + int(lib.APP_POINTER_SIZE)
+                    yield _from(kind, kept.before, first, size, lib.CDL_CHANGE_OBJECTS * to_object, stride)
+
+    def _fills(self) -> Iterator[ChangeStep]:
+        for kept in self.change.parts:
+            for fill in kept.fills:
+                kind = lib.CDL_CHANGE_SIGN if fill.signed else lib.CDL_CHANGE_CLEAR
+                to = kept.variable.offset + fill.offset
+                yield ChangeStep(int(kind), kept.variable.area.value, to, fill.size)
+
+    def _contents(self) -> Iterator[ChangeStep]:
+        moved = {kept.variable for kept in self.change.parts if kept.moved}
+        before: Any = self.change.previous.facts.get("constants", {})
+        for variable in self.change.constants:
+            content = self._content(variable)
+            if variable not in moved:
+                if before.get(variable.name) == crc32(content):
+                    continue
+                yield self._saved(variable)
+            yield from _initialise(variable, 0, content)
+        for variable in self.change.new:
+            yield from _initialise(variable, 0, self._content(variable))
+        contents: dict[Variable, bytes] = {}
+        for variable, fresh in self.change.fresh:
+            if fresh.owner is None or fresh.owner not in self.transient:
+                content = contents.get(variable) or contents.setdefault(variable, self._content(variable))
+                yield from _initialise(variable, fresh.offset, content[fresh.offset : fresh.offset + fresh.size])
+
+    def _content(self, variable: Variable) -> bytes:
+        return image_of(self.defaults, variable.type, variable.initial)
+
+    def _saved(self, variable: Variable) -> ChangeStep:
+        """Saves the old content of a constant, which the device needs if it goes back."""
+        area, size = variable.area.value, variable.type.size
+        to = self.room[area]
+        self.room[area] += size
+        return ChangeStep(int(lib.CDL_CHANGE_COPY), area, to, size, area, variable.offset)
+
+
+def constants_of(variables: Iterable[Variable], defaults: dict[str, StructInit]) -> dict[str, int]:
+    """The CRCs of the contents of constants that are in memory."""
+    return {v.name: crc32(image_of(defaults, v.type, v.initial)) for v in variables if v.constant}
+
+
+def _from(kind: int, before: PreviousVariable, offset: int, size: int, area: int = 0, to: int = 0) -> ChangeStep:
+    """A step about a part of a variable of the previous program."""
+    return ChangeStep(int(kind), int(area), to, size, before.area.value, before.offset + offset)
+
+
+def _rows(offsets: Sequence[int]) -> Iterator[tuple[int, int, int]]:
+    """Rows of equal distances: the first offset, the distance, how many there are."""
+    at = 0
+    while at < len(offsets):
+        end = at + 1
+        stride = offsets[end] - offsets[at] if end < len(offsets) else int(lib.APP_POINTER_SIZE)
+        while end < len(offsets) and offsets[end] - offsets[end - 1] == stride:
+            end += 1
+        yield offsets[at], stride, end - at
+        at = end
 
 
 def _initialise(variable: Variable, offset: int, content: bytes) -> Iterator[ChangeStep]:

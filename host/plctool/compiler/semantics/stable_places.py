@@ -1,8 +1,9 @@
 """Places that stay: where the variables of a program go that is to take the place of another one while that runs.
 
-A variable is found again by its full name and its type. What both programs have keeps its place; what a type has
-besides gets its initial value there. New variables go where the previous program has none, so that until the exchange
-nothing is touched that it uses.
+A variable is found again by its full name. If all that both programs have of it is at the same offsets, it keeps its
+place, and what its type has besides gets its initial value there. Otherwise it moves: it gets room that the previous
+program does not use, and what both have of it is copied there. New variables get such room too, so that until the
+exchange nothing is touched that the previous program uses.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -15,12 +16,24 @@ from dataclasses import dataclass, field, replace
 
 from plctool.compiler.semantics.sfc import RUNNING, STATE, STEP_TYPE
 from plctool.compiler.typed.nodes import Variable
-from plctool.compiler.typed.online_change import Fresh, OnlineChange, Previous, PreviousVariable
+from plctool.compiler.typed.online_change import (
+    Fill,
+    Fresh,
+    Gone,
+    Kept,
+    OnlineChange,
+    PointerPart,
+    Previous,
+    PreviousVariable,
+    Run,
+)
 from plctool.iec.areas import Area
 from plctool.iec.types import (
     ArrayType,
+    Elementary,
     EnumType,
     InterfaceType,
+    Kind,
     PointerType,
     StringType,
     StructType,
@@ -37,16 +50,55 @@ PLACED_AREAS = (Area.DATA, Area.RETAIN, Area.MEMORY)  # whose variables get thei
 
 @dataclass
 class Match:
-    """What a variable has of the previous one. `moved`: something is at another offset within the variable; `misfit`:
-    why the value of a part cannot be kept."""
+    """What a variable has of the previous one. `runs`: bytes that both have; `fills`: what numbers that became wider
+    have besides; `objects`: where instances and structures were, and are; `retyped`: values that cannot be kept, in
+    words; `misfit`: why there can be no change at all."""
 
+    runs: list[Run] = field(default_factory=list)
     fresh: list[Fresh] = field(default_factory=list)
-    moved: str = ""
+    gone: list[Gone] = field(default_factory=list)
+    fills: list[Fill] = field(default_factory=list)
+    pointers: list[PointerPart] = field(default_factory=list)
+    objects: list[tuple[int, int]] = field(default_factory=list)
+    retyped: list[str] = field(default_factory=list)
     misfit: str = ""
 
     @property
     def same(self) -> bool:
-        return not (self.fresh or self.moved or self.misfit)
+        """True if nothing of a variable of this type changes."""
+        return not (self.fresh or self.gone or self.fills or self.retyped or self.misfit) and self.stays
+
+    @property
+    def stays(self) -> bool:
+        """True if all that is kept is at the same offset, and as wide."""
+        return not self.fills and all(run.source == run.to for run in self.runs)
+
+    def add(self, part: Match, source: int, to: int) -> None:
+        """Adds what a member or an element has, which was at offset `source`, and is at `to`."""
+        self.runs += [Run(r.source + source, r.to + to, r.size) for r in part.runs]
+        self.fresh += [replace(f, offset=f.offset + to) for f in part.fresh]
+        self.gone += [replace(g, offset=g.offset + source) for g in part.gone]
+        self.fills += [replace(f, offset=f.offset + to) for f in part.fills]
+        self.pointers += [replace(p, offset=p.offset + source) for p in part.pointers]
+        self.objects += [(before + source, now + to) for before, now in part.objects]
+        self.retyped += part.retyped
+        self.misfit = self.misfit or part.misfit
+
+    def joined(self) -> Match:
+        """The same with runs as long as possible."""
+        gone = sorted(self.gone, key=lambda g: g.offset)
+        runs: list[Run] = []
+        at = 0
+        for run in sorted(set(self.runs)):
+            while at < len(gone) and gone[at].offset < (runs[-1].source + runs[-1].size if runs else 0):
+                at += 1
+            last = runs[-1] if runs else run
+            between = at < len(gone) and gone[at].offset < run.source
+            if runs and run.source - last.source == run.to - last.to and not between:
+                runs[-1] = Run(last.source, last.to, max(last.size, run.source + run.size - last.source))
+            else:
+                runs.append(run)
+        return replace(self, runs=runs)
 
 
 class Matcher:
@@ -57,42 +109,52 @@ class Matcher:
         self._known: dict[tuple[int, int], tuple[Type, Type, Match]] = {}
 
     def compare(self, old: Type, new: Type) -> Match:
-        """What a variable that has the type `new` finds in place of one of the type `old`."""
+        """What a variable that has the type `new` finds of one of the type `old`."""
         known = self._known.get((id(old), id(new)))
         if known is None:
-            known = self._known[id(old), id(new)] = (old, new, self._compare(old, new))
+            known = self._known[id(old), id(new)] = (old, new, self._compare(old, new).joined())
         return known[2]
 
     def _compare(self, old: Type, new: Type) -> Match:
         if isinstance(new, StructType) and isinstance(old, StructType):
+            if old.union or new.union:
+                return self._unions(old, new)
             return self._structs(old, new)
-        if isinstance(new, ArrayType) and isinstance(old, ArrayType):
+        if isinstance(new, ArrayType) and isinstance(old, ArrayType) and len(old.bounds) == len(new.bounds):
             return self._arrays(old, new)
         if isinstance(new, StringType) and isinstance(old, StringType) and new.wide == old.wide:
-            if new.length == old.length:
-                return Match()
-            return Match(moved=f"{old} became {new}")
-        return Match() if _is_same(old, new) else Match(misfit=f"was {old}, is {new}")
+            if new.length < old.length:
+                return _retyped(old, new)
+            return Match([Run(0, 0, old.size)], fills=_fills(old, new))
+        if _is_same(old, new):
+            return Match([Run(0, 0, new.size)], pointers=_pointer(new, None))
+        if _is_wider(old, new):
+            return Match([Run(0, 0, old.size)], fills=_fills(old, new))
+        return _retyped(old, new)
 
     def _arrays(self, old: ArrayType, new: ArrayType) -> Match:
-        if old.bounds != new.bounds:
-            return Match(moved=f"{old} became {new}")
         element = self.compare(old.element, new.element)
-        if element.same:
-            return element
-        if element.misfit or element.moved or old.element.size != new.element.size:
-            why = element.moved or f"{old.element} has {old.element.size} bytes, now {new.element.size}"
-            return Match(misfit=element.misfit, moved="" if element.misfit else why)
-        size = new.element.size
-        return Match([_shifted(f, n * size) for n in range(new.count) for f in element.fresh])
+        if old.bounds == new.bounds and element.same and not element.pointers and not element.objects:
+            return Match([Run(0, 0, new.size)])
+        if element.retyped and not element.runs:
+            return _retyped(old, new)
+        result = Match()
+        _add_rows(result, element, old, new, (0, 0))
+        result.retyped = element.retyped
+        return result
+
+    @staticmethod
+    def _unions(old: StructType, new: StructType) -> Match:
+        names = [[(f.name.casefold(), str(f.type)) for f in t.fields] for t in (old, new)]
+        if not (old.union and new.union and names[0] == names[1] and old.size == new.size):
+            return _retyped(old, new)
+        return Match([Run(0, 0, new.size)], objects=[(0, 0)])
 
     def _structs(self, old: StructType, new: StructType) -> Match:
-        if old.union or new.union:
-            names = [[(f.name.casefold(), str(f.type)) for f in t.fields] for t in (old, new)]
-            return Match() if old.union == new.union and names[0] == names[1] else Match(misfit=f"{new} changed")
         had = {f.name.casefold(): f for f in old.fields}
+        has = {f.name.casefold() for f in new.fields}
         was_in_register = self._in_registers.get(old.name, ())
-        result = Match()
+        result = Match(objects=[(0, 0)])
         for f in new.fields:
             before = had.get(f.name.casefold())
             if before is None:
@@ -100,16 +162,17 @@ class Matcher:
                 if f.bit is not None:
                     result.misfit = result.misfit or f"{new}.{f.name} is a new bit"
                 continue
-            if (before.offset, before.bit) != (f.offset, f.bit):
-                result.moved = result.moved or f"in {new}, {f.name} is at another place"
-                continue
+            if before.bit != f.bit:
+                result.misfit = result.misfit or f"in {new}, the bit {f.name} is at another place"
             part = self.compare(before.type, f.type)
-            result.fresh += [_shifted(fresh, f.offset) for fresh in part.fresh]
-            result.moved = result.moved or part.moved
-            if part.misfit and not result.misfit:
-                result.misfit = f"{new}.{f.name} {part.misfit}" if part.misfit.startswith("was ") else part.misfit
-        if new.size > old.size:
-            result.moved = result.moved or f"{new} grew by {new.size - old.size} bytes"
+            if part.pointers and isinstance(f.type, PointerType):
+                part = replace(part, pointers=_pointer(f.type, (new, f.offset)))
+            fresh = [replace(p, owner=p.owner or (new, f.offset)) for p in part.fresh]
+            part = replace(part, fresh=fresh, retyped=[_in(f"{new}.{f.name}", why) for why in part.retyped])
+            result.add(part, before.offset, f.offset)
+        result.gone += [
+            Gone(f.offset, f.type.size, f.type) for key, f in had.items() if key not in has and f.bit is None
+        ]
         chart = _chart_problem(
             _Chart.of((f.name, f.type) for f in old.fields), _Chart.of((f.name, f.type) for f in new.fields)
         )
@@ -117,8 +180,63 @@ class Matcher:
         return result
 
 
-def _shifted(fresh: Fresh, by: int) -> Fresh:
-    return replace(fresh, offset=fresh.offset + by)
+def _add_rows(result: Match, element: Match, old: ArrayType, new: ArrayType, at: tuple[int, int]) -> None:
+    """Adds the elements that both arrays have; `at`: the offsets of both. The other indices are done as arrays of
+    their own."""
+    (low, high), (had_low, had_high) = new.bounds[0], old.bounds[0]
+    old_row, new_row = (replace(a, bounds=a.bounds[1:]) for a in (old, new))
+    old_size, new_size = old_row.size, new_row.size
+    source, to = at
+    for index in range(had_low, had_high + 1):
+        if not low <= index <= high:
+            result.gone.append(Gone(source + (index - had_low) * old_size, old_size, old.element))
+    for index in range(low, high + 1):
+        here = to + (index - low) * new_size
+        there = source + (index - had_low) * old_size
+        if not had_low <= index <= had_high:
+            result.fresh.append(Fresh(here, new_size))
+        elif new_row.bounds:
+            _add_rows(result, element, old_row, new_row, (there, here))
+        else:
+            result.add(element, there, here)
+
+
+def _retyped(old: Type, new: Type) -> Match:
+    return Match(fresh=[Fresh(0, new.size)], gone=[Gone(0, old.size, old)], retyped=[f"was {old}, is {new}"])
+
+
+def _pointer(t: Type, owner: tuple[StructType, int] | None) -> list[PointerPart]:
+    if not isinstance(t, PointerType):
+        return []
+    target = t.target
+    while isinstance(target, ArrayType):
+        target = target.element
+    return [PointerPart(0, isinstance(target, StructType), owner)]
+
+
+def _in(name: str, why: str) -> str:
+    return f"{name} {why}" if why.startswith("was ") else why
+
+
+def _fills(old: Type, new: Type) -> list[Fill]:
+    signed = isinstance(new, Elementary) and new.signed and _elementary(old).signed
+    return [Fill(old.size, new.size - old.size, signed)] if new.size > old.size else []
+
+
+def _elementary(t: Type) -> Elementary:
+    t = t.base if isinstance(t, SubrangeType) else t
+    assert isinstance(t, Elementary)
+    return t
+
+
+def _is_wider(old: Type, new: Type) -> bool:
+    """True if a number of one type is the same number in the other one, which has more bits."""
+    old = old.base if isinstance(old, SubrangeType) else old
+    if not (isinstance(old, Elementary) and isinstance(new, Elementary)) or new.bits <= old.bits or old.bits < 8:
+        return False
+    if (old.kind, new.kind) not in ((Kind.INT, Kind.INT), (Kind.BIT, Kind.BIT), (Kind.BIT, Kind.INT)):
+        return False
+    return new.signed or not old.signed
 
 
 def _is_same(old: Type, new: Type) -> bool:
@@ -216,26 +334,28 @@ class StablePlaces:
         for variable in open_ones:
             if variable.offset >= 0:  # at an address
                 self._take(variable.area, variable.offset, variable.type.size)
+                self._keep_pointers(variable)
         had = self.change.previous.variables
         for before in had.values():
             if before.area in self._taken:
                 self._take(before.area, before.offset, before.type.size)
         new = [v for v in open_ones if v.offset < 0 and not self._keep(v)]
         for variable in new:
-            variable.offset = self._room(variable.area, variable.type)
-            self._take(variable.area, variable.offset, variable.type.size)
+            self._place(variable)
         self.change.new = new
         self._check_charts(variables)
         names = {v.name.casefold() for v in variables}
         for key, before in had.items():
             if key not in names and before.area in PLACED_AREAS:
                 self.change.removed.append(before.name)
-                self._check_exit(before)
+                self._drop(before, [Gone(0, before.type.size, before.type)])
 
     def is_new(self, variable: Variable) -> bool:
         """True if the previous program does not have a variable, in any place that it gives to variables."""
         before = self._previous_of(variable)
-        return variable.area in PLACED_AREAS and variable.offset < 0 and before is None
+        if variable.area not in PLACED_AREAS or variable.offset >= 0:
+            return False
+        return before is None or not self._matcher.compare(before.type, variable.type).runs
 
     def has_fresh_parts(self, variable: Variable) -> bool:
         """True if a variable that is kept has parts that the previous program does not have."""
@@ -252,30 +372,55 @@ class StablePlaces:
         return before if before is not None and before.area in PLACED_AREAS else None
 
     def _keep(self, variable: Variable) -> bool:
-        """Gives a variable the place that it has. False if the previous program does not have it."""
+        """Places a variable that the previous program has, too. False if that does not have it, or another value."""
         before = self._previous_of(variable)
         if before is None:
             return False
         name, change = variable.name, self.change
         match = self._matcher.compare(before.type, variable.type)
-        if before.area is not variable.area:
-            change.problems.append(
-                f"{name} is in the {variable.area.name.lower()} area, before in the {before.area.name.lower()} area"
-            )
-        elif match.misfit:
-            own = match.misfit.startswith("was ")
-            change.problems.append(f"{name} {match.misfit}" if own else f"{name}: {match.misfit}")
-        elif match.moved:
-            change.problems.append(f"{name}: {match.moved}")
-        if before.area is not variable.area or variable.type.size > before.type.size:
+        if match.misfit:
+            change.problems.append(f"{name}: {match.misfit}")
+        change.retyped += [_in(name, why) if why.startswith("was ") else f"{name}: {why}" for why in match.retyped]
+        self._drop(before, match.gone)
+        if not match.runs:
             return False
-        variable.offset = before.offset
+        if self._stays(before, variable, match):
+            variable.offset = before.offset
+        else:
+            self._place(variable)
+            change.moved.append(name)
+        change.parts.append(Kept(variable, before, match.runs, match.pointers, match.fills, match.objects))
         change.kept += 1
         if variable.constant:
             change.constants.append(variable)
         else:
             change.fresh += [(variable, fresh) for fresh in match.fresh]
         return True
+
+    def _keep_pointers(self, variable: Variable) -> None:
+        """Notes the pointers in a variable at an address."""
+        before = self._previous_of(variable)
+        if before is not None and (before.area, before.offset) == (variable.area, variable.offset):
+            pointers = self._matcher.compare(before.type, variable.type).pointers
+            self.change.parts.append(Kept(variable, before, [], pointers, [], []))
+
+    @staticmethod
+    def _stays(before: PreviousVariable, variable: Variable, match: Match) -> bool:
+        fits = variable.type.size <= before.type.size and before.offset % variable.type.align == 0
+        return match.stays and fits and before.area is variable.area
+
+    def _place(self, variable: Variable) -> None:
+        variable.offset = self._room(variable.area, variable.type)
+        self._take(variable.area, variable.offset, variable.type.size)
+
+    def _drop(self, before: PreviousVariable, gone: Iterable[Gone]) -> None:
+        """Notes parts of a variable that the new program does not have."""
+        for part in gone:
+            self.change.gone.append((before, part))
+            if any(t.name.casefold() in self.change.previous.with_exit for t in _parts(part.type)):
+                whole = part.size == before.type.size
+                what = f"{before.name} is removed" if whole else f"a part of {before.name} is removed"
+                self.problem(f"{what}, and its FB_Exit would not run")
 
     def _check_charts(self, variables: Iterable[Variable]) -> None:
         """Checks the charts of programs, whose steps are variables of their own; Matcher checks those of blocks."""
@@ -284,10 +429,6 @@ class StablePlaces:
             problem = _chart_problem(had.get(unit, _Chart()), chart)
             if problem:
                 self.problem(f"in the chart of {unit}, {problem}")
-
-    def _check_exit(self, before: PreviousVariable) -> None:
-        if any(t.name.casefold() in self.change.previous.with_exit for t in _parts(before.type)):
-            self.change.problems.append(f"{before.name} is removed, and its FB_Exit would not run")
 
     def _take(self, area: Area, offset: int, size: int) -> None:
         insort(self._taken[area], (offset, offset + size))
