@@ -34,6 +34,7 @@ SHARED = [
     "CmpIecTask.h",
     "CmpItf.h",
     "CmpLog.h",
+    "CmpLogKeep.h",
     "SettingsCheck.h",
     "CmpPackets.h",
     "AppRecord.h",
@@ -43,6 +44,7 @@ SHARED = [
     "SimLink.h",
     "SimBoards.h",
     "SysFlashLog.h",
+    "SysTimeRtc.h",
 ]
 
 

@@ -110,6 +110,7 @@ enum {
     CMPID_IoDrvCanopen = 0x0053,
     CMPID_IecClock = 0x0072,
     CMPID_IecTaskCalls = 0x00A1,
+    CMPID_CmpLogKeep = 0x00AC,
 };
 
 /* Name of a component, "" when unknown. */

@@ -63,6 +63,10 @@
 #if HAS_IoDrvCanopen && (CANOPEN_MAX_DEVICES == 0 || !HAS_IecCan)
 #error "HAS_IoDrvCanopen: set CANOPEN_MAX_DEVICES in rts_config_port.h, and HAS_IecCan in cmp_list.c."
 #endif
+#if HAS_CmpLogKeep && (LOG_KEEP == 0 || !HAS_CmpLog)
+#error \
+    "HAS_CmpLogKeep: set LOG_KEEP, the entries that survive power-off, in rts_config_port.h, and HAS_CmpLog in cmp_list.c."
+#endif
 #if HAS_CmpLogSrv && !HAS_CmpLog
 #error "HAS_CmpLogSrv needs HAS_CmpLog in cmp_list.c."
 #endif

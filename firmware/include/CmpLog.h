@@ -20,13 +20,21 @@ enum { LOG_INFO = 1, LOG_WARNING = 2, LOG_ERROR = 4, LOG_EXCEPTION = 8, LOG_DEBU
 typedef struct {
     RTS_UI32 handle; /* counts from 1, never reused */
     RTS_UI32 component;
+#if LOG_KEEP > 0
+    RTS_UI16 log_class;
+    RTS_UI16 kept; /* not 0: survives power-off */
+#else
     RTS_UI32 log_class;
+#endif
     RTS_UI32 error;
     RTS_I64 time_ns;
     char text[LOG_TEXT_SIZE];
 } LOG_ENTRY;
 
 #ifndef RTS_CFFI
+/* With a class: the entry survives power-off (CmpLogKeep.h), whatever the filter of the settings is. All exceptions do. */
+enum { LOG_KEPT = LOG_KEEP > 0 ? 0x100 : 0 };
+
 /* Adds an entry; `format` is a literal with the conversions of CMUtils.h. From main or a task context. Without log
  * its arguments are not evaluated, and the messages take no flash. */
 #define LogAdd(...)                   \

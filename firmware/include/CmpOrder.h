@@ -16,6 +16,9 @@ X(CmpLog)
 PORT_SYSTEM(X)
 #endif
 X(SysFileFlash)
+#if HAS_CmpLogKeep
+X(CmpLogKeep)
+#endif
 #if HAS_CmpSettings
 X(CmpSettings)
 #endif

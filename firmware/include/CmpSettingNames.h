@@ -16,7 +16,7 @@ SETTING_CHOICE(BootStart, "CmpApp", "Bootproject.Start", "always|never|clean",
 SETTING_NUMBER(Watchdog, "CmpIecTask", "Watchdog", 0, 0, 5000,
                "longest cycle of a task that has no watchdog [ms]; 0: as built, 5000 on plcrt and 2000 on boards")
 SETTING_NUMBER(LogFilter, "CmpLog", "Logger.0.Filter", 0x1F, 0, 0x1F,
-               "sum of what is logged: 1 info, 2 warnings, 4 errors, 16 debug; exceptions always are")
+               "sum of what is logged: 1 info, 2 warnings, 4 errors, 16 debug; exceptions and kept entries always")
 SETTING_NUMBER(RetainSave, "CmpRetain", "SavePeriod", APP_RETAIN_SAVE_US / 1000, 100, 3600000,
                "shortest time between two saves of changed retain variables [ms]")
 SETTING_OPTION(TcpAddress, "CmpBlkDrvTcp", "Address", "tcp", "[ADDRESS:]PORT where TCP is served")

@@ -392,6 +392,9 @@ enum {
     TAG_LOG_ENTRY = 0x03,
     TAG_LOG_TEXT = 0x04,
     TAG_LOG_COMPONENT_NAME = 0x05,
+    TAG_LOG_CLOCK = 0x13, /* own, as the following */
+    TAG_LOG_UTC_NS = 0x14,
+    TAG_LOG_START = 0x15,
 };
 
 /* Files (4.12): "upload" goes to the client, "download" to the device. */

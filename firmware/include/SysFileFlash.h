@@ -13,6 +13,9 @@
 #include "CmpErrors.h"
 #include "CmpItf.h"
 #include "CmpStd.h"
+#ifndef RTS_CFFI
+#include "rts_config.h"
+#endif
 
 /* The files. Commit and retain are record logs (SysFlashLog.h). */
 enum { FILE_SLOT_A = 0, FILE_SLOT_B = 1, FILE_COMMIT = 2, FILE_RETAIN = 3, FILE_COUNT = 4 };
@@ -20,6 +23,11 @@ enum { FILE_SLOT_A = 0, FILE_SLOT_B = 1, FILE_COMMIT = 2, FILE_RETAIN = 3, FILE_
 /* With FILE_STORE_FILES also those of FileStore.h, at the end of the flash; the catalog is a record log. They have no
  * bytes where FILE_STORE_SIZE is too small. */
 enum { FILE_CATALOG = 4, FILE_STORE = 5 };
+
+/* With LOG_KEEP the log that survives power-off (CmpLogKeep.h), a record log in the last LOG_KEEP_SIZE bytes of the flash. */
+#ifndef RTS_CFFI
+enum { FILE_KEPT = FILE_STORE_FILES > 0 ? 6 : 4 };
+#endif
 
 /* Bytes that are programmed at a time; all program sizes divide it. */
 enum { FILE_ALIGN = 16 };

@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * It may jump, so only programs use it, for what people read. From any context but interrupts; nothing blocks. A port
- * without such a clock writes neither function: those of IecClock.c say so.
+ * without such a clock writes neither function: those of SysTimeRtc.c say so.
  */
 #ifndef SYSTIMERTC_H
 #define SYSTIMERTC_H

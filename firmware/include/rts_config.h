@@ -754,4 +754,29 @@
 #define LOG_TEXT_SIZE 80
 #endif
 
+/* Entries of the log that survive power-off (CmpLogKeep.h); 0.9 KiB of flash, 70 bytes of RAM. 0: none. LOG_KEEP_BURST
+ * are written at once, then one each LOG_KEEP_REFILL_MS [ms]: a program that is started and stopped all the time costs
+ * each half an erasure in 12 minutes, and flash of 100 000 erasures lasts for two years of that. */
+#ifndef LOG_KEEP
+#define LOG_KEEP 0
+#endif
+#ifndef LOG_KEEP_BURST
+#define LOG_KEEP_BURST 16
+#endif
+#ifndef LOG_KEEP_REFILL_MS
+#define LOG_KEEP_REFILL_MS 10000
+#endif
+
+/* Bytes of flash that they have, at its end: two halves of whole sectors, each with room for all of them and four more. */
+#define LOG_KEEP_TEXT_SIZE 64
+#define LOG_KEEP_RECORD 112
+#ifndef LOG_KEEP_SIZE
+#if LOG_KEEP > 0
+#define LOG_KEEP_SECTORS (((LOG_KEEP + 4) * LOG_KEEP_RECORD + BOARD_FLASH_SECTOR_SIZE - 1) / BOARD_FLASH_SECTOR_SIZE)
+#define LOG_KEEP_SIZE (2u * LOG_KEEP_SECTORS * BOARD_FLASH_SECTOR_SIZE)
+#else
+#define LOG_KEEP_SIZE 0u
+#endif
+#endif
+
 #endif

@@ -206,8 +206,9 @@ class Controller(ABC):
         return []
 
     @abstractmethod
-    def log(self, after: int = 0) -> list[LogEntry]:
-        """The log entries with a handle above `after` that the controller still has, oldest first."""
+    def log(self, after: int = 0, *, kept: bool = False) -> list[LogEntry]:
+        """The log entries with a handle above `after` that the controller still has, oldest first. `kept`: those that
+        outlast power-off, starts, stops, exceptions and causes of resets. Raises DeviceError if it keeps none."""
 
     # ---- the application ----
 

@@ -68,9 +68,10 @@ LOG_CLASSES = ("debug", "info", "warning", "error", "exception")
 """Of log entries, the gravest last; those of LOG_DEBUG .. LOG_EXCEPTION (CmpLog.h)."""
 
 
-def log(plc: Controller) -> Document:
-    """The log; the exception that holds the program at present comes with its source line."""
-    return {"entries": log_entries(plc, plc.log())}
+def log(plc: Controller, *, kept: bool = False) -> Document:
+    """The log, or the one that outlasts power-off; the exception that holds the program at present comes with its
+    source line."""
+    return {"entries": log_entries(plc, plc.log(kept=kept))}
 
 
 def log_entries(plc: Controller, entries: Sequence[LogEntry]) -> list[Document]:
@@ -86,7 +87,9 @@ def log_entries(plc: Controller, entries: Sequence[LogEntry]) -> list[Document]:
             "class": names.get(entry.log_class, f"0x{entry.log_class:X}"),
             "error": entry.error,
             "text": entry.text,
+            "utc": None if entry.utc_ns is None else utc_text(entry.utc_ns),
         }
+        | ({} if entry.start is None else {"start": entry.start})
         for entry in entries
     ]
     last = next((e for e in reversed(documents) if e["class"] == "exception"), None)
@@ -97,15 +100,26 @@ def log_entries(plc: Controller, entries: Sequence[LogEntry]) -> list[Document]:
     return documents
 
 
-def follow_log(plc: Controller) -> Iterator[list[LogEntry]]:
+def utc_text(ns: int) -> str:
+    """A moment as users read it, in UTC; `ns` since 1970-01-01."""
+    from datetime import UTC, datetime, timedelta
+
+    try:
+        moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=ns // 1000)
+    except OverflowError:  # a clock that was set to nonsense
+        return f"{ns // 10**9} s after 1970"
+    return moment.replace(tzinfo=None).isoformat(" ", "milliseconds")
+
+
+def follow_log(plc: Controller, *, kept: bool = False) -> Iterator[list[LogEntry]]:
     """Yields the entries of the controller, then each time those that were added since, perhaps none. A controller
     that restarts begins a new log, which is noticed by its first entries."""
     last: LogEntry | None = None
     while True:
-        entries = plc.log(last.handle - 1 if last else 0)
+        entries = plc.log(last.handle - 1 if last else 0, kept=kept)
         if last is not None and entries and entries[0] == last:
             entries = entries[1:]
         elif last is not None and (not entries or entries[0].handle <= last.handle):
-            entries = plc.log()
+            entries = plc.log(kept=kept)
         last = entries[-1] if entries else last
         yield entries

@@ -181,8 +181,8 @@ class Plc(Controller):
         """Project, author, version and so on, of the application."""
         return services.read_application_info(self._session)
 
-    def log(self, after: int = 0) -> list[LogEntry]:
-        return services.read_log(self._session, after)
+    def log(self, after: int = 0, *, kept: bool = False) -> list[LogEntry]:
+        return services.read_log(self._session, after, kept)
 
     def shell(self, command: str) -> str:
         """The answer of the controller's PLC shell, in lines; `?` lists its commands."""

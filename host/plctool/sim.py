@@ -44,7 +44,8 @@ if TYPE_CHECKING:
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
 _MAX_CYCLES = 0xFFFF_FFFF  # of one call of the C core
 _SECTOR = 4096
-_FILE_STORE = 1 << 20  # bytes for files, as on plcrt; the program's own room stays as it was
+_KEPT_LOG = 2 * _SECTOR  # bytes for the log that outlasts power-off
+_FILE_STORE = (1 << 20) - _KEPT_LOG  # bytes for files, as on plcrt; the program's own room stays as it was
 _PROGRAM_UNIT = 8
 MAX_NS = 2**62  # at once; the clock goes twice as far
 _TRACE_MESSAGE = 64 * 1024  # bytes of samples at a time
@@ -146,7 +147,8 @@ class Simulator(Controller):
         """With an empty flash and no events."""
         self._lib.SimSetClock(lib.SIM_CLOCK_FIRST_S * 1_000_000_000)
         self._lib.SimSetFileStore(_FILE_STORE)
-        made = self._lib.SimFlashConfigure(_FLASH_SIZE + _FILE_STORE, _SECTOR, _PROGRAM_UNIT, 0xFF)
+        self._lib.SimSetKeptLog(_KEPT_LOG)
+        made = self._lib.SimFlashConfigure(_FLASH_SIZE + _FILE_STORE + _KEPT_LOG, _SECTOR, _PROGRAM_UNIT, 0xFF)
         _check(made, "The simulated flash cannot be made")
         self._limited = cycle_limit_ms > 0
         if self._limited:
@@ -164,6 +166,7 @@ class Simulator(Controller):
             self._closed = True
             self._lib.SimStop()
             self._lib.SimSetFileStore(0)
+            self._lib.SimSetKeptLog(0)
             self._functions.disconnect(self._core)
             if self._limited:
                 self._lib.SimSetCycleLimit(0)
@@ -308,15 +311,21 @@ class Simulator(Controller):
             )  # fmt: skip
         return infos
 
-    def log(self, after: int = 0) -> list[LogEntry]:
+    def log(self, after: int = 0, *, kept: bool = False) -> list[LogEntry]:
         entries = []
-        c = self._ffi.new("LOG_ENTRY *")
-        while self._lib.LogGetEntry(after + 1, c) == lib.ERR_OK:
+        c, origin, utc = self._ffi.new("LOG_ENTRY *"), self._ffi.new("LOG_KEPT_FROM *"), self._ffi.new("RTS_I64 *")
+        clock = utc[0] - self._lib.SimNow() if self._lib.SysTimeRtcGet(utc) == lib.ERR_OK else None
+        if kept:
+            self._lib.SimCommCycle()  # main copies what has happened
+        while (
+            self._lib.LogKeepGet(after + 1, c, origin) if kept else self._lib.LogGetEntry(after + 1, c)
+        ) == lib.ERR_OK:
             after = c.handle
-            component, text = self._ffi.string(self._lib.CMGetComponentName(c.component)), self._ffi.string(c.text)
-            entries.append(
-                LogEntry(after, c.time_ns, component.decode("latin-1"), c.log_class, c.error, text.decode("latin-1"))
-            )
+            component = self._ffi.string(self._lib.CMGetComponentName(c.component)).decode("latin-1")
+            text = self._ffi.string(c.text).decode("latin-1")
+            utc_ns = (origin.utc_ns or None) if kept else None if clock is None else clock + c.time_ns
+            start = origin.start if kept else None
+            entries.append(LogEntry(after, c.time_ns, component, c.log_class, c.error, text, utc_ns, start))
         return entries
 
     # ---- inputs and outputs ----

@@ -24,6 +24,7 @@
 #include "CmpEventMgr.h"
 #include "CyclePhases.h"
 #include "FileStore.h"
+#include "CmpLogKeep.h"
 #include "CmpLogSrv.h"
 #include "CmpPlcShell.h"
 #include "CmpMonitor2.h"
@@ -51,6 +52,11 @@ SRV_GROUP srv_groups[10];
 const RTS_SIZE srv_group_room = RTS_COUNT(srv_groups);
 
 /* ---- system ---- */
+
+RTS_I64 SysTimeGetNs(void)
+{
+    return 0;
+}
 
 RTS_UI32 SysTimeGetMs(void)
 {
@@ -176,6 +182,18 @@ RTS_RESULT LogGetEntry(RTS_UI32 handle, LOG_ENTRY *entry)
         }
     }
     return ERR_END_OF_OBJECT;
+}
+
+RTS_RESULT LogKeepGet(RTS_UI32 number, LOG_ENTRY *entry, LOG_KEPT_FROM *from)
+{
+    *from = (LOG_KEPT_FROM){fakes.utc_ns, 7};
+    return fakes.kept != ERR_OK ? fakes.kept : LogGetEntry(number, entry);
+}
+
+RTS_RESULT SysTimeRtcGet(RTS_I64 *utc_ns)
+{
+    *utc_ns = fakes.utc_ns;
+    return fakes.utc_ns == 0 ? ERR_NOT_READY_YET : ERR_OK;
 }
 
 /* Without the simulator there is no power to cut. */

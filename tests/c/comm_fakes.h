@@ -86,6 +86,8 @@ typedef struct {
 #endif
     LOG_ENTRY log[FAKE_LOG_SIZE];
     RTS_UI32 log_count;
+    RTS_RESULT kept; /* of the log that is kept, which has the same entries */
+    RTS_I64 utc_ns;  /* 0: not set */
     IEC_TASK_INFO tasks[FAKE_TASKS];
     RTS_UI32 task_count;
     bool task_busy;

@@ -574,6 +574,52 @@ static void log_request_is_limited_by_count_and_start(void)
     CHECK_EQUAL(records(&handle), 0);
 }
 
+static bool ask_named_log(const char *name, RTS_UI32 length)
+{
+    RTS_UI8 content[40] = {TAG_LOG_NAME, (RTS_UI8)length};
+
+    memcpy(content + 2, name, length);
+    return client_request(&client, SG_LOG, SRV_LOG_GET_ENTRIES, content, 2 + length, &reply);
+}
+
+static void the_kept_log_comes_by_its_name_with_start_and_clock(void)
+{
+    BTAG_READER record;
+    RTS_UI32 start = 0;
+    BTAG tag;
+
+    setup();
+    fill_log(1);
+    fakes.utc_ns = 0x1122334455667788;
+    CHECK(ask_named_log("KeptLog", 8));
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_LOG_NAME, 8, 32, &tag), ERR_OK);
+    CHECK(strcmp((const char *)tag.data, "KeptLog") == 0);
+    CHECK_EQUAL(BTagFindContainer(&reply.tags, TAG_LOG_RECORD, &record), ERR_OK);
+    CHECK(BTagFindUnsigned(&record, TAG_LOG_START, &start) == ERR_OK && start == 7);
+    CHECK_EQUAL(BTagFind(&record, TAG_LOG_UTC_NS, 8, 8, &tag), ERR_OK);
+    CHECK(memcmp(tag.data, "\x88\x77\x66\x55\x44\x33\x22\x11", 8) == 0);
+    CHECK(ask_named_log("KeptLo", 6));
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_LOG_NAME, 0, 32, &tag), ERR_L7_TAG_MISSING);
+    fakes.kept = ERR_NOT_SUPPORTED;
+    CHECK(ask_named_log("KeptLog", 7));
+    CHECK_EQUAL(reply_error(&reply), ERR_NOT_SUPPORTED);
+}
+
+static void the_clock_comes_to_a_client_that_asks_for_it(void)
+{
+    static const RTS_UI8 content[] = {TAG_LOG_CLOCK, 4, 1, 0, 0, 0};
+    BTAG tag;
+
+    setup();
+    CHECK(client_request(&client, SG_LOG, SRV_LOG_GET_ENTRIES, content, sizeof content, &reply));
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_LOG_CLOCK, 8, 8, &tag), ERR_L7_TAG_MISSING);
+    fakes.utc_ns = 0x1122334455667788;
+    CHECK(client_request(&client, SG_LOG, SRV_LOG_GET_ENTRIES, content, sizeof content, &reply));
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_LOG_CLOCK, 8, 8, &tag), ERR_OK);
+    CHECK(ask_log(0, 100));
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_LOG_CLOCK, 8, 8, &tag), ERR_L7_TAG_MISSING);
+}
+
 int main(void)
 {
     RUN(cut_headers_are_not_answered);
@@ -611,5 +657,7 @@ int main(void)
     RUN(empty_log_is_an_empty_reply);
     RUN(log_is_read_in_pieces_that_fit);
     RUN(log_request_is_limited_by_count_and_start);
+    RUN(the_kept_log_comes_by_its_name_with_start_and_clock);
+    RUN(the_clock_comes_to_a_client_that_asks_for_it);
     return test_result();
 }

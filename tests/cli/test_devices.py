@@ -14,8 +14,10 @@ from small_app import make_application
 
 from plctool.cli import connections
 from plctool.cli.command_line import parser
+from plctool.cli.commands.device import log_text
 from plctool.cli.commands.scan import devices_text
 from plctool.cli.links import all_links, can_interfaces
+from plctool.controller_documents import utc_text
 from plctool.core import lib
 from plctool.errors import LinkError
 from plctool.link.mdns import Announced
@@ -237,6 +239,23 @@ def test_log_entries_come_with_class_component_and_place(tool: Any, running: Fak
     assert (first["time_s"], first["class"], first["component"], first["text"]) == (1.5, "info", "CmpApp", "started")
     assert (second["class"], second["pou"], second["file"], second["line"]) == ("exception", "Main", "main.st", 8)
     assert "main.st:8" in tool("log", *PORT).out
+
+
+def test_a_kept_entry_shows_its_start_and_its_moment() -> None:
+    entry = {
+        "time_s": 1.5,
+        "class": "info",
+        "component": "CmpApp",
+        "text": "started",
+        "utc": utc_text(10**18),
+        "start": 3,
+    }
+    line = "start 3    2001-09-09 01:46:40.000  info       CmpApp: started"
+    assert log_text({"entries": [entry]}, clock=True) == line
+    assert log_text({"entries": [{**entry, "utc": None}]}, clock=True) == line.replace(
+        "2001-09-09 01:46:40.000", "             1.500000 s"
+    )
+    assert utc_text(2**63 - 1) == "2262-04-11 23:47:16.854"
 
 
 LOG = [

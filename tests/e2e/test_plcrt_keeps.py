@@ -127,3 +127,22 @@ def test_what_is_saved_is_of_one_moment_though_tasks_never_pause_together(tool, 
         eventually(lambda: all(read(tool, plcrt, [f"{p}.again" for p in programs])))
         assert min(read(tool, plcrt, [f"{p}.restored" for p in programs])) > 0
         assert read(tool, plcrt, [f"{p}.torn" for p in programs]) == [False] * 4
+
+
+def test_the_log_of_the_run_before_a_power_cut_is_there(tool, plcrt, eventually):
+    counter = tool.build("first", program(""))
+    tool.ok("flash", "--port", plcrt.port, str(counter))
+    tool.ok("stop", "--port", plcrt.port)
+    kept = tool.ok("log", "--kept", "--port", plcrt.port)["entries"]
+    assert [e["text"].partition(",")[0] for e in kept] == [
+        "plcrt started",
+        "Application loaded",
+        "Application started",
+        "Application stopped",
+    ]
+    plcrt.stop(signal.SIGKILL)
+    plcrt.start()
+    again = tool.ok("log", "--kept", "--port", plcrt.port)["entries"]
+    assert again[: len(kept)] == kept
+    assert {entry["start"] for entry in again[len(kept) :]} == {2}
+    assert all(entry["utc"].startswith("20") for entry in again)

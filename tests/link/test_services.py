@@ -328,6 +328,13 @@ def test_the_log_is_read_to_its_end_in_several_requests() -> None:
     assert [e.handle for e in services.read_log(bench.session, after=6)] == [7, 8]
 
 
+def test_firmware_without_a_kept_log_says_how_to_get_one() -> None:
+    bench = Bench()
+    bench.plc.log = [(1, 10**9, lib.LOG_INFO, "CmpApp", "entry")]
+    with pytest.raises(DeviceError, match="Build its firmware with LOG_KEEP"):
+        services.read_log(bench.session, kept=True)
+
+
 def test_the_log_ends_with_the_last_handle_there_can_be() -> None:
     bench = Bench()
     bench.plc.log = [(n, 10**9, lib.LOG_INFO, "CmpApp", "entry") for n in (1, 0xFFFFFFFF)]

@@ -337,6 +337,19 @@ def test_log_entries_come_once(plc: Controller) -> None:
     assert plc.log(entries[-1].handle) == []
 
 
+def test_starts_and_stops_are_in_the_log_that_is_kept(plc: Controller) -> None:
+    plc.stop()
+    let_pass(plc)
+    kept = plc.log(kept=True)
+    assert [entry.text for entry in kept if "Application" in entry.text][-2:] == [
+        "Application started",
+        "Application stopped",
+    ]
+    assert kept[-1].start == 1 and kept[-1].utc_ns is not None
+    assert plc.log(kept[-1].handle, kept=True) == []
+    assert all(entry.utc_ns for entry in plc.log())
+
+
 @pytest.mark.parametrize("address", ["%MD10000", "%IX9000.0"])
 def test_an_address_where_the_program_has_no_memory_is_told_of(plc: Controller, address: str) -> None:
     with pytest.raises(DeviceError, match="The program has no memory at"):

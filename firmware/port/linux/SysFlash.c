@@ -225,7 +225,7 @@ static bool lock_file(int file, const char *path, PORT_REASON *reason)
  * programs alone. */
 static bool is_flash_file(int file, off_t size)
 {
-    enum { PROGRAMS = BOARD_FLASH_SIZE - FILE_STORE_SIZE };
+    enum { PROGRAMS = BOARD_FLASH_SIZE - FILE_STORE_SIZE - LOG_KEEP_SIZE };
 
     return size == BOARD_FLASH_SIZE ||
            (size < BOARD_FLASH_SIZE && is_erased(file, size < PROGRAMS ? 0 : PROGRAMS, size));

@@ -661,8 +661,10 @@ static void log_restart(void)
     char words[80];
     if (SysStartGet()->stay_stopped != SYS_BOOT_START) {
         describe_program(words, sizeof(words));
-        LogAdd(CMPID_CmpMgr, LOG_WARNING, ERR_OK, "The controller died (%s) and was started again%s",
+        LogAdd(CMPID_CmpMgr, LOG_WARNING | LOG_KEPT, ERR_OK, "The controller died (%s) and was started again%s",
                SysStartGet()->text, words);
+    } else {
+        LogAdd(CMPID_CmpMgr, LOG_INFO | LOG_KEPT, ERR_OK, "plcrt started");
     }
 }
 

@@ -58,6 +58,7 @@
 #define CAN_RECEIVE_FRAMES 32
 #define CAN_SEND_FRAMES 64
 #define LOG_MAX_ENTRIES 256
+#define LOG_KEEP 32
 #define CHECKSUM_TABLE_ENTRIES 256
 
 /* Less than the patience of plctool with a device that does not answer, and of what ends plcrt [us]. */
@@ -83,11 +84,11 @@
 #endif
 #define BOARD_DEVICE_NAME "plcrt"
 
-/* The flash file [bytes]: 4 MiB for programs, as long as there was nothing else, and then the files. Geometry of a
+/* The flash file [bytes]: 4 MiB for programs, as long as there was nothing else, then the files and the log that is kept. Geometry of a
  * common serial NOR flash, programmed in the units of an STM32's. */
 #define FILE_STORE_FILES 32
-#define FILE_STORE_SIZE (1024 * 1024)
-#define BOARD_FLASH_SIZE (4 * 1024 * 1024 + FILE_STORE_SIZE)
+#define FILE_STORE_SIZE (1024 * 1024 - LOG_KEEP_SIZE)
+#define BOARD_FLASH_SIZE (5 * 1024 * 1024)
 #define BOARD_FLASH_SECTOR_SIZE 4096
 #define BOARD_FLASH_PROGRAM_SIZE 8
 

@@ -130,6 +130,10 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
  * SimStart; it stays. */
 void SimSetFileStore(RTS_UI32 size);
 
+/* Bytes of it for the log that is kept (CmpLogKeep.h), two halves of whole sectors at its very end; the default is 0. Before
+ * SimStart; it stays. */
+void SimSetKeptLog(RTS_UI32 size);
+
 /* A file, as a program or a tool writes it. While power is on. Errors as FileStoreBegin; ERR_INVALID_STATE: one is being
  * written. */
 RTS_RESULT SimPutFile(const char *name, const RTS_UI8 *data, RTS_UI32 size);

@@ -46,6 +46,7 @@ typedef struct {
 } PLAN;
 
 unsigned SimFileStoreSize;
+unsigned SimKeptLogSize;
 
 static struct {
     SYS_FLASH flash;
@@ -362,6 +363,11 @@ static bool renew_cells(RTS_UI32 size, RTS_UI8 erased)
 void SimSetFileStore(RTS_UI32 size)
 {
     SimFileStoreSize = size;
+}
+
+void SimSetKeptLog(RTS_UI32 size)
+{
+    SimKeptLogSize = size;
 }
 
 RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 program_size, RTS_UI8 erased)

@@ -6,6 +6,7 @@
 #include "../linux/IecCompilerCalls.h"
 
 #define HAS_CmpLog 1
+#define HAS_CmpLogKeep 1
 #define HAS_CmpEventMgrEmbedded 1
 #define HAS_CmpSettings 1
 #define HAS_CmpRetain 1

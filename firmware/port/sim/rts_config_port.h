@@ -57,6 +57,7 @@
 #define CAN_SEND_FRAMES 64
 #define LOG_MAX_ENTRIES 64
 #define LOG_TEXT_SIZE 160
+#define LOG_KEEP 32
 #define CM_OWN_EXT_TABLES 8
 #ifndef CM_LEAVES_OUT
 #define CM_LEAVES_OUT 0 /* a test that lacks a component shall fail */
@@ -84,6 +85,12 @@
 extern unsigned SimFileStoreSize;
 #endif
 #define FILE_STORE_SIZE SimFileStoreSize
+
+/* The same for the log that is kept. */
+#ifndef RTS_CFFI
+extern unsigned SimKeptLogSize;
+#endif
+#define LOG_KEEP_SIZE SimKeptLogSize
 
 /* Stack of the IEC code [bytes]: that of the Linux port. */
 #define RTS_IEC_STACK_SIZE (1024 * 1024)

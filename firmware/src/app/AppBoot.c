@@ -42,7 +42,7 @@ static RTS_RESULT load_from_slot(RTS_UI32 slot, RTS_UI32 retain_until)
             result = ERR_FAILED; /* of a driver: the image can be read */
     }
     if (result != ERR_OK)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Boot project refused: %s", refusal.text);
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR | LOG_KEPT, result, "Boot project refused: %s", refusal.text);
     return result;
 }
 
@@ -66,7 +66,7 @@ bool AppRollBack(RTS_UI32 failed)
     (void)RetainSave(true);
     (void)AppCommitRollBack(failed, retain_after);
     RetainKeepNone();
-    LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "Back to the application before");
+    LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING | LOG_KEPT, ERR_OK, "Back to the application before");
     return true;
 }
 
@@ -179,7 +179,7 @@ static void run_boot_project(void)
     if (result != ERR_OK)
         return;
     if (waits(failed))
-        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "Boot project not started%s",
+        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING | LOG_KEPT, ERR_OK, "Boot project not started%s",
                AppCommitIsDead() ? ": it failed before" : "");
     else
         start_boot_project();

@@ -210,7 +210,7 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
     AppHandlePendingException();
     result = finish_download(take_over, refusal);
     if (result == ERR_OK)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application loaded, CRC %X", (unsigned)download.crc);
+        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO | LOG_KEPT, ERR_OK, "Application loaded, CRC %X", (unsigned)download.crc);
     else
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Download refused: %s", refusal->text);
     return result;
@@ -224,7 +224,7 @@ RTS_RESULT AppDownloadChange(APP_REFUSAL *refusal)
     refusal->text[0] = '\0';
     result = finish_download(AppChange, refusal);
     if (result == ERR_OK)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Online change, CRC %X", (unsigned)download.crc);
+        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO | LOG_KEPT, ERR_OK, "Online change, CRC %X", (unsigned)download.crc);
     else
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Online change refused: %s", refusal->text);
     return result;

@@ -410,7 +410,7 @@ RTS_RESULT AppStart(void)
         return result;
     }
     app.state = AS_RUN;
-    LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application started");
+    LogAdd(CMPID_CmpAppEmbedded, LOG_INFO | LOG_KEPT, ERR_OK, "Application started");
     return tell(EVT_StartDone);
 }
 

@@ -41,8 +41,8 @@ static void save(void)
 
     power.since_ms = SysTimeGetMs();
     power.waits = power.waits || ran;
-    LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, result, "The power fails: program stopped and values saved in %u ms",
-           (unsigned)(power.since_ms - start_ms));
+    LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING | LOG_KEPT, result,
+           "The power fails: program stopped and values saved in %u ms", (unsigned)(power.since_ms - start_ms));
 }
 
 static void go_on(void)
@@ -50,8 +50,8 @@ static void go_on(void)
     power.waits = false;
     if (AppGetState() != AS_STOP || AppHasException())
         return;
-    LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "The power is back after %u ms: the program is started again",
-           (unsigned)APP_POWER_BACK_MS);
+    LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING | LOG_KEPT, ERR_OK,
+           "The power is back after %u ms: the program is started again", (unsigned)APP_POWER_BACK_MS);
     (void)AppStartIfAllowed();
 }
 

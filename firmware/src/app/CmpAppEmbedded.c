@@ -48,7 +48,7 @@ static RTS_RESULT stop_unasked(void)
         return ERR_APP_NOT_LOADED;
     if (AppStopTasks() && (!AppHasException() || AppWasBrokenOff())) {
         (void)AppCommitSetState(AppGetSlot(), SLOT_TRIAL);
-        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application stopped");
+        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO | LOG_KEPT, ERR_OK, "Application stopped");
     }
     return ERR_OK;
 }
@@ -132,7 +132,7 @@ RTS_RESULT AppReset(RTS_UI32 option)
     if (is_loaded())
         (void)stop_unasked();
     result = option == RESET_OPTION_ORIGIN ? reset_origin() : AppReinitialise(option == RESET_OPTION_COLD);
-    LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, result, "Reset %s",
+    LogAdd(CMPID_CmpAppEmbedded, LOG_INFO | LOG_KEPT, result, "Reset %s",
            option == RESET_OPTION_WARM   ? "warm"
            : option == RESET_OPTION_COLD ? "cold"
                                          : "origin");

@@ -11,22 +11,6 @@
 
 enum { VERSION = 0x00010000 };
 
-/* ---- a port without such a clock ---- */
-
-__attribute__((weak)) RTS_RESULT SysTimeRtcGet(RTS_I64 *utc_ns)
-{
-    RTS_UNUSED(utc_ns);
-    return ERR_NOT_SUPPORTED;
-}
-
-__attribute__((weak)) RTS_RESULT SysTimeRtcSet(RTS_I64 utc_ns)
-{
-    RTS_UNUSED(utc_ns);
-    return ERR_NOT_SUPPORTED;
-}
-
-/* ---- what the library calls ---- */
-
 /* ns since 1970-01-01, at least 0; else the negative of an error. */
 static RTS_I64 clock_get(void)
 {

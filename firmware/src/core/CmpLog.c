@@ -26,7 +26,7 @@ static struct {
 /* True if the settings leave entries of this class out. */
 static bool is_filtered(RTS_UI32 log_class)
 {
-    return SETTINGS && (log_class & ((RTS_UI32)SETTING(LogFilter) | LOG_EXCEPTION)) == 0;
+    return SETTINGS && (log_class & ((RTS_UI32)SETTING(LogFilter) | LOG_EXCEPTION | LOG_KEPT)) == 0;
 }
 
 void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...)
@@ -42,7 +42,12 @@ void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const c
     SysAtomicStore(&entry->handle, 0);
     SysAtomicFence();
     entry->component = component;
+#if LOG_KEEP > 0
+    entry->log_class = (RTS_UI16)(log_class & ~(RTS_UI32)LOG_KEPT);
+    entry->kept = (log_class & (LOG_KEPT | LOG_EXCEPTION)) != 0;
+#else
     entry->log_class = log_class;
+#endif
     entry->error = error;
     entry->time_ns = SysTimeGetNs();
     va_start(arguments, format);

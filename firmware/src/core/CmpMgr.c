@@ -49,7 +49,7 @@ static void note_failure(RTS_SIZE component, RTS_RESULT error)
         failure.first = (CMP_FAILURE){name->name, name->id, error};
     if (error != ERR_NOMEMORY || failure.setting == NULL)
         failure.setting = "";
-    LogAdd(CMPID_CmpMgr, LOG_ERROR, error, "Start of %s failed%s", name->name, failure.setting);
+    LogAdd(CMPID_CmpMgr, LOG_ERROR | LOG_KEPT, error, "Start of %s failed%s", name->name, failure.setting);
 }
 
 /* Leaves a component out whose hook failed, if the device can do without. */
@@ -120,7 +120,8 @@ RTS_RESULT CMInit(void)
     if (result != ERR_OK) {
         done--; /* the one that failed has undone what it did itself */
         if (!CM_LEAVES_OUT)
-            LogAdd(CMPID_CmpMgr, LOG_ERROR, result, "Start of %s failed", cmp_names[done % cmp_component_count].name);
+            LogAdd(CMPID_CmpMgr, LOG_ERROR | LOG_KEPT, result, "Start of %s failed",
+                   cmp_names[done % cmp_component_count].name);
     } else {
         result = CMCallHook(CH_INIT_FINISHED);
     }

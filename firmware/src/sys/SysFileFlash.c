@@ -21,24 +21,46 @@ typedef struct {
     RTS_UI8 unit[FILE_ALIGN]; /* the last position % FILE_ALIGN bytes, not yet programmed */
 } FLASH_FILE;
 
-static FLASH_FILE files[FILE_STORE_FILES > 0 ? FILE_STORE + 1 : FILE_COUNT];
+static FLASH_FILE files[LOG_KEEP > 0 ? FILE_KEPT + 1 : FILE_STORE_FILES > 0 ? FILE_STORE + 1 : FILE_COUNT];
 
 /* ---- where the files are ---- */
 
-/* Of the flash, without the end that the store has. */
-static RTS_UI32 size_for_programs(void)
+/* Of the flash, without the end that the kept log has. */
+static RTS_UI32 size_without_log(void)
 {
     RTS_UI32 size = SysFlashGet()->size;
 
+    return LOG_KEEP > 0 && LOG_KEEP_SIZE < size ? size - LOG_KEEP_SIZE : size;
+}
+
+/* Of that, without the end that the store has. */
+static RTS_UI32 size_for_programs(void)
+{
+    RTS_UI32 size = size_without_log();
+
     return FILE_STORE_FILES > 0 && FILE_STORE_SIZE < size ? size - FILE_STORE_SIZE : size;
 }
+
+#if LOG_KEEP > 0
+static void map_log(void)
+{
+    RTS_UI32 half = (SysFlashGet()->size - size_without_log()) / 2;
+
+    if (half > 0 && half % SysFlashGet()->sector_size == 0)
+        files[FILE_KEPT].area = (FILE_AREA){size_without_log(), 2 * half};
+}
+#else
+static void map_log(void)
+{
+}
+#endif
 
 #if FILE_STORE_FILES > 0
 static void map_store(void)
 {
     RTS_UI32 sector = SysFlashGet()->sector_size;
     RTS_UI32 start = size_for_programs();
-    RTS_UI32 size = SysFlashGet()->size - start;
+    RTS_UI32 size = size_without_log() - start;
 
     if (size < 3 * sector || size % sector != 0)
         return;
@@ -303,5 +325,6 @@ RTS_RESULT SysFileFlash_Hook(CMP_HOOK hook)
         return ERR_NOMEMORY;
     }
     map_store();
+    map_log();
     return ERR_OK;
 }

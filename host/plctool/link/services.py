@@ -130,7 +130,11 @@ class Lateness:
 
 @dataclass(frozen=True)
 class LogEntry:
-    """One line of the device's log. `time_ns` counts from the start of the runtime, `log_class` is LOG_*."""
+    """One line of the device's log. `time_ns` counts from the start of the runtime, `log_class` is LOG_*.
+
+    `utc_ns` since 1970-01-01: None if the device has no clock, or it was not set. `start`: of the log that is kept, the
+    number of the power-up.
+    """
 
     handle: int
     time_ns: int
@@ -138,6 +142,8 @@ class LogEntry:
     log_class: int
     error: int
     text: str
+    utc_ns: int | None = field(default=None, compare=False)
+    start: int | None = None
 
 
 # ---- device ----------------------------------------------------------------------------------------------------------
@@ -618,19 +624,28 @@ def _check_shell(command: str, parts: Sequence[bintag.Tags], text: str) -> None:
 
 
 _LAST_HANDLE = 0xFFFFFFFF
+KEPT_LOG = "KeptLog"  # LOG_KEPT_NAME
+NO_KEPT_LOG = "This device keeps no log over power-off. Build its firmware with LOG_KEEP and HAS_CmpLogKeep."
 
 
-def read_log(session: Session, after: int = 0) -> list[LogEntry]:
-    """The entries that the device still has with a handle above `after`, oldest first."""
+def read_log(session: Session, after: int = 0, kept: bool = False) -> list[LogEntry]:
+    """The entries that the device still has with a handle above `after`, oldest first. `kept`: of the log that
+    outlasts power-off. Raises DeviceError if the device has none."""
     entries: list[LogEntry] = []
-    while after < _LAST_HANDLE and (batch := session.recover(partial(_read_log_batch, session, after + 1))):
+    while after < _LAST_HANDLE and (batch := session.recover(partial(_read_log_batch, session, after + 1, kept))):
         entries += batch
         after = batch[-1].handle
     return entries
 
 
-def _read_log_batch(session: Session, start_handle: int) -> list[LogEntry]:
-    tags = session.call(lib.SG_LOG, lib.SRV_LOG_GET_ENTRIES, [bintag.u32(lib.TAG_LOG_START_HANDLE, start_handle)])
+def _read_log_batch(session: Session, start_handle: int, kept: bool) -> list[LogEntry]:
+    choice = bintag.text(lib.TAG_LOG_NAME, KEPT_LOG) if kept else bintag.u32(lib.TAG_LOG_CLOCK, 1)
+    tags = session.call(
+        lib.SG_LOG, lib.SRV_LOG_GET_ENTRIES, [bintag.u32(lib.TAG_LOG_START_HANDLE, start_handle), choice]
+    )
+    if kept and tags.find(lib.TAG_LOG_NAME) is None:
+        raise DeviceError(NO_KEPT_LOG, "no-kept-log")
+    clock = _number64(tags.find(lib.TAG_LOG_CLOCK))
     entries = []
     for record in tags.containers(lib.TAG_LOG_RECORD):
         entry = _LOG_RECORD.unpack(record.bytes(lib.TAG_LOG_ENTRY, _LOG_RECORD.size))
@@ -639,5 +654,11 @@ def _read_log_batch(session: Session, start_handle: int) -> list[LogEntry]:
             time_ns = int.from_bytes(record.bytes(lib.TAG_LOG_TIME_NS, 8)[:8], "little", signed=True)
             component = record.text(lib.TAG_LOG_COMPONENT_NAME)
             text = record.text(lib.TAG_LOG_TEXT)
-            entries.append(LogEntry(handle, time_ns, component, entry.log_class, entry.error, text))
+            utc_ns = (_number64(record.find(lib.TAG_LOG_UTC_NS)) or None) if clock is None else clock + time_ns
+            start = record.u32(lib.TAG_LOG_START) if kept else None
+            entries.append(LogEntry(handle, time_ns, component, entry.log_class, entry.error, text, utc_ns, start))
     return entries
+
+
+def _number64(data: bytes | None) -> int | None:
+    return None if data is None or len(data) < 8 else int.from_bytes(data[:8], "little", signed=True)

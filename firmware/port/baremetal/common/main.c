@@ -20,11 +20,12 @@ static void log_reset_cause(void)
         "power on", "reset pin", "software", "", "fault of the runtime", "hardware watchdog"};
     const RESET_RECORD *record = ResetGet();
     if (CM_LEAVES_OUT && record->cause == RESET_START)
-        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_FAILED, "Reset: start of %s failed", CMGetComponentName(record->pc));
+        LogAdd(CMPID_CmpMgr, LOG_ERROR | LOG_KEPT, ERR_FAILED, "Reset: start of %s failed",
+               CMGetComponentName(record->pc));
     else if (record->cause < RESET_FATAL)
-        LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", names[record->cause]);
+        LogAdd(CMPID_CmpMgr, LOG_INFO | LOG_KEPT, ERR_OK, "Reset: %s", names[record->cause]);
     else
-        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%X, " CPU_FAULT_STATUS " 0x%X",
+        LogAdd(CMPID_CmpMgr, LOG_ERROR | LOG_KEPT, ERR_EXCEPTION, "Reset: %s at 0x%X, " CPU_FAULT_STATUS " 0x%X",
                names[record->cause], (unsigned)record->pc, (unsigned)record->status);
 }
 

@@ -6,6 +6,7 @@ import argparse
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,6 +69,10 @@ def tasks_arguments(command: Parser) -> None:
 
 def log_arguments(command: Parser) -> None:
     command.add_argument("--follow", action="store_true", help="go on until Ctrl-C, and show what is added")
+    command.add_argument(
+        "--kept", action="store_true", help="what outlasts power-off: starts, stops, exceptions, causes of resets"
+    )
+    command.add_argument("--clock", action="store_true", help="date and time in UTC in place of seconds, if known")
     command.add_argument(
         "--class", dest="log_class", choices=LOG_CLASSES, default=LOG_CLASSES[0], help="this class and graver ones"
     )
@@ -175,12 +180,13 @@ def tasks_text(document: dict[str, Any]) -> str:
 
 def _log(args: argparse.Namespace) -> int:
     wanted = _wanted(args)
+    text = partial(log_text, clock=args.clock or args.kept)
     if not args.follow:
-        return on_device(args, lambda plc: {"entries": [*filter(wanted, log(plc)["entries"])]}, log_text)
+        return on_device(args, lambda plc: {"entries": [*filter(wanted, log(plc, kept=args.kept)["entries"])]}, text)
     with connect(args) as plc, suppress(KeyboardInterrupt):
-        for entries in follow_log(plc):
+        for entries in follow_log(plc, kept=args.kept):
             for entry in filter(wanted, log_entries(plc, entries)):
-                output.say(output.as_json(entry) if args.json else log_text({"entries": [entry]}))
+                output.say(output.as_json(entry) if args.json else text({"entries": [entry]}))
             time.sleep(_FOLLOW_S)
     return EXIT_OK
 
@@ -194,12 +200,22 @@ def _wanted(args: argparse.Namespace) -> Callable[[Document], bool]:
     )
 
 
-def log_text(document: dict[str, Any]) -> str:
+def log_text(document: dict[str, Any], clock: bool = False) -> str:
+    """A line for each entry; `clock`: with date and time where they are known."""
     return "\n".join(
-        f"{e['time_s']:12.6f} s  {e['class']:<9}  {e['component']}: {e['text']}{place_text(e)}"
+        f"{_start_text(e)}{_moment_text(e, clock)}  {e['class']:<9}  {e['component']}: {e['text']}{place_text(e)}"
         f"{detail_text(e)}{calls_text(e, _LOG_COLUMN)}"
         for e in document["entries"]
     )
+
+
+def _start_text(entry: dict[str, Any]) -> str:
+    """Which power-up an entry of the kept log is of."""
+    return f"start {entry['start']:<5}" if "start" in entry else ""
+
+
+def _moment_text(entry: dict[str, Any], clock: bool) -> str:
+    return f"{entry['utc']:>23}" if clock and entry["utc"] else f"{entry['time_s']:{21 if clock else 12}.6f} s"
 
 
 def place_text(place: dict[str, Any]) -> str:

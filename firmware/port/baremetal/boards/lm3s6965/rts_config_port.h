@@ -16,6 +16,7 @@
 #define TRACE_BUFFER 0
 #define BP_MAX 0
 #define IEC_TASK_CALLS 0
+#define LOG_KEEP 0
 
 /* A second connection has no room in its 64 KiB. */
 #define COMM_MAX_CLIENTS 1

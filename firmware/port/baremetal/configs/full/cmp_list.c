@@ -6,6 +6,7 @@
 #include "CmpCompilerCalls.h"
 
 #define HAS_CmpLog 1
+#define HAS_CmpLogKeep (LOG_KEEP > 0)
 #define HAS_CmpEventMgrEmbedded 1
 #define HAS_CmpSettings SETTINGS
 #define HAS_SysWatchdog 1

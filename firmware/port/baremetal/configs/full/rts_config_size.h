@@ -54,7 +54,7 @@
 #endif
 #define BP_TRAPS (BP_MAX * 16)
 #define FILE_STORE_FILES 8
-#define FILE_STORE_SIZE (BOARD_FLASH_SIZE / 4)
+#define FILE_STORE_SIZE (BOARD_FLASH_SIZE / 4 - LOG_KEEP_SIZE)
 #ifndef COMM_MAX_CLIENTS
 #define COMM_MAX_CLIENTS 2
 #endif
@@ -63,6 +63,9 @@
 #define EVENT_MAX_CALLBACKS (14 + (APP_CALLS > 0) + (IEC_FILES > 0))
 #define COM_MAX_LINES 2
 #define LOG_MAX_ENTRIES 32
+#ifndef LOG_KEEP
+#define LOG_KEEP 32
+#endif
 #define CHECKSUM_TABLE_ENTRIES 256
 
 #define BOARD_UART_COUNT 2

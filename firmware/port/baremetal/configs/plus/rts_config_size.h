@@ -21,6 +21,7 @@
 #define COM_QUEUE_SIZE 540
 #define LOG_MAX_ENTRIES 8
 #define LOG_TEXT_SIZE 80
+#define LOG_KEEP 32
 #define EXCEPT_MAX_CALLS 6
 #define RTS_IEC_UNPRIVILEGED 0   /* 1: 300 bytes of flash, 24 of RAM */
 #define RTS_MAIN_STACK_SIZE 2560 /* an event is posted in the middle of a download */
