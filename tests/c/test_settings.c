@@ -81,6 +81,24 @@ static void a_line_that_is_not_valid_costs_a_warning_and_nothing_else(void)
     }
 }
 
+static void a_file_of_bad_lines_leaves_room_in_the_log(void)
+{
+    LOG_ENTRY entry = {0};
+    RTS_UI32 count = 0;
+    char text[SETTINGS_FILE_SIZE] = {0};
+
+    memset(text, '\n', sizeof text - 1);
+    for (RTS_UI32 i = 0; i < sizeof text - 1; i += 2)
+        text[i] = 'x';
+    start_with(text);
+    CHECK(log_has("Settings.cfg line 3 is left out"));
+    CHECK(!log_has("Settings.cfg line 4 is left out"));
+    CHECK(log_has("Settings.cfg: 509 more lines are left out"));
+    for (; LogGetEntry(entry.handle + 1, &entry) == ERR_OK; count++)
+        ;
+    CHECK(count < LOG_MAX_ENTRIES / 2);
+}
+
 static void a_file_that_is_too_large_is_left_out_as_a_whole(void)
 {
     static char text[SETTINGS_FILE_SIZE + 2];
@@ -308,6 +326,7 @@ int main(void)
 {
     RUN(a_file_sets_values_and_all_others_are_the_standard);
     RUN(a_line_that_is_not_valid_costs_a_warning_and_nothing_else);
+    RUN(a_file_of_bad_lines_leaves_room_in_the_log);
     RUN(a_file_that_is_too_large_is_left_out_as_a_whole);
     RUN(a_fault_is_said_with_its_line_and_what_to_write);
     RUN(the_log_leaves_out_what_the_filter_says_but_never_exceptions);

@@ -81,19 +81,31 @@ static bool take_line(const INI_READER *reader, const INI_ENTRY *entry)
            SettingsTake(&entry->value, limits[i].words, limits[i].least, limits[i].most, &setting_values[i]);
 }
 
+/* The first lines that are left out; the log has other things to show, too. */
+enum { NAMED_LINES = 3 };
+
+static void report_line(RTS_UI32 line, RTS_UI32 count)
+{
+    if (count <= NAMED_LINES)
+        LogAdd(CMPID_CmpSettings, LOG_WARNING, ERR_PARAMETER,
+               SETTINGS_FILE_NAME " line %u is left out: not valid, or only of plcrt --config", (unsigned)line);
+}
+
 static void take_text(const char *text, RTS_UI32 size)
 {
     INI_READER reader;
     INI_ENTRY entry;
     INI_KIND kind;
+    RTS_UI32 count = 0;
 
     IniOpen(&reader, text, size);
     while ((kind = IniNext(&reader, &entry)) != INI_END) {
         if (kind == INI_BAD || (kind == INI_VALUE && !take_line(&reader, &entry)))
-            LogAdd(CMPID_CmpSettings, LOG_WARNING, ERR_PARAMETER,
-                   SETTINGS_FILE_NAME " line %u is left out: not valid, or only of plcrt --config",
-                   (unsigned)reader.line);
+            report_line(reader.line, ++count);
     }
+    if (count > NAMED_LINES)
+        LogAdd(CMPID_CmpSettings, LOG_WARNING, ERR_PARAMETER, SETTINGS_FILE_NAME ": %u more lines are left out",
+               (unsigned)(count - NAMED_LINES));
 }
 
 #if FILE_STORE_FILES > 0
