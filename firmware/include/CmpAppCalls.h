@@ -17,8 +17,9 @@
 #if APP_CALLS > 0
 
 enum {
-    APP_CALL_PENDING = -1, /* the call needs another pass */
-    APP_CALL_PART = 32,    /* bytes that a task puts at once */
+    APP_CALL_PENDING = -1,   /* the call needs another pass */
+    APP_CALL_ABANDONED = -2, /* `error` of a call that ended well, and whose result no task has fetched */
+    APP_CALL_PART = 32,      /* bytes that a task puts at once */
 };
 
 RTS_STATIC_ASSERT(APP_CALL_DATA % APP_CALL_PART == 0, call_data_is_whole_parts);
@@ -26,7 +27,7 @@ RTS_STATIC_ASSERT(APP_CALL_DATA % APP_CALL_PART == 0, call_data_is_whole_parts);
 typedef struct APP_CALL APP_CALL;
 
 /* Carries out a call, in main. Returns 0 with `result`, the number of an error, or APP_CALL_PENDING: then it is called again
- * in the next pass. */
+ * in the next pass. A call with the error APP_CALL_ABANDONED is undone: `result` is that of its end. */
 typedef RTS_I32 (*PF_APP_CALL)(APP_CALL *call);
 
 struct APP_CALL {

@@ -350,12 +350,37 @@ static void a_flash_fault_leaves_the_previous_file_or_the_new_one(void)
     }
 }
 
+/* The block was called once and never again: the task has no handle to close. */
+static void a_file_whose_open_is_not_fetched_is_closed_after_a_minute(void)
+{
+    static const RTS_UI32 modes[] = {IEC_FILE_MODE_READ, IEC_FILE_MODE_WRITE};
+
+    setup();
+    CHECK(put_file("a", IEC_FILE_MODE_WRITE, pattern, 100));
+    for (RTS_UI32 m = 0; m < 2; m++) {
+        for (RTS_UI32 i = 0; i < (m == 0 ? IEC_FILES : 1); i++) {
+            RTS_I32 number = file_call(IEC_FILE_OPEN, 0, modes[m]);
+            put_bytes(number, (const RTS_UI8 *)"a", 2);
+            CHECK(call_send(number, 2));
+            CHECK_EQUAL(SimCommCycle(), ERR_OK);
+        }
+        CHECK(!open_as("a", m == 0 ? IEC_FILE_MODE_READ : IEC_FILE_MODE_WRITE));
+        CHECK_EQUAL(result, IEC_FILE_TOO_MANY);
+        CHECK_EQUAL(SimAdvance(61000000000), ERR_OK);
+        CHECK_EQUAL(SimCommCycle(), ERR_OK);
+    }
+    CHECK(has("a", pattern, 100)); /* what was opened to write was not put in its place */
+    CHECK(put_file("a", IEC_FILE_MODE_WRITE, pattern, 50));
+    CHECK(has("a", pattern, 50));
+}
+
 int main(void)
 {
     NEEDS_X86_64;
     RUN(ten_thousand_opens_are_refused_past_the_limit_and_leak_nothing);
     RUN(ten_thousand_calls_that_are_not_fetched_take_all_slots_until_the_reset);
     RUN(a_call_that_is_abandoned_is_free_after_a_minute);
+    RUN(a_file_whose_open_is_not_fetched_is_closed_after_a_minute);
     RUN(numbers_that_are_none_change_nothing);
     RUN(every_operation_with_every_odd_argument_is_an_error_of_the_library);
     RUN(a_file_that_is_copied_to_append_cannot_be_closed_before);

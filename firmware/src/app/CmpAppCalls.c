@@ -195,11 +195,17 @@ static void carry_out(APP_CALL *call)
     SysAtomicStore(&call->state, ENDED);
 }
 
-/* Frees what has ended and has not been fetched: the block is not called any more. */
+/* Frees what has ended and has not been fetched: the block is not called any more. Without a number no task finds it. */
 static void free_abandoned(APP_CALL *call)
 {
-    if (SysTimeGetNs() - call->since_ns > ABANDONED_NS)
-        (void)SysAtomicReplace(&call->state, ENDED, FREE);
+    if (SysTimeGetNs() - call->since_ns <= ABANDONED_NS || !SysAtomicReplace(&call->state, ENDED, TAKEN))
+        return;
+    call->number = 0;
+    if (call->error == 0) {
+        call->error = APP_CALL_ABANDONED;
+        (void)call->carry_out(call);
+    }
+    SysAtomicStore(&call->state, FREE);
 }
 
 static void poll_calls(void)

@@ -367,9 +367,26 @@ static RTS_I32 open_list(APP_CALL *call)
     return 0;
 }
 
+/* Closes what was opened and whose handle no task knows. What is written of it is dropped. */
+static RTS_I32 undo_open(const APP_CALL *call)
+{
+    OPEN_FILE *file = NULL;
+
+    if (call->operation == IEC_FILE_OPEN || call->operation == IEC_FILE_OPEN_DIR)
+        file = find_open(call->result);
+    if (file == NULL)
+        return 0;
+    if (file->use == WRITING)
+        FileStoreAbort();
+    file->use = CLOSED;
+    return 0;
+}
+
 /* In main. */
 static RTS_I32 carry_out(APP_CALL *call)
 {
+    if (call->error == APP_CALL_ABANDONED)
+        return undo_open(call);
     switch (call->operation) {
     case IEC_FILE_OPEN:
     case IEC_FILE_DELETE:
