@@ -24,7 +24,7 @@ FLOORS = (
     ("canopen", "gateway"),
     ("controller", "compiler", "sim_io"),
     ("doc", "fmt"),
-    ("sim_can", "sim_functions", "sim_worker"),
+    ("sim_can", "sim_functions", "sim_net", "sim_worker"),
     ("device", "sim"),
     ("", "controller_documents", "dump_file", "sim_plant"),
     ("port_check", "st_tests", "templates", "testing", "trace_file", "trace_plot", "ui"),

@@ -111,6 +111,7 @@ enum {
     CMPID_IecClock = 0x0072,
     CMPID_IecTaskCalls = 0x00A1,
     CMPID_CmpLogKeep = 0x00AC,
+    CMPID_IecSocket = 0x0073,
 };
 
 /* Name of a component, "" when unknown. */

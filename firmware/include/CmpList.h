@@ -48,6 +48,9 @@
 #if HAS_IecFile && (IEC_FILES == 0 || !HAS_CmpAppCalls || !HAS_CmpFileTransfer)
 #error "HAS_IecFile: set IEC_FILES in rts_config_port.h, and HAS_CmpAppCalls and HAS_CmpFileTransfer in cmp_list.c."
 #endif
+#if HAS_IecSocket && !HAS_CmpAppCalls
+#error "HAS_IecSocket needs HAS_CmpAppCalls in cmp_list.c."
+#endif
 #if HAS_CmpTraceMgr && TRACE_BUFFER == 0
 #error "HAS_CmpTraceMgr: set TRACE_BUFFER, the bytes that traces may use, in rts_config_port.h."
 #endif
@@ -142,6 +145,9 @@ enum {
 #endif
 #if HAS_IecFile
     CMP_ONE(IecFile)
+#endif
+#if HAS_IecSocket
+    CMP_ONE(IecSocket)
 #endif
 #if HAS_IecCan
     CMP_ONE(IecCan)

@@ -75,6 +75,9 @@ X(CmpAppCalls)
 #if HAS_IecFile
 X(IecFile)
 #endif
+#if HAS_IecSocket
+X(IecSocket)
+#endif
 #if HAS_IecClock
 X(IecClock)
 #endif

@@ -348,6 +348,12 @@
 #define IEC_FILES 0
 #endif
 
+/* Sockets that a program may have open at a time (IecSocket.h); 12 bytes of RAM for each. With HAS_IecSocket in cmp_list.c
+ * and one of EVENT_MAX_CALLBACKS. 0: the device has no network, which the program learns by an error. */
+#ifndef IEC_SOCKETS
+#define IEC_SOCKETS 0
+#endif
+
 /* 1: a program may ask about its tasks, and disable their watchdog for a cycle (IecTaskCalls.h); 24 bytes for each task. It
  * needs HAS_IecTaskCalls in cmp_list.c, and one of EVENT_MAX_CALLBACKS. 0: no flash for it, and a program that does is
  * refused. */

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
 
 from plctool.controller import Closed, Controller
-from plctool.core import error_name, give_back_core, lib, take_core
+from plctool.core import Core, error_name, give_back_core, lib, take_core
 from plctool.debug.breakpoints import Debugger, DeviceCondition
 from plctool.debug.forced import ForcedPlace, ForceList
 from plctool.debug.halted import BpStatus
@@ -36,6 +36,7 @@ from plctool.link.traces import TraceState
 from plctool.sim_can import CanFrame, send_frame, take_frames
 from plctool.sim_functions import SimFunctions
 from plctool.sim_io import SimIo, is_input, read_parameter, set_fault, set_modbus
+from plctool.sim_net import Datagram, send_datagram, take_datagrams
 from plctool.sim_worker import Worker
 
 if TYPE_CHECKING:
@@ -167,6 +168,7 @@ class Simulator(Controller):
             self._lib.SimStop()
             self._lib.SimSetFileStore(0)
             self._lib.SimSetKeptLog(0)
+            self._lib.SimNetSetAddress(0)
             self._functions.disconnect(self._core)
             if self._limited:
                 self._lib.SimSetCycleLimit(0)
@@ -370,6 +372,20 @@ class Simulator(Controller):
     def can_receive(self) -> list[CanFrame]:
         """The frames that the device has sent on the CAN bus since the last call, the 4096 newest at most."""
         return take_frames(self._core)
+
+    def udp_send(self, data: bytes, port: int, *, sender: tuple[str, int] = ("192.168.0.1", 1)) -> None:
+        """A datagram of another host to a port of the program: it is there when time passes."""
+        send_datagram(self._core, Datagram(bytes(data), *sender, to_port=port))
+
+    def udp_receive(self) -> list[Datagram]:
+        """The datagrams that the program has sent to other hosts since the last call. For simulators that are not on a
+        Network."""
+        return take_datagrams(self._core)
+
+    def join_network(self, ip: int) -> Core:
+        """Has this address from now on; for `Network`."""
+        self._lib.SimNetSetAddress(ip)
+        return self._core
 
     def attach(self, step: Callable[[Simulator], None], every_ms: float = 1) -> None:
         """A plant: `step(plc)` is called each `every_ms` of virtual time, from now on, while time passes. It reads

@@ -18,6 +18,7 @@ COMPONENTS = {
     "IecEvents.functions": "IecEvents",
     "CmpAppCalls.functions": "CmpAppCalls",
     "IecFile.functions": "IecFile",
+    "IecSocket.functions": "IecSocket",
     "IecCan.functions": "IecCan",
     "IecClock.functions": "IecClock",
     "IecLog.functions": "IecLog",

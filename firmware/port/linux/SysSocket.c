@@ -30,7 +30,8 @@
 
 enum {
     PURPOSES = SYSSOCK_UDP_BROADCAST + 1,
-    SOCKETS = PURPOSES + TCP_MAX_CONNECTIONS + 1 + SYSSOCK_MAX_FIELD_BUS, /* one waits for a place */
+    SOCKETS = PURPOSES + TCP_MAX_CONNECTIONS + 1 + SYSSOCK_MAX_FIELD_BUS + IEC_SOCKETS,
+    /* one waits for a place */
     BACKLOG = 16,
     IP_BITS = 32,
     NOT_ASKED = -1,
@@ -408,12 +409,6 @@ static RTS_HANDLE take(int file, short events)
     return handle;
 }
 
-static void send_without_delay(int file)
-{
-    int on = 1;
-    (void)setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-}
-
 static RTS_RESULT why_not_bound(void)
 {
     switch (errno) {
@@ -424,6 +419,34 @@ static RTS_RESULT why_not_bound(void)
     default:
         return ERR_DEVICE;
     }
+}
+
+/* Datagrams of a program, which it may also send to all hosts of a network. */
+RTS_RESULT PortSockBind(const SOCKADDRESS *own, RTS_HANDLE *socket)
+{
+    int on = 1;
+    int file = bind_socket(SOCK_DGRAM, *own, false);
+    if (file < 0) {
+        return why_not_bound();
+    }
+    (void)setsockopt(file, SOL_SOCKET, SO_BROADCAST, &on, sizeof(on));
+    make_ready();
+    *socket = take(file, POLLIN);
+    return *socket != RTS_INVALID_HANDLE ? ERR_OK : ERR_NOBUFFER;
+}
+
+void PortSockQuiet(RTS_HANDLE socket)
+{
+    PORT_SOURCE *source = find(socket);
+    if (source != NULL) {
+        PortWaitRemove(source);
+    }
+}
+
+static void send_without_delay(int file)
+{
+    int on = 1;
+    (void)setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
 }
 
 RTS_RESULT SysSockListen(const SOCKADDRESS *own, RTS_HANDLE *listener)

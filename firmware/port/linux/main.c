@@ -73,6 +73,7 @@ static const char usage[] =
     "[--tunnel-drive]\n"
     "             [--board NAME] [--event NAME=PIPE]... [--dump FILE] [--metrics FILE] [--metrics-every SECONDS]\n"
     "             [--config FILE]\n"
+    "             [--net ADDRESSES] [--set-clock]\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
@@ -119,6 +120,9 @@ static const char usage[] =
     "  --reset-password\n"
     "                  removes the password that is in the flash file, and ends\n"
     "  --set-clock     lets the program set the clock of this machine, if plcrt may: docs/library.md\n"
+    "  --net LIST      addresses that the program may reach by UDP and TCP: ADDRESS[/BITS][:PORT[-PORT]] with commas "
+    "between;\n"
+    "                  only this machine if not given: docs/sockets.md\n"
     "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
     "  --version       prints the version\n"
     "  --help          prints this\n"
@@ -202,6 +206,7 @@ enum {
     OPTION_MDNS,
     OPTION_CONFIG,
     OPTION_HELP_CONFIG,
+    OPTION_NET,
 };
 
 /* clang-format off */
@@ -234,6 +239,7 @@ static const struct option long_options[] = {
     {"metrics-every", required_argument, NULL, OPTION_METRICS_EVERY},
     {"config", required_argument, NULL, OPTION_CONFIG},
     {"help-config", no_argument, NULL, OPTION_HELP_CONFIG},
+    {"net", required_argument, NULL, OPTION_NET},
     {NULL, 0, NULL, 0},
 };
 /* clang-format on */
@@ -265,6 +271,13 @@ static const char *take_udp(const char *text)
                text);
     }
     return text;
+}
+
+static void take_net(const char *text)
+{
+    if (!PortNetAllow(text)) {
+        refuse("--net %s is not a list of addresses: write for example 192.168.1.0/24,10.0.0.5:1202", text);
+    }
 }
 
 static void take_event(OPTIONS *options, char *text)
@@ -398,6 +411,9 @@ static void take_option(OPTIONS *options, int option)
         break;
     case OPTION_EVENT:
         take_event(options, optarg);
+        break;
+    case OPTION_NET:
+        take_net(optarg);
         break;
     case OPTION_MDNS:
         options->mdns = true;

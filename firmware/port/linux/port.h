@@ -155,6 +155,13 @@ bool PortUdpOpen(const char *text, PORT_REASON *reason);
 void PortSockClose(void);
 /* The address at which a socket listens, 0 for all of the machine; false if it is not open. */
 bool PortSockAddress(SYSSOCK_PURPOSE purpose, SOCKADDRESS *own);
+/* Binds a socket of a program (SysNet.h); errors as SysSockListen. */
+RTS_RESULT PortSockBind(const SOCKADDRESS *own, RTS_HANDLE *socket);
+/* Main no longer waits for a socket. */
+void PortSockQuiet(RTS_HANDLE socket);
+/* Lets programs reach the addresses of a list "ADDRESS[/BITS][:PORT[-PORT]],..."; without one those of this machine. False
+ * if the list is not valid. */
+bool PortNetAllow(const char *text);
 /* Where a socket listens, as "127.0.0.1:11740"; false if it is not open. */
 bool PortSockName(SYSSOCK_PURPOSE purpose, char *name, size_t size);
 

@@ -162,6 +162,7 @@ RTS_RESULT SimStart(void)
     sim.group_ns = NEVER;
     forget_timers();
     SimComPowerOn();
+    SimNetPowerOn();
     SimLinkReset();
     SimSuperviseStart();
     return with_landing(power_on, NULL);

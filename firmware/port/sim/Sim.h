@@ -142,6 +142,31 @@ RTS_RESULT SimGetFile(RTS_UI32 index, char name[36], RTS_UI32 *size);
 /* Reads all of a file. ERR_NO_OBJECT; ERR_SIZE_MISMATCH: it has another size. */
 RTS_RESULT SimReadFile(const char *name, RTS_UI8 *data, RTS_UI32 size);
 
+/* ---- network ---- */
+
+enum { SIM_NET_DATA = 2048 };
+
+/* What is on the simulated network. A connection is asked for, and then accepted or refused; data and its end follow, in
+ * order. */
+enum { SIM_NET_DATAGRAM, SIM_NET_CONNECT, SIM_NET_ACCEPT, SIM_NET_REFUSE, SIM_NET_DATA_OF, SIM_NET_END };
+
+typedef struct {
+    RTS_UI32 kind; /* SIM_NET_* */
+    RTS_UI32 from_ip;
+    RTS_UI32 from_port;
+    RTS_UI32 to_ip;
+    RTS_UI32 to_port;
+    RTS_UI32 size;
+    RTS_UI8 data[SIM_NET_DATA];
+} SIM_NET_PACKET;
+
+/* The IPv4 address of the device, 127.0.0.1 without one; it stays when power goes. Open sockets do not follow. */
+void SimNetSetAddress(RTS_UI32 ip);
+/* Gives the device a packet. ERR_NOBUFFER: its program must first read what came before; ERR_PARAMETER: no such packet. */
+RTS_RESULT SimNetPut(const SIM_NET_PACKET *packet);
+/* Takes a packet that the device has sent to another one. ERR_NOTHING_TO_DO. */
+RTS_RESULT SimNetGet(SIM_NET_PACKET *packet);
+
 /* 0: the flash is read through its read function only. From power off; the default is 1. */
 void SimFlashSetMapped(int mapped);
 

@@ -38,8 +38,9 @@
 #define IEC_EVENTS 1
 #define SETTINGS 1
 #define APP_CALLS 32
-#define APP_CALL_DATA 1024
+#define APP_CALL_DATA 2048
 #define IEC_FILES 16
+#define IEC_SOCKETS 64
 #define APP_POWER_FAIL 1
 #define IEC_TASK_CALLS 1
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */

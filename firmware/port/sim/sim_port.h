@@ -18,6 +18,7 @@ void SimPowerCut(void);
 /* Power on: forget what RAM and pins held. */
 RTS_RESULT SimFlashPowerOn(void);
 void SimComPowerOn(void);
+void SimNetPowerOn(void);
 
 /* Starts the thread that aborts endless loops, once per process. */
 void SimSuperviseStart(void);

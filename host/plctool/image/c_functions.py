@@ -33,6 +33,9 @@ _FUNCTIONS = {
         call_room():UDINT                                   16    16""",
     "IecFile": """
         file_call(UDINT,UDINT,UDINT):DINT                   80   112""",
+    "IecSocket": """
+        socket_call(UDINT,UDINT,UDINT):DINT                 80   112
+        socket_session():UDINT                              16    16""",
     "IecCan": """
         can_send(USINT,DWORD,USINT,USINT,LWORD):DINT            160   208
         can_sent(DINT):DINT                                     64   80
