@@ -5,10 +5,11 @@ from __future__ import annotations
 import struct
 
 import pytest
-from front_support import folded, main, messages
+from front_support import body_of, folded, main, messages
 from hypothesis import given
 from hypothesis import strategies as st
 
+from plctool.compiler.typed import nodes as typed
 from plctool.iec import literals
 
 
@@ -162,3 +163,39 @@ def test_duration_text_reads_back(d: int, h: int, m: int, s: int, ms: int) -> No
 def test_string_text_reads_back(value: str) -> None:
     text = value.replace("$", "$$").replace("'", "$'")
     assert literals.string(f"'{text}'") == value
+
+
+NAMESPACED = "NAMESPACE Plant.Parts\nTYPE Color : (Red, Green, Blue); Small : INT(0..9); END_TYPE\nEND_NAMESPACE\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("Plant.Parts.Color#Blue", 2),
+        ("Plant . Parts.Small#7", 7),
+        ("plant.parts.small#16#9", 9),
+        ("CIA405.STATE#OPERATIONAL", 5),
+        ("CIA405.DEVICE#5", 5),
+        ("CIA405_STATE#STOPPED", 4),
+    ],
+)
+def test_value_may_have_a_type_in_a_namespace(text: str, value: int) -> None:
+    (statement,) = body_of("x : DINT;", f"x := {text};", NAMESPACED)
+    assert isinstance(statement, typed.Assign)
+    assert isinstance(statement.value, typed.Const)
+    assert statement.value.value == value
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Plant.Parts.Color#Pink", "Plant.Parts.Color has no value Pink"),
+        ("Plant.Parts.Small#10", "10"),
+        ("Plant.Color#Red", "Plant.Color"),
+        ("Plant.INT#5", "take away what stands before INT#5"),
+        ("a[1].Color#Red", "take away what stands before Color#Red"),
+    ],
+)
+def test_value_of_no_type_in_a_namespace_is_reported(text: str, message: str) -> None:
+    found = messages(main("x : DINT; a : ARRAY[0..1] OF INT;", f"x := {text};", NAMESPACED))
+    assert message in " ".join(found)

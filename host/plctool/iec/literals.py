@@ -210,6 +210,11 @@ def _one_byte(character: str) -> str:
         raise LiteralError(f'{message}; write a WSTRING: "..."') from None
 
 
+def is_elementary(text: str) -> bool:
+    """Whether `text` is a value with the name of an elementary type before it."""
+    return text.partition("#")[0].upper() in _NOT_ENUMS
+
+
 def is_enum_value(prefix: str, rest: str) -> bool:
     """Whether `prefix#rest` names a value of an enumeration."""
     name = prefix.upper()

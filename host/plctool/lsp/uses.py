@@ -221,13 +221,15 @@ class Walk:
         self.shape = None if item is None else self.names.shape(item)
 
     def _typed(self, token: Token) -> None:
-        """`Color#Red`"""
-        self._argument(token)
-        self._nothing()
+        """`Color#Red`, `Plant.Color#Red`"""
         prefix, _, rest = token.text.partition("#")
+        inner = self._part(prefix) if self._after_dot else None
+        if not self._after_dot:
+            self._argument(token)
+        self._nothing()
         if prefix.upper() in ELEMENTARY or not prefix[:1].isalpha():
             return
-        item = self.names.unit(prefix, self.unit)
+        item = inner or self.names.unit(prefix, self.unit)
         if item is None:
             return
         self._use(token.pos, len(prefix), item)

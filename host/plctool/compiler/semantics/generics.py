@@ -174,6 +174,12 @@ def is_any(spec: ast.TypeSpec) -> bool:
     return isinstance(spec, ast.NamedType) and is_group(spec.name)
 
 
+def group_of(spec: ast.TypeSpec) -> str:
+    """ANY_INT of a declaration, in capitals."""
+    assert isinstance(spec, ast.NamedType)
+    return spec.name.upper()
+
+
 def parameter(name: str, value: Variable) -> tuple[Parameter, list[Parameter], list[Statement]]:
     """The parameter that is passed for `value`, an AnyType; those after all others; what the body begins with."""
     pos, t = value.pos, value.type
@@ -208,6 +214,13 @@ def handed(place: Place, described: Type, size: Expr) -> tuple[Expr, list[Expr]]
         )
         return address, [kind, bytes_]
     return AddressOf(place, RawPointerType(BYTE), pos), [Const(class_of(place.type), INT, pos), size]
+
+
+def kept(own: Place, place: Place, size: Expr) -> list[Statement]:
+    """What makes `own`, the AnyType of an instance, describe `place`."""
+    address, (kind, bytes_) = handed(place, own.type, size)
+    parts = (("pValue", None, address), ("TypeClass", INT, kind), ("diSize", None, bytes_))
+    return [Assign(part(own, name, seen), value, place.pos) for name, seen, value in parts]
 
 
 # ---- ARRAY[*] ----

@@ -572,6 +572,19 @@ class Builder:
         except literals.LiteralError as error:
             return self._bad(token, error)
 
+    def typed_in_namespace(self, base: ast.Expr, token: Token) -> ast.Expr:
+        """`Plant.Color#Red`"""
+        names = [token.text]
+        while isinstance(base, ast.Member):
+            names.append(base.name)
+            base = base.base
+        if not isinstance(base, ast.Name) or literals.is_elementary(token.text):
+            message = (
+                f"a value is written TYPE#VALUE, or NAMESPACE.TYPE#VALUE; take away what stands before {token.text}"
+            )
+            return self._bad(token, literals.LiteralError(message))
+        return self.typed(Token(token.type, ".".join([base.name, *reversed(names)]), base.pos))
+
     def typed(self, token: Token) -> ast.Expr:
         prefix, _, rest = token.text.partition("#")
         if literals.is_enum_value(prefix, rest):

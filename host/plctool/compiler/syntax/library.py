@@ -28,7 +28,7 @@ STAND_INS = (
 )  # fmt: skip
 """Libraries of other systems that this one stands in for, as far as it has their names."""
 
-PREFIXED = ("CAA", "FILE", "NBS", "COM")
+PREFIXED = ("CAA", "CIA405", "FILE", "NBS", "COM")
 """Namespaces whose names are too common without them: `FILE.Open` is FILE_Open here."""
 
 _PREFIXED = re.compile(rf"({'|'.join(PREFIXED)})\.(?=\w+$)", re.IGNORECASE)

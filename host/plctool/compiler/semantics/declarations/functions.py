@@ -17,6 +17,7 @@ from plctool.compiler.semantics.generics import (
     WIDE_LIBRARY_STRING,
     bound_parameters,
     describes_any,
+    group_of,
     is_any,
     parameter,
 )
@@ -126,7 +127,7 @@ class Functions:
         t, behind = self._world.declared.type_named(line.pos, f"__SYSTEM.{NAME}", scope), list[Parameter]()
         for offset, name in line.names:
             symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword])
-            symbol.used, symbol.group = True, line.type.name.upper()
+            symbol.used, symbol.group = True, group_of(line.type)
             if not scope.declare(symbol, offset):
                 continue
             symbol.variable = Variable(name, t, Storage.LOCAL, symbol.pos)

@@ -19,7 +19,7 @@ from plctool.compiler.semantics.declarations.unit_variables import (
     see_edge,
 )
 from plctool.compiler.semantics.declarations.variables import Variables
-from plctool.compiler.semantics.generics import give_bounds
+from plctool.compiler.semantics.generics import NAME, give_bounds, group_of, is_any
 from plctool.compiler.semantics.instances import require_instances
 from plctool.compiler.semantics.names import PlannedInstance
 from plctool.compiler.semantics.scope import Scope
@@ -36,7 +36,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed.nodes import Direction, Initial, Parameter, Pou, Storage, StructInit, Variable
-from plctool.iec.types import DWORD, Field, Keep, ReferenceType, StringType, StructType
+from plctool.iec.types import DWORD, Field, Keep, ReferenceType, StringType, StructType, Type
 
 # ---- function blocks ----
 
@@ -116,7 +116,10 @@ class Blocks:
         keep = self._units.keep_of(block, info.pou)
         info.retain = info.retain or keep.kept
         for line in block.decls:
-            t, default = self._types.declared_type(line, scope, _MEMBER_MAY[role])
+            described = is_any(line.type) and role in (Role.INPUT, Role.OUTPUT)
+            t, default = (
+                self._any(line, scope) if described else self._types.declared_type(line, scope, _MEMBER_MAY[role])
+            )
             if role is not Role.IN_OUT:
                 require_instances(self._world, t, scope, line.pos)
             info.retain = info.retain or (role is not Role.IN_OUT and self._variables.is_retain(t))
@@ -126,6 +129,7 @@ class Blocks:
                 symbol.access = next(iter(block.qualifiers & ast.ACCESS), None)
                 symbol.open_area = line.location.text[1] if line.location is not None else ""
                 symbol.constant = ast.Modifier.CONSTANT in block.qualifiers
+                symbol.group = group_of(line.type) if described else ""
                 symbol.is_path = "instance-path" in line.attributes
                 symbol.used = symbol.used or symbol.is_path
                 if symbol.is_path and not isinstance(t, StringType) and t is not DWORD:
@@ -157,6 +161,12 @@ class Blocks:
                     self._hidden_member(last, info, keep)
                     self._hidden_member(edge, info, keep)
                     see_edge(symbol, line.edge, last, edge, scope)
+
+    def _any(self, line: ast.VarDecl, scope: Scope) -> tuple[Type, None]:
+        """What an instance has of the argument for an input or output of type ANY_..."""
+        if line.init is not None:
+            scope.error(line.pos, "type", f"{group_of(line.type)} has no initial value")
+        return self._world.declared.type_named(line.pos, f"__SYSTEM.{NAME}", scope), None
 
     def _hidden_member(self, variable: Variable, info: BlockInfo, keep: Keep) -> None:
         """A member that has no name in the program."""

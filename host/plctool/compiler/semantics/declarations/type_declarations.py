@@ -201,7 +201,7 @@ class TypeDeclarations:
         if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.INTERFACE:
             return self._world.declared.interface(symbol), None
         if is_group(spec.name):
-            scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
+            scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions, methods and blocks only")
         elif symbol is None and scope.lookup(spec.name) is None:
             upper = spec.name.upper()
             hint = known_name_like(spec.name, [*ELEMENTARY, *_STRINGS, *self._world.names.type_names()])

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from plctool.compiler.semantics.checker import Checker, checks_statement
 from plctool.compiler.semantics.conversions import elementary, load, place_of, same_type, whole
-from plctool.compiler.semantics.generics import handed_bounds
+from plctool.compiler.semantics.generics import accepts, group_name, handed_bounds, kept
 from plctool.compiler.semantics.once import kept_place
 from plctool.compiler.semantics.rules.arguments import (
     bind,
@@ -20,13 +20,14 @@ from plctool.compiler.semantics.rules.arguments import (
     parameter_names,
     refer,
     referenced_place,
+    size_of,
     split_enable,
     too_short,
 )
 from plctool.compiler.semantics.rules.callees import BlockCall, ProgramCall, resolve_statement
 from plctool.compiler.semantics.rules.calls import body_dispatch, call, called_variable
 from plctool.compiler.semantics.rules.members import bound_member, is_called_by_name, variable_value
-from plctool.compiler.semantics.rules.places import changeable_place
+from plctool.compiler.semantics.rules.places import changeable_place, named_place
 from plctool.compiler.semantics.rules.pools import DELETE, delete
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, BlockInfo, ProgramInfo, Role
 from plctool.compiler.syntax import ast
@@ -59,6 +60,7 @@ from plctool.iec.types import BOOL, ReferenceType, StructType
 class _Arguments:
     """What a call of a function block passes."""
 
+    before: list[tuple[Variable, Place]] = field(default_factory=list)  # arguments that are described: ANY
     inputs: list[tuple[Variable, Expr]] = field(default_factory=list)
     in_outs: list[tuple[Variable, Place]] = field(default_factory=list)
     outputs: list[tuple[Variable, Place]] = field(default_factory=list)
@@ -130,7 +132,8 @@ def block_call(c: Checker, call: ast.Call, instance: Expr) -> list[Statement]:
     handed = _block_arguments(c, block, bound, call, place)
     if handed is None:
         return []
-    before, named = kept_place(c, place) if handed.after else ([], place)
+    before, named = kept_place(c, place) if handed.after or handed.before else ([], place)
+    described = [s for variable, argument in handed.before for s in _description(c, named, variable, argument)]
     for taken in handed.after:
         for part in walk(taken.value):
             if isinstance(part, MemberPlace) and part.base is place:
@@ -141,7 +144,12 @@ def block_call(c: Checker, call: ast.Call, instance: Expr) -> list[Statement]:
         c.world.calls.add(c.scope.pou, block.pou, pos)
     if isinstance(place, DerefPlace) or statement.dispatch is not None:
         c.world.dispatches.note_other_call(c.scope.pou, block.pou, statement.dispatch, pos)
-    return [*before, statement, *handed.after]
+    return [*before, *described, statement, *handed.after]
+
+
+def _description(c: Checker, instance: Place, variable: Variable, argument: Place) -> list[Statement]:
+    own = MemberPlace(instance, variable.offset, variable.type, argument.pos)
+    return kept(own, argument, size_of(c, argument))
 
 
 def _block_arguments(
@@ -156,6 +164,11 @@ def _block_arguments(
             if place is not None:
                 handed.in_outs.append((variable, place))
                 handed.inputs += handed_bounds(variable, place, place.pos)
+        elif (group := block.members[variable.name.casefold()].group) != "":
+            place = _block_any(c, variable, group, argument, block, call)
+            ok = ok and place is not None
+            if place is not None:
+                handed.before.append((variable, place))
         elif argument is None or argument.value is None:
             continue
         elif parameter.direction is Direction.INPUT:
@@ -184,6 +197,32 @@ def _block_in_out(
     short = "" if place is None else too_short(c, place, variable.type)
     if short:
         c.error(argument.pos, "type", f"the VAR_IN_OUT {name} is {variable.type}, {short}")
+        return None
+    return place
+
+
+def _block_any(
+    c: Checker, variable: Variable, group: str, argument: ast.Argument | None, block: BlockInfo, call: ast.Call
+) -> Place | None:
+    """The variable that an input or output of type ANY_... stands for; the instance keeps its address."""
+    name = variable.name
+    if argument is None or argument.value is None:
+        c.error(call.pos, "arguments", f"{name} of {block.type} is missing: every call gives {group} a variable")
+        return None
+    if argument.output:
+        place = changeable_place(c, argument.value, f"the output {name}", f"be given to the output {name}")
+    else:
+        place = named_place(c, argument.value, f"the instance keeps the address of {name}, which")
+    if place is None:
+        return None
+    if isinstance(place, BitPlace):
+        c.error(argument.pos, "type", f"a single bit has no address, so it cannot be given to {name}")
+        return None
+    if is_unaligned(place):
+        c.error(argument.pos, "type", packed(place, name))
+        return None
+    if not accepts(group, place.type) and place.type is not variable.type:
+        c.error(argument.pos, "type", f"{name} takes {group_name(group)}, not {place.type}")
         return None
     return place
 
