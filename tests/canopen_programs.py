@@ -15,6 +15,26 @@ coils := inputs;
 IF NOT Valves.ok THEN lost := lost + 1; END_IF
 END_PROGRAM
 """
+BLOCKS = """
+PROGRAM Main
+VAR
+    inputs, coils : BYTE; door : BOOL; pressure : INT; cycles : UDINT;
+    r4 : CIA405_SDO_READ4; r7 : CIA405_SDO_READ7; r14 : CIA405.SDO_READ14; r21 : CIA405.SDO_READ21;
+    w4 : CIA405_SDO_WRITE4; w7 : CIA405_SDO_WRITE7; w14 : CIA405.SDO_WRITE14; w21 : CIA405.SDO_WRITE21;
+    read_real, read_text, read_flag : CIA405.SDO_READ; write_real, write_text : CIA405.SDO_WRITE;
+    real, real2 : LREAL; text, text2 : STRING(20); flag : BOOL;
+    id : CIA405.GET_LOCAL_NODE_ID; state : CIA405.GET_STATE; kernel : CIA405.GET_CANOPEN_KERNEL_STATE; nmt : CIA405.NMT;
+    emcy : CIA405.RECV_EMCY; emcy_dev : CIA405.RECV_EMCY_DEV;
+END_VAR
+cycles := cycles + 1;
+r4(); r7(); r14(); r21(); w4(); w7(); w14(); w21(); id(); state(); kernel(); nmt(); emcy(); emcy_dev();
+read_real(DEVICE := 9, DATA => real2);
+read_text(DEVICE := 9, DATA => text2);
+read_flag(DEVICE := 9, DATA => flag);
+write_real(DEVICE := 9, DATA := real);
+write_text(DEVICE := 9, DATA := text);
+END_PROGRAM
+"""
 ONE = """
 [[canopen]]
 name = "Bus"
@@ -48,11 +68,11 @@ in = { "6000:01" = "Main.inputs3" }
 """
 
 
-def write_program(folder: Path, *, others: str = "", line: str = "", device: str = "") -> Path:
+def write_program(folder: Path, *, others: str = "", line: str = "", device: str = "", source: str = SOURCE) -> Path:
     """The sources in a folder; `line` and `device`: more keys of the network and its first node."""
     folder.mkdir(exist_ok=True)
     shutil.copy(VALVES, folder / "valves.eds")
     (folder / "app.io.toml").write_text(ONE.format(line=line, device=device) + others)
     path = folder / "app.st"
-    path.write_text(SOURCE)
+    path.write_text(source)
     return path

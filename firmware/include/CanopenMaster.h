@@ -20,6 +20,7 @@ typedef enum {
     MASTER_START,     /* the command is to be sent */
     MASTER_STARTS,    /* waits for its heartbeat */
     MASTER_RUNS,
+    MASTER_HELD,  /* in the state that a program has commanded */
     MASTER_WAITS, /* until the next attempt */
 } MASTER_STATE;
 
@@ -38,8 +39,10 @@ enum {
     MASTER_WHY_STATE = 's',     /* it has left the operational state */
     MASTER_WHY_LATE = 'p',      /* a PDO is late */
     MASTER_WHY_BUS = 'o',       /* bus off */
+    MASTER_WHY_HELD = 'n',      /* a program has commanded another state */
 };
 
+enum { CANOPEN_SDO_BUFFER = 64 }; /* bytes that can be read of an identity */
 enum { EXPECTED_TYPE, EXPECTED_VENDOR, EXPECTED_PRODUCT, EXPECTED_REVISION, EXPECTED_COUNT };
 
 /* Counters in the order of CANOPEN_PARAM_BOOTS .. */
@@ -62,17 +65,22 @@ typedef struct {
     RTS_UI32 heartbeat_ms; /* its period; 0: it has none */
     /* Of the master. */
     MASTER_STATE state;
-    RTS_UI8 why;       /* MASTER_WHY_* of the last failure */
-    RTS_UI8 nmt_state; /* of its last heartbeat */
-    bool repeated;     /* the transfer is the second one */
-    RTS_UI32 failures; /* of attempts and losses */
-    RTS_UI32 step;     /* of MASTER_IDENTIFY; of MASTER_CONFIGURE: the place in `config` */
-    RTS_UI32 since_ms; /* of the state; of MASTER_RUNS the last heartbeat */
-    RTS_UI32 wait_ms;  /* before the next attempt */
-    RTS_UI32 found;    /* what it has instead of what is expected */
-    RTS_UI16 index;    /* whose write was refused */
+    RTS_UI8 why;             /* MASTER_WHY_* of the last failure */
+    RTS_UI8 nmt_state;       /* of its last heartbeat */
+    RTS_UI8 command;         /* what starts it; NMT_STOP, NMT_PREOPERATIONAL: a program does not want it to run */
+    bool is_heard;           /* there was a heartbeat */
+    RTS_UI32 heard_ms;       /* when the last one was */
+    bool is_asked_elsewhere; /* of the owner: another client of SDO is at it, so the manager waits */
+    bool repeated;           /* the transfer is the second one */
+    RTS_UI32 failures;       /* of attempts and losses */
+    RTS_UI32 step;           /* of MASTER_IDENTIFY; of MASTER_CONFIGURE: the place in `config` */
+    RTS_UI32 since_ms;       /* of the state; of MASTER_RUNS the last heartbeat */
+    RTS_UI32 wait_ms;        /* before the next attempt */
+    RTS_UI32 found;          /* what it has instead of what is expected */
+    RTS_UI16 index;          /* whose write was refused */
     RTS_UI8 sub;
     SDO_CLIENT sdo;
+    RTS_UI8 reply[CANOPEN_SDO_BUFFER];
     CANOPEN_COUNTERS counters;
 } CANOPEN_NODE;
 
@@ -88,6 +96,15 @@ void CanopenNodePoll(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_
 
 /* The owner has seen that it is lost. */
 void CanopenNodeLose(CANOPEN_NODE *node, RTS_UI8 why, RTS_UI32 now_ms);
+
+/* A program has sent it a command. The manager keeps it in that state, also after a loss, until it is to run again. */
+void CanopenNodeCommand(CANOPEN_NODE *node, RTS_UI8 command, RTS_UI32 now_ms);
+
+/* True while the manager resets it, reads or writes its objects, so that no other client may. */
+bool CanopenNodeIsAsked(const CANOPEN_NODE *node);
+
+/* True if its heartbeat is not late. */
+bool CanopenNodeIsHeard(const CANOPEN_NODE *node, RTS_UI32 now_ms);
 
 /* How long it is until it has something to do without a frame [ms]; UINT32_MAX: never. */
 RTS_UI32 CanopenNodeGetWaitMs(const CANOPEN_NODE *node, RTS_UI32 now_ms);

@@ -11,8 +11,6 @@
 #include "Canopen.h"
 #include "SysCan.h"
 
-enum { CANOPEN_SDO_BUFFER = 64 }; /* bytes that can be read */
-
 typedef enum {
     SDO_IDLE,
     SDO_BUSY,
@@ -37,10 +35,12 @@ typedef struct {
     RTS_UI32 abort;
     RTS_UI32 timeout_ms;
     RTS_UI32 since_ms;
-    RTS_UI8 in[CANOPEN_SDO_BUFFER];
+    RTS_UI8 *in; /* of the owner: what is read */
+    RTS_UI32 room;
 } SDO_CLIENT;
 
-/* Begin a transfer; `data` stays until it has ended. */
+/* Begin a transfer; `data` stays until it has ended. A read of more than `room` bytes ends by SDO_ABORT_MEMORY, and the
+ * first ones are there. */
 void SdoClientRead(SDO_CLIENT *client, RTS_UI8 node, RTS_UI16 index, RTS_UI8 sub, RTS_UI32 now_ms);
 void SdoClientWrite(SDO_CLIENT *client, RTS_UI8 node, RTS_UI16 index, RTS_UI8 sub, const RTS_UI8 *data, RTS_UI32 size,
                     RTS_UI32 now_ms);
@@ -50,6 +50,9 @@ void SdoClientTake(SDO_CLIENT *client, const CAN_FRAME *frame, RTS_UI32 now_ms);
 
 /* Ends a transfer whose reply is late, by an abort. */
 void SdoClientPoll(SDO_CLIENT *client, RTS_UI32 now_ms);
+
+/* Ends a transfer before its time, by an abort; the node may reply nevertheless. False: there is none. */
+bool SdoClientCancel(SDO_CLIENT *client);
 
 /* What was read, as a number of up to 32 bits. */
 RTS_UI32 SdoClientGetNumber(const SDO_CLIENT *client);

@@ -525,6 +525,14 @@
 #define CANOPEN_MAX_PDOS (4 * CANOPEN_MAX_DEVICES)
 #endif
 
+/* SDO transfers and NMT commands of programs (CanopenCalls.h) at a time, 0: none, and bytes of data of each. */
+#ifndef CANOPEN_MAX_CALLS
+#define CANOPEN_MAX_CALLS 0
+#endif
+#ifndef CANOPEN_CALL_SIZE
+#define CANOPEN_CALL_SIZE 256
+#endif
+
 /* Packets that may arrive over CAN at a time, from as many tools; each costs a packet of CAN_PACKET_SIZE bytes
  * and 30. */
 #ifndef CAN_RX_SESSIONS

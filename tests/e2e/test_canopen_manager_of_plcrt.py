@@ -12,7 +12,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from canopen_programs import VALVES, write_program
+from canopen_programs import BLOCKS, SOURCE, VALVES, write_program
 
 from plctool import connect
 from plctool.device import Plc
@@ -56,9 +56,14 @@ def hub() -> Iterator[CanHub]:
 
 
 @pytest.fixture
-def plc(hub: CanHub, tmp_path: Path, tool: Any) -> Iterator[Plc]:
+def source() -> str:
+    return SOURCE
+
+
+@pytest.fixture
+def plc(hub: CanHub, tmp_path: Path, tool: Any, source: str) -> Iterator[Plc]:
     image = tmp_path / "app.cdl"
-    built = tool("build", str(write_program(tmp_path / "program")), "-o", str(image))
+    built = tool("build", str(write_program(tmp_path / "program", source=source)), "-o", str(image))
     assert built.status == 0, built.err
     options = ("--can", f"slcan:{hub.paths[0]}", "--node", "5")
     with Plcrt(tmp_path / "flash", *options), connect(f"can:slcan:{hub.paths[1]}?node=5") as plc:
@@ -82,3 +87,35 @@ def test_foreign_node_is_brought_into_operation_lost_and_regained(hub: CanHub, p
     texts = [entry.text for entry in plc.log()]
     assert "Valves is lost: its heartbeat is missing" in texts
     assert "Valves is back" in texts
+
+
+def do(plc: Plc, block: str, **inputs: Any) -> tuple[bool, int]:
+    """What a block says of a job that begins now."""
+    has_error = block != "state"
+    plc.write({f"Main.{block}.ENABLE": False})
+    eventually(lambda: not plc.read(f"Main.{block}.CONFIRM"))
+    eventually(lambda: not has_error or plc.read(f"Main.{block}.ERROR") == 0)
+    plc.write({f"Main.{block}.{name}": value for name, value in inputs.items()} | {f"Main.{block}.ENABLE": True})
+    eventually(lambda: plc.read(f"Main.{block}.CONFIRM") or (has_error and plc.read(f"Main.{block}.ERROR") != 0))
+    return plc.read(f"Main.{block}.CONFIRM"), plc.read(f"Main.{block}.ERROR") if has_error else 0
+
+
+@pytest.mark.parametrize("source", [BLOCKS])
+def test_program_reads_writes_and_commands_a_foreign_node(hub: CanHub, plc: Plc) -> None:
+    with ForeignNode(hub.paths[2]) as foreign:
+        eventually(lambda: plc.read("Valves.ok"))
+        assert do(plc, "r4", DEVICE=NODE, INDEX=0x2001) == (True, 0)
+        assert (plc.read("Main.r4.DATA[1]"), plc.read("Main.r4.DATA[2]")) == (700 & 0xFF, 700 >> 8)
+        assert do(plc, "r21", DEVICE=NODE, INDEX=0x2000) == (True, 0)
+        assert plc.read("Main.r21.DATALENGTH") == len("press twenty-five")
+        plc.write({"Main.text": "by the program"})
+        assert do(plc, "write_text", INDEX=0x2000) == (True, 0)
+        assert foreign.node.sdo[0x2000].raw == "by the program"
+        assert do(plc, "r4", DEVICE=NODE, INDEX=0x5555) == (False, 1)
+        assert plc.read("Main.r4.ERRORINFO") == 0x06020000
+        assert do(plc, "nmt", DEVICE=NODE, STATE="STOP_REMOTE_NODE") == (True, 0)
+        eventually(lambda: foreign.node.nmt.state == "STOPPED")
+        eventually(lambda: do(plc, "state", DEVICE=NODE)[0] and plc.read("Main.state.STATE") == "STOPPED")
+        foreign.node.emcy.send(0x8130, 0x11, b"\1\2\3\4\5")
+        assert do(plc, "emcy") == (True, 0)
+        assert (plc.read("Main.emcy.DEVICE"), plc.read("Main.emcy.ERRORINFO.EMCY_ERROR_CODE")) == (NODE, 0x8130)

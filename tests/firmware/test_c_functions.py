@@ -20,6 +20,7 @@ COMPONENTS = {
     "IecFile.functions": "IecFile",
     "IecSocket.functions": "IecSocket",
     "IecCan.functions": "IecCan",
+    "CanopenCalls.functions": "IoDrvCanopen",
     "IecClock.functions": "IecClock",
     "IecLog.functions": "IecLog",
     "IecTaskCalls.functions": "IecTaskCalls",

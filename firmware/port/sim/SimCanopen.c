@@ -20,7 +20,7 @@
 #define BOOT_NS (50 * NS_PER_MS)
 #define REPLY_NS ((RTS_I64)200000)
 
-enum { OBJECTS = 512, OBJECT_SIZE = 8, OFF = 0xFF, TPDO_PARAMETERS = 0x1800, LAST_PDO = 0x1FF, EVENT_TIMER = 5 };
+enum { OBJECTS = 512, OBJECT_SIZE = 32, OFF = 0xFF, TPDO_PARAMETERS = 0x1800, LAST_PDO = 0x1FF, EVENT_TIMER = 5 };
 
 typedef struct {
     RTS_UI16 index;
@@ -37,6 +37,8 @@ typedef struct {
     CAN_FRAME reply;
     OBJECT writing; /* in segments */
     RTS_UI32 written;
+    OBJECT reading; /* in segments */
+    RTS_UI32 read;
     RTS_UI32 count;
     OBJECT objects[OBJECTS];
     RTS_UI32 faults[IO_SIM_FAULTS];
@@ -235,10 +237,28 @@ static void serve_read(NODE *node, RTS_UI8 *data, OBJECT *object, RTS_I64 now_ns
         refuse(node, data, SDO_ABORT_NO_OBJECT, now_ns);
         return;
     }
-    RTS_UI32 size = object->size < 4 ? object->size : 4;
-    data[0] = (RTS_UI8)(0x43 | (4 - size) << 2);
-    memset(data + 4, 0, 4);
-    memcpy(data + 4, object->data, size);
+    if (object->size > 4) {
+        node->reading = *object;
+        node->read = 0;
+        data[0] = SDO_READ | 1;
+        BytesPut32(data + 4, object->size);
+    } else {
+        data[0] = (RTS_UI8)(0x43 | (4 - object->size) << 2);
+        memset(data + 4, 0, 4);
+        memcpy(data + 4, object->data, object->size);
+    }
+    reply(node, data, now_ns);
+}
+
+static void serve_read_segment(NODE *node, RTS_UI8 *data, RTS_I64 now_ns)
+{
+    RTS_UI32 left = node->reading.size - node->read;
+    RTS_UI32 size = left < 7 ? left : 7;
+
+    data[0] = (RTS_UI8)((data[0] & SDO_TOGGLE) | (7 - size) << 1 | (size == left));
+    memset(data + 1, 0, 7);
+    memcpy(data + 1, node->reading.data + node->read, size);
+    node->read += size;
     reply(node, data, now_ns);
 }
 
@@ -279,6 +299,8 @@ static void serve(NODE *node, RTS_UI8 *data, RTS_I64 now_ns)
         refuse(node, data, SDO_ABORT_GENERAL, now_ns);
     } else if (data[0] == SDO_READ) {
         serve_read(node, data, &object, now_ns);
+    } else if ((data[0] & SDO_KIND) == SDO_READ_SEGMENT) {
+        serve_read_segment(node, data, now_ns);
     } else if ((data[0] & SDO_KIND) == 0x20 && (data[0] & 2) != 0) {
         object.size = (RTS_UI8)(4 - (data[0] >> 2 & 3u));
         memcpy(object.data, data + 4, object.size);

@@ -44,13 +44,16 @@ static void enter(CANOPEN_NODE *node, MASTER_STATE state, RTS_UI32 now_ms)
 void CanopenNodeBegin(CANOPEN_NODE *node, RTS_UI32 timeout_ms, RTS_UI32 now_ms)
 {
     node->sdo.timeout_ms = timeout_ms;
+    node->sdo.in = node->reply;
+    node->sdo.room = sizeof(node->reply);
+    node->command = NMT_START;
     enter(node, MASTER_RESET, now_ms);
 }
 
 /* The next attempt: at once after a loss, then later each time. */
 static void fail(CANOPEN_NODE *node, RTS_UI8 why, RTS_UI32 now_ms)
 {
-    bool ran = node->state == MASTER_RUNS;
+    bool ran = node->state == MASTER_RUNS || node->state == MASTER_HELD;
 
     node->counters.lost += ran;
     node->failures++;
@@ -195,7 +198,8 @@ static void follow_transfer(CANOPEN_NODE *node, RTS_UI32 now_ms)
 {
     switch (node->sdo.state) {
     case SDO_IDLE:
-        begin_step(node, now_ms);
+        if (!node->is_asked_elsewhere)
+            begin_step(node, now_ms);
         break;
     case SDO_DONE:
         if (node->state == MASTER_IDENTIFY)
@@ -232,19 +236,50 @@ static void run(CANOPEN_NODE *node, RTS_UI32 now_ms)
     enter(node, MASTER_RUNS, now_ms);
 }
 
+static void hold(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    node->failures++;
+    node->why = MASTER_WHY_HELD;
+    enter(node, MASTER_HELD, now_ms);
+}
+
+void CanopenNodeCommand(CANOPEN_NODE *node, RTS_UI8 command, RTS_UI32 now_ms)
+{
+    bool stops = command == NMT_STOP || command == NMT_PREOPERATIONAL;
+
+    node->command = stops ? command : NMT_START; /* one that is reset is to run afterwards */
+    if (stops && (node->state == MASTER_RUNS || node->state == MASTER_STARTS))
+        hold(node, now_ms);
+    else if (command == NMT_START && node->state == MASTER_HELD)
+        enter(node, MASTER_STARTS, now_ms);
+}
+
+bool CanopenNodeIsAsked(const CANOPEN_NODE *node)
+{
+    return node->state <= MASTER_CONFIGURE;
+}
+
+bool CanopenNodeIsHeard(const CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    return node->is_heard && now_ms - node->heard_ms < grace_ms(node);
+}
+
 /* ---- frames ---- */
 
 static void take_heartbeat(CANOPEN_NODE *node, RTS_UI8 state, RTS_UI32 now_ms)
 {
     node->nmt_state = state;
+    node->is_heard = true;
+    node->heard_ms = now_ms;
     if (state == NODE_BOOTS) {
-        if (node->state == MASTER_RUNS || node->state == MASTER_STARTS || node->state == MASTER_CONFIGURE)
+        if (node->state == MASTER_RUNS || node->state == MASTER_HELD || node->state == MASTER_STARTS ||
+            node->state == MASTER_CONFIGURE)
             fail(node, MASTER_WHY_RESTARTED, now_ms);
         if (node->state == MASTER_BOOTS || node->state == MASTER_WAITS)
             enter(node, MASTER_IDENTIFY, now_ms); /* it has just been reset: no need to do it again */
     } else if (node->state == MASTER_STARTS && state == NODE_OPERATIONAL) {
         run(node, now_ms);
-    } else if (node->state == MASTER_RUNS && state == NODE_OPERATIONAL) {
+    } else if ((node->state == MASTER_RUNS && state == NODE_OPERATIONAL) || node->state == MASTER_HELD) {
         node->since_ms = now_ms;
     } else if (node->state == MASTER_RUNS) {
         fail(node, MASTER_WHY_STATE, now_ms);
@@ -290,8 +325,12 @@ static void poll_state(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RT
             enter(node, MASTER_IDENTIFY, now_ms);
         break;
     case MASTER_START:
-        if (CanopenSendNmt(send, owner, NMT_START, node->node))
+        if (!CanopenSendNmt(send, owner, node->command, node->node))
+            break;
+        if (node->command == NMT_START)
             enter(node, MASTER_STARTS, now_ms);
+        else
+            hold(node, now_ms);
         break;
     case MASTER_STARTS:
         if (node->heartbeat_ms == 0)
@@ -300,6 +339,7 @@ static void poll_state(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RT
             fail(node, MASTER_WHY_NO_HEARTBEAT, now_ms);
         break;
     case MASTER_RUNS:
+    case MASTER_HELD:
         if (node->heartbeat_ms != 0 && since_ms >= grace_ms(node))
             fail(node, MASTER_WHY_LOST, now_ms);
         break;
@@ -346,6 +386,7 @@ RTS_UI32 CanopenNodeGetWaitMs(const CANOPEN_NODE *node, RTS_UI32 now_ms)
     case MASTER_STARTS:
         return left_ms(since_ms, start_ms(node));
     case MASTER_RUNS:
+    case MASTER_HELD:
         return node->heartbeat_ms != 0 ? left_ms(since_ms, grace_ms(node)) : UINT32_MAX;
     case MASTER_WAITS:
         return left_ms(since_ms, node->wait_ms);

@@ -126,7 +126,7 @@ static void take_begin(SDO_CLIENT *client, const RTS_UI8 *data)
 {
     if ((data[0] & IS_EXPEDITED) != 0) {
         client->done = (data[0] & HAS_SIZE) != 0 ? EXPEDITED - (data[0] >> 2 & 3u) : EXPEDITED;
-        memcpy(client->in, data + 4, client->done);
+        memcpy(client->in, data + 4, client->done); /* every room has as many */
         end(client, SDO_DONE, 0);
     } else {
         client->segmented = true;
@@ -140,7 +140,9 @@ static void take_segment(SDO_CLIENT *client, const RTS_UI8 *data)
 
     if ((data[0] & SDO_TOGGLE) != client->toggle)
         return;
-    if (size > sizeof(client->in) - client->done) {
+    if (size > client->room - client->done) {
+        memcpy(client->in + client->done, data + 1, client->room - client->done);
+        client->done = client->room;
         give_up(client, SDO_ABORTED, SDO_ABORT_MEMORY);
         return;
     }
@@ -190,6 +192,15 @@ void SdoClientPoll(SDO_CLIENT *client, RTS_UI32 now_ms)
 {
     if (client->state == SDO_BUSY && now_ms - client->since_ms >= client->timeout_ms)
         give_up(client, SDO_SILENT, SDO_ABORT_TIMEOUT);
+}
+
+bool SdoClientCancel(SDO_CLIENT *client)
+{
+    bool is_busy = client->state == SDO_BUSY;
+
+    if (is_busy)
+        give_up(client, SDO_ABORTED, SDO_ABORT_GENERAL);
+    return is_busy;
 }
 
 RTS_UI32 SdoClientGetNumber(const SDO_CLIENT *client)

@@ -49,6 +49,7 @@ typedef struct {
     bool sync;
     bool attached;
     bool was_off;
+    bool is_passive;
     CANOPEN_DEVICE *devices;
     RTS_UI32 device_count;
     CAN_USER user;

@@ -11,6 +11,8 @@
 #include <string.h>
 
 #include "CMUtils.h"
+#include "AppState.h"
+#include "CanopenCalls.h"
 #include "CanopenDriver.h"
 #include "CmpIoMgrEmbedded.h"
 #include "CmpLog.h"
@@ -89,7 +91,7 @@ static void take(RTS_UI32 index, const CAN_FRAME *frame, RTS_UI32 now_ms)
     if (line->by_cob[frame->id & 0x7FF] != NULL) {
         if (frame->size < line->by_cob[frame->id & 0x7FF]->pdo.size)
             count_short(line, line->by_cob[frame->id & 0x7FF]);
-    } else if (device != NULL) {
+    } else if (!CanopenCallsTake(index, frame, now_ms) && device != NULL) {
         CanopenNodeTake(&device->node, frame, now_ms);
     }
 }
@@ -132,6 +134,7 @@ static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int 
         release(line);
     is_running = false;
     memset(&setup, 0, sizeof(setup));
+    CanopenCallsBegin(&setup, send);
     return ERR_OK;
 }
 
@@ -307,6 +310,8 @@ static const char *describe_step(const CANOPEN_NODE *node)
         return "one of its PDOs is late";
     case MASTER_WHY_BUS:
         return "the bus is off";
+    case MASTER_WHY_HELD:
+        return "the program has taken it out of operation";
     default:
         return "it is not in operation yet";
     }
@@ -439,11 +444,11 @@ static void note_bus(CANOPEN_LINE *line, RTS_UI32 now_ms)
     else
         IoMgrConfigNoteData(line->connector);
     line->was_off = off;
+    line->is_passive = state.bus == CAN_BUS_PASSIVE;
 }
 
 static void poll_line(CANOPEN_LINE *line, RTS_UI32 now_ms)
 {
-    note_bus(line, now_ms);
     FOR_EACH_DEVICE (line, device)
         poll_device(line, device, now_ms);
     send_heartbeat(line, now_ms);
@@ -472,7 +477,7 @@ static RTS_UI32 get_wait_ms(const CANOPEN_LINE *line, RTS_UI32 now_ms)
 RTS_I64 IoDrvCanopenGetDueNs(RTS_I64 now_ns)
 {
     RTS_UI32 now_ms = (RTS_UI32)(now_ns / NS_PER_MS);
-    RTS_UI32 wait_ms = UINT32_MAX;
+    RTS_UI32 wait_ms = is_running ? CanopenCallsGetWaitMs(now_ms) : UINT32_MAX;
 
     FOR_EACH_LINE (line)
         if (is_running && line->attached) {
@@ -486,6 +491,11 @@ static void cycle(void)
 {
     RTS_UI32 now_ms = SysTimeGetMs();
 
+    FOR_EACH_LINE (line)
+        if (line->attached)
+            note_bus(line, now_ms);
+    CanopenCallsPoll(AppGetState() == AS_RUN, now_ms);
+    SysTimeWantPass(CanopenCallsGetWaitMs(now_ms));
     FOR_EACH_LINE (line) {
         if (!line->attached)
             continue;
@@ -531,8 +541,11 @@ RTS_RESULT IoDrvCanopen_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT2)
         return IoMgrRegisterInstance(&driver);
-    if (hook == CH_INIT3)
+    if (hook == CH_INIT3) {
         IecCanSetReserved(is_reserved);
+        CanopenCallsBegin(&setup, send);
+        return CanopenCallsRegister();
+    }
     if (hook == CH_COMM_CYCLE && is_running)
         cycle();
     else if (hook == CH_EXIT3)

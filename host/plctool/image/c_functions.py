@@ -46,6 +46,17 @@ _FUNCTIONS = {
         can_time(DINT):UDINT                                    64   80
         can_lost(DINT):UDINT                                    64   80
         can_free(DINT):BOOL                                     64   80""",
+    "IoDrvCanopen": """
+        canopen_take(USINT,USINT,WORD,BYTE,BYTE,UDINT,UDINT):DINT  160  208
+        canopen_put(DINT,UDINT,LWORD):BOOL                      80   96
+        canopen_send(DINT):BOOL                                 64   80
+        canopen_state(DINT):DINT                                64   80
+        canopen_result(DINT):LWORD                              64   80
+        canopen_get(DINT,UDINT):LWORD                           80   96
+        canopen_free(DINT):BOOL                                 64   80
+        canopen_status(USINT,USINT):DWORD                       80  112
+        canopen_emcy(USINT,USINT):DINT                          96  128
+        canopen_emcy_data(DINT):LWORD                           80   96""",
     "IecClock": """
         clock_get():LINT                                    32    48
         clock_set(LINT):UDINT                               16    32""",
