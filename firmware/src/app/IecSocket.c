@@ -106,8 +106,9 @@ static void report(const SOCKADDRESS *peer)
         return;
     sockets.reported_ms = now_ms | 1;
     LogAdd(CMPID_IecSocket, LOG_WARNING, ERR_NO_ACCESS_RIGHTS,
-           "The program may not reach %u.%u.%u.%u port %u: allow it with --net", peer->ip >> 24, peer->ip >> 16 & 0xFF,
-           peer->ip >> 8 & 0xFF, peer->ip & 0xFF, peer->port);
+           "The program may not reach %u.%u.%u.%u port %u: allow it with --net", (unsigned)(peer->ip >> 24),
+           (unsigned)(peer->ip >> 16 & 0xFF), (unsigned)(peer->ip >> 8 & 0xFF), (unsigned)(peer->ip & 0xFF),
+           peer->port);
 }
 
 static bool may_reach(const SOCKADDRESS *peer)

@@ -1,4 +1,4 @@
-"""The variables behind the pins, contacts, coils and steps of a diagram, for their live values.
+"""The variables of the pins, contacts, coils and steps of a diagram, for their live values.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -21,7 +21,7 @@ Place = tuple[str, str]
 
 @dataclass(frozen=True)
 class Monitor:
-    """`names`: the variable of each place that has one. `values`: their texts."""
+    """`names`: the variable of each place that has one. `values`: their values as strings."""
 
     names: Mapping[Place, str] = field(default_factory=dict)
     values: Mapping[str, str] = field(default_factory=dict)
