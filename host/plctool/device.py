@@ -13,7 +13,7 @@ from typing import Any, cast
 from plctool.archives import MAX_BYTES, ArchiveError, inflate
 from plctool.controller import Closed, Controller, OtherTool
 from plctool.core import lib
-from plctool.debug.breakpoints import Debugger, DeviceCondition
+from plctool.debug.breakpoints import Debugger, DeviceCondition, Target
 from plctool.debug.forced import ForcedPlace, ForceList
 from plctool.debug.halted import BpStatus
 from plctool.debug.recording import Recording
@@ -473,7 +473,7 @@ class Plc(Controller):
         return False
 
 
-class _DebuggedPlc:
+class _DebuggedPlc(Target):
     """What a controller on a link does for a debugger (`debug.breakpoints.Target`)."""
 
     def __init__(self, plc: Plc, session: Session) -> None:

@@ -59,9 +59,9 @@ class Dump:
     def sample(self, names: Sequence[str]) -> Reading:
         """Variables by name, as `Controller.sample` has them. Raises UsageError, DeviceError as that does."""
         symbols = self.symbols.select(names)
-        contents = {name: self._content(symbol) for name, symbol in symbols.items()}
+        contents = {name: self.content(symbol) for name, symbol in symbols.items()}
         reading = Reading(symbols, contents)
-        reading.check([name for name in names if name in contents], self._content)
+        reading.check([name for name in names if name in contents], self.content)
         return reading
 
     def explained(self) -> ExceptionInfo | None:
@@ -69,7 +69,7 @@ class Dump:
         if self.exception is None:
             return None
         e = self.exception
-        read = partial(map, self._content)
+        read = partial(map, self.content)
         places = self.symbols.whole_stack(e.code_offset, e.trace, lambda symbols: list(read(symbols)))
         task = self.tasks[e.task].name if 0 <= e.task < len(self.tasks) else None
         if not places:
@@ -79,7 +79,7 @@ class Dump:
             detail = self.symbols.what_was_outside(place, lambda symbols: list(read(symbols)))
         return ExceptionInfo(e.code, e.name, task, place.pou, place.file, place.line, places[1:], detail)
 
-    def _content(self, symbol: Symbol) -> bytes | None:
+    def content(self, symbol: Symbol) -> bytes | None:
         """None if a pointer leads to nothing that is in the dump."""
         if symbol.fixed is not None:
             return symbol.fixed
@@ -98,7 +98,7 @@ class Dump:
         if symbol.pointer is None:
             found = next((area for area in self.areas if area.area == symbol.area), None)
             return None if found is None else (found, symbol.offset)
-        held = self._content(symbol.pointer)
+        held = self.content(symbol.pointer)
         if held is None:
             return None
         pointer = int.from_bytes(held[: self.pointer_size], "little")

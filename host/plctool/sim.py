@@ -12,11 +12,11 @@ from datetime import UTC, datetime, timedelta
 from functools import partial
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
+from typing import TYPE_CHECKING, Any, Protocol, SupportsFloat, SupportsIndex
 
 from plctool.controller import Closed, Controller
 from plctool.core import Core, error_name, give_back_core, lib, take_core
-from plctool.debug.breakpoints import Debugger, DeviceCondition
+from plctool.debug.breakpoints import Debugger, DeviceCondition, Target
 from plctool.debug.forced import ForcedPlace, ForceList
 from plctool.debug.halted import BpStatus
 from plctool.debug.recording import Recording
@@ -57,6 +57,40 @@ _NS_AT_ONCE = 3600 * 10**9
 _NS_DEBUGGED = 10**8  # the rest of which still passes when a halted program goes on
 
 
+class Watcher(Protocol):
+    """A debugger of the simulators that code of others makes, such as a test: that code runs until a program halts, and
+    again when it goes on."""
+
+    def made(self, plc: Simulator) -> None:
+        """It has a program, which has not begun."""
+
+    def before(self, plc: Simulator) -> None:
+        """Time is about to pass."""
+
+    def halted(self, plc: Simulator) -> None:
+        """Its program is halted. Returns when it has gone on."""
+
+    def closed(self, plc: Simulator) -> None: ...
+
+
+_watchers: list[Watcher] = []
+
+
+@contextmanager
+def watched_by(watcher: Watcher) -> Iterator[None]:
+    """Simulators that are made meanwhile have this debugger."""
+    _watchers.append(watcher)
+    try:
+        yield
+    finally:
+        _watchers.pop()
+
+
+def is_debugged() -> bool:
+    """Whether programs are to be compiled for a debugger, since simulators that are made now have one."""
+    return bool(_watchers)
+
+
 class Simulator(Controller):
     """A controller in this process, with a program in it, started. Each has a clock of its own; all of a process are
     used by one thread.
@@ -82,6 +116,7 @@ class Simulator(Controller):
         self._functions = functions or SimFunctions()
         self._plants: list[_Plant] = []
         self._worker: Worker | None = None  # while a debugger is attached
+        self._watcher = _watchers[-1] if _watchers else None
         if symbols is not None:
             self.add_symbols(symbols)
         self._core = take_core()
@@ -90,6 +125,8 @@ class Simulator(Controller):
         try:
             self._power_on(cycle_limit_ms)
             self._download(image, start=False, restart=True, progress=lambda done: None)
+            if self._watcher is not None:
+                self._watcher.made(self)
             if start:
                 self.check_running()  # initialisation may have failed
                 self.start()
@@ -127,6 +164,7 @@ class Simulator(Controller):
             if not callable(function):
                 raise UsageError(f"{name} in Python is {function!r}, which cannot be called.", "python")
         python = PythonFunctions(functions) if functions else None
+        level = 0 if is_debugged() else level
         built = compile_sources(
             paths,
             target=host_target(),
@@ -162,6 +200,8 @@ class Simulator(Controller):
         """Shuts the runtime down."""
         if self._closed:
             return
+        if self._watcher is not None:
+            self._watcher.closed(self)
         self.end_debugging()
         with self._functions.while_running():
             self._closed = True
@@ -487,7 +527,16 @@ class Simulator(Controller):
             with self._functions.while_running():
                 return call(*arguments)
 
-        return run() if self._worker is None else self._worker.run(run) or 0
+        worker, watcher = self._worker, self._watcher
+        if worker is None:
+            return run()
+        if watcher is None:
+            return worker.run(run) or 0
+        watcher.before(self)
+        worker.start(run)
+        while self.is_halted:
+            watcher.halted(self)
+        return worker.settle() or 0
 
     # ---- breakpoints ----
 
@@ -664,7 +713,7 @@ def _forced_place(forced: Any) -> ForcedPlace:
     return ForcedPlace(p.area, offset, tuple(hops), p.size, p.mask, forced.value.to_bytes(8, "little")[: p.size])
 
 
-class _DebuggedSimulator:
+class _DebuggedSimulator(Target):
     """What a simulator does for a debugger (`debug.breakpoints.Target`)."""
 
     def __init__(self, sim: Simulator) -> None:
@@ -738,7 +787,9 @@ class _DebuggedSimulator:
 
     def go(self, how: int, serial: int) -> None:
         _check(self._lib.AppBpGo(how), "The program does not go on")
-        if self._sim._worker is not None:
+        if self._sim._watcher is not None and self._sim._worker is not None:
+            self._sim._worker.wait()  # what let time pass gets what was raised
+        elif self._sim._worker is not None:
             self._sim._worker.settle()
 
     def pause(self) -> None:

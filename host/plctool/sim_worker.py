@@ -40,17 +40,26 @@ class Worker:
 
     def run(self, call: Callable[[], Any]) -> Any:
         """The result of a call; None if its program is halted. Raises what it raises, UsageError while it is halted."""
+        self.start(call)
+        return self.settle()
+
+    def start(self, call: Callable[[], Any]) -> None:
+        """Begins a call, and waits until it has returned, or its program is halted. Raises UsageError while it is."""
         if self.is_busy:
             raise UsageError("The program is halted at a breakpoint; let it go on first.", "halted")
         self._done.clear()
         self._result = None
         self._calls.put(call)
-        return self.settle()
+        self.wait()
 
-    def settle(self) -> Any:
+    def wait(self) -> None:
         """Waits until the call has returned, or its program is halted."""
         while not self._done.wait(_POLL) and not self._is_halted():
             pass
+
+    def settle(self) -> Any:
+        """The same; the result of the call, or what it raised."""
+        self.wait()
         error, self._error = self._error, None
         if error is not None:
             raise error

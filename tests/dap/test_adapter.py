@@ -19,6 +19,7 @@ from breakpoints import FILE, PROGRAM, build
 from dap_client import Editor, InProcess, Refused
 
 from plctool import connect
+from plctool.dump_file import save, take_dump
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.waiting import eventually
 
@@ -135,6 +136,8 @@ def test_force_and_a_cycle_are_requests_of_our_own(editor: Editor, source: str) 
     assert editor.stopped()[0] == ("Main", 23)
     assert editor.request("evaluate", expression="Main.cycles")["result"] == str(before + 1)
     assert editor.request("unforce") == {"forced": []}
+    editor.request("runTo", source={"path": source}, line=30)
+    assert editor.stopped()[0] == ("Main", 30)
 
 
 def test_a_restart_begins_again_with_its_breakpoints(editor: Editor, source: str, on: str) -> None:
@@ -273,3 +276,197 @@ def test_messages_are_numbered_json() -> None:
     message = json.loads(body)
     assert head == f"Content-Length: {len(body)}".encode()
     assert (message["seq"], message["request_seq"], message["success"]) == (1, 1, True)
+
+
+# ---- data breakpoints ----
+
+
+def test_a_change_of_a_variable_halts(editor: Editor, source: str, on: str) -> None:
+    editor.begin("launch", {source: [{"line": 15}]}, program=source, on=on)
+    editor.stopped()
+    scopes = editor.request("scopes", frameId=1)["scopes"]
+    counter = next(s["variablesReference"] for s in scopes if s["name"] == "Counter")
+    info = editor.request("dataBreakpointInfo", variablesReference=counter, name="n")
+    assert (info["dataId"], info["accessTypes"]) == ("Main.counter.n", ["write"])
+    on_stack = editor.request("dataBreakpointInfo", variablesReference=scopes[0]["variablesReference"], name="twice")
+    assert on_stack["dataId"] is None
+    assert "a variable of a call" in on_stack["description"]
+    editor.request("setBreakpoints", source={"path": source}, breakpoints=[])
+    wanted = [{"dataId": "Main.counter.n"}, {"dataId": "Main.nothing"}, {"dataId": "Main.k", "accessType": "read"}]
+    found = editor.request("setDataBreakpoints", breakpoints=wanted)["breakpoints"]
+    assert [b["verified"] for b in found] == [True, False, False]
+    assert found[0]["message"] == "Main.counter.n is compared before each statement."
+    editor.request("continue", threadId=1)
+    stopped = editor.event("stopped")
+    assert (stopped["reason"], stopped["hitBreakpointIds"]) == ("data breakpoint", [found[0]["id"]])
+    assert stopped["text"] == "Main.counter.n: 0 -> 1"
+    assert editor.request("stackTrace", threadId=1)["stackFrames"][0]["line"] == 16
+
+
+# ---- dumps ----
+
+
+def test_a_dump_shows_the_calls_and_variables_of_the_past(editor: Editor, tmp_path: Path) -> None:
+    with Plcrt(tmp_path / "flash", "--tcp", "0") as plcrt, connect(f"tcp:{plcrt.tcp}") as plc:
+        plc.flash(build(tmp_path))
+        plc.write({"Main.divisor": 0})
+        eventually(lambda: plc.status().exception)
+        (tmp_path / "x.dump").write_bytes(save(take_dump(plc)))
+    (found,) = editor.begin("attach", {FILE: [{"line": 15}]}, dump=str(tmp_path / "x.dump"))
+    assert (found["verified"], "does not run" in found["message"]) == (False, True)
+    assert editor.stopped() == [("Main", 31)]
+    assert editor.request("exceptionInfo", threadId=1)["exceptionId"] == "DIVIDEBYZERO"
+    assert editor.scope("Main")["divisor"] == "0"
+    assert editor.request("evaluate", expression="Main.divisor + 7", frameId=1)["result"] == "7"
+    for command in ("continue", "next", "stepCycle", "restart"):
+        with pytest.raises(Refused, match="does not run"):
+            editor.request(command, threadId=1)
+    with pytest.raises(Refused, match="cannot be changed"):
+        editor.request("evaluate", expression="Main.divisor := 1", frameId=1, context="repl")
+    assert editor.request("stackTrace", threadId=1)["totalFrames"] == 1
+
+
+def test_a_file_that_is_no_dump_is_refused(editor: Editor, source: str) -> None:
+    with pytest.raises(Refused, match="is not a dump"):
+        editor.request("attach", dump=source)
+
+
+# ---- tests ----
+
+TESTED = """\
+FUNCTION_BLOCK Pump
+VAR_INPUT on : BOOL; END_VAR
+VAR_OUTPUT speed : INT; END_VAR
+VAR delay : TON; END_VAR
+delay(IN := on, PT := T#1s);
+IF delay.Q THEN
+    speed := speed + 1;         // 7
+END_IF
+END_FUNCTION_BLOCK
+PROGRAM Main VAR pump : Pump; END_VAR
+pump(on := TRUE);
+END_PROGRAM
+TEST 'a pump waits for a second'
+VAR p : Pump; n : INT; END_VAR
+p(on := TRUE);                  // 15
+ADVANCE_TIME(T#2s);
+p(on := TRUE);
+n := p.speed;
+ASSERT_EQ(n, 1);                // 19
+END_TEST
+TEST 'a pump stands still'
+VAR p : Pump; END_VAR
+p(on := FALSE);                 // 23
+ASSERT_EQ(p.speed, 1);
+END_TEST
+"""
+
+
+@pytest.fixture
+def tested(tmp_path: Path) -> str:
+    (tmp_path / "pump.st").write_text(TESTED)
+    return str(tmp_path / "pump.st")
+
+
+def begin_tests(editor: Editor, breakpoints: dict[str, list[int]], **arguments: object) -> None:
+    lines = {path: [{"line": line} for line in found] for path, found in breakpoints.items()}
+    found = editor.begin("launch", lines, **arguments)
+    assert not any(b["verified"] for b in found)
+    assert all("when a test runs" in b["message"] for b in found)
+
+
+def ended(editor: Editor) -> tuple[int, str]:
+    """The exit status of the tests, and what they wrote."""
+    status = editor.event("exited")["exitCode"]
+    editor.event("terminated")
+    return status, "".join(e["body"]["output"] for e in editor.events if e["event"] == "output")
+
+
+def test_a_test_block_halts_steps_and_goes_on_to_its_result(editor: Editor, tested: str) -> None:
+    begin_tests(editor, {tested: [7, 19, 23]}, program=tested, tests=True)
+    assert editor.event("breakpoint")["breakpoint"]["verified"]
+    assert [line for _, line in editor.stopped()] == [7, 17]
+    assert editor.scope("Pump")["speed"] == "0"
+    editor.request("next", threadId=1)
+    assert editor.stopped()[0][0] != ""
+    editor.request("continue", threadId=1)
+    assert editor.stopped()[0][1] == 19
+    assert editor.request("evaluate", expression="n", frameId=1)["result"] == "1"
+    editor.request("continue", threadId=1)
+    assert editor.stopped()[0][1] == 23
+    editor.request("continue", threadId=1)
+    status, text = ended(editor)
+    assert (status, "2 tests, 1 passed, 1 failed" in text) == (1, True)
+    assert "pump.st:24: ASSERT_EQ: expected 1, got 0" in text
+
+
+def test_time_stands_still_while_a_test_is_halted(editor: Editor, tested: str) -> None:
+    begin_tests(editor, {tested: [15]}, program=tested, tests="waits")
+    editor.stopped()
+    assert editor.request("evaluate", expression="p.speed", frameId=1)["result"] == "0"
+    editor.request("evaluate", expression="p.speed := 41", frameId=1, context="repl")
+    editor.request("continue", threadId=1)
+    status, text = ended(editor)
+    assert (status, "expected 1, got 42" in text) == (1, True)
+
+
+def test_tests_end_when_the_editor_disconnects(editor: Editor, tested: str) -> None:
+    begin_tests(editor, {tested: [15]}, program=tested, tests=True)
+    editor.stopped()
+    editor.request("disconnect")
+    assert editor.event("exited")["exitCode"] == 1
+
+
+PYTHON_TEST = """\
+from plctool import Simulator
+
+
+def test_a_pump_turns():
+    with Simulator.from_sources("pump.st") as plc:
+        plc.run_for(2000)
+        assert plc.read("Main.pump.speed") > 0
+        before = plc.now_ns
+        plc.run_for(10)
+        assert plc.now_ns == before + 10_000_000
+"""
+
+
+def test_a_test_of_pytest_halts_in_the_program(tested: str, tmp_path: Path) -> None:
+    (tmp_path / "test_pump.py").write_text(PYTHON_TEST)
+    with subprocess.Popen(DAP, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin and process.stdout
+        pipe = process.stdin
+
+        def write(data: bytes) -> None:
+            pipe.write(data)
+            pipe.flush()
+
+        editor = Editor(write, process.stdout)
+        begin_tests(editor, {tested: [7]}, pytest=["test_pump.py"], cwd=str(tmp_path))
+        assert editor.stopped()[0] == ("Pump", 7)
+        assert editor.scope("Pump")["speed"] == "0"
+        editor.request("setBreakpoints", source={"path": tested}, breakpoints=[])
+        editor.request("continue", threadId=1)
+        status, text = ended(editor)
+        assert (status, "1 passed" in text) == (0, True)
+        editor.request("disconnect")
+        process.wait(60)
+        pipe.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"pytest": "tests"}, '"pytest" is a list'),
+        ({"tests": 5, "program": "a.st"}, '"tests" is true, or a pattern'),
+        ({"tests": True}, "names its program"),
+    ],
+)
+def test_bad_launches_of_tests_are_refused(editor: Editor, arguments: dict[str, object], words: str) -> None:
+    with pytest.raises(Refused, match=words):
+        editor.request("launch", **arguments)
+
+
+def test_a_pattern_that_no_test_has_is_refused(editor: Editor, tested: str) -> None:
+    with pytest.raises(Refused, match="No test matches 'fan'"):
+        editor.request("launch", program=tested, tests="fan")

@@ -34,7 +34,7 @@ async function resolved(
   }
   const program = target(activeFile())?.path ?? folder?.uri.fsPath;
   const isAttached = configuration.request === 'attach';
-  const link = isAttached ? await linkOf(program) : '';
+  const link = isAttached && configuration.dump === undefined ? await linkOf(program) : '';
   return {
     ...(isAttached || program === undefined ? {} : { program }),
     ...(link === '' ? {} : { link }),

@@ -11,18 +11,23 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from plctool.compiler import CompileError
-from plctool.dap.debuggees import Debuggee, attach, launch
+from plctool.dap.debuggees import Debuggee, TestedDebuggee, attach, launch
 from plctool.dap.messages import Message, Sender
+from plctool.dap.test_runs import TestRun, find_test_run
+from plctool.dap.wanted import Install, WantedBreakpoints, hits_of
 from plctool.debug.breakpoints import Debugger, Halt
 from plctool.debug.expressions import NAME
+from plctool.debug.forced import name_forced, place_of
 from plctool.debug.halted import Call
 from plctool.debug.variables import Symbol
+from plctool.debug.watches import check_watchable
 from plctool.errors import PlcError, UsageError
 from plctool.iec.types import ArrayType, StructType
+from plctool.sim import Simulator, watched_by
 
 _SLICE = 0.02  # between two looks at requests while the program runs [s]
+_DATA = ":data"  # the group of data breakpoints, which no path of a source is
 _MOST_CAUGHT_UP = 0.2  # of virtual time [s]
-_HITS = re.compile(r"\s*(>=|>|=|==)?\s*(\d{1,9})\s*")
 _ASSIGNMENT = re.compile(r"\s*(\S+)\s*:=\s*(.+)")
 
 Named = Callable[[], dict[str, Symbol]]
@@ -33,6 +38,7 @@ CAPABILITIES = {
     "supportsConditionalBreakpoints": True,
     "supportsHitConditionalBreakpoints": True,
     "supportsLogPoints": True,
+    "supportsDataBreakpoints": True,
     "supportsSetVariable": True,
     "supportsEvaluateForHovers": True,
     "supportsExceptionInfoRequest": True,
@@ -50,12 +56,13 @@ class Adapter:
         self._sender = sender
         self._debuggee: Debuggee | None = None
         self._debugger: Debugger | None = None
+        self._tests: TestRun | None = None  # let time pass in place of the adapter
         self._running = False
         self._done = False
         self._entry = False  # the next pause is the halt at the beginning
         self._failed = False  # an exception was reported
         self._first_line = 1
-        self._files: dict[str, list[int]] = {}  # the numbers of breakpoints, by the path of the editor
+        self._wanted = WantedBreakpoints()
         self._references: list[Named] = []
         self._calls: list[Call] = []
         self._last = time.monotonic()
@@ -78,7 +85,7 @@ class Adapter:
             self._done = True
         elif request.get("type") == "request":
             self._handle(request)
-        if self._running and not self._done:
+        if self._running and not self._done and self._tests is None:
             self._let_run()
 
     # ---- requests ----
@@ -106,26 +113,43 @@ class Adapter:
         """What follows a response."""
         if command in ("launch", "attach"):
             self._sender.event("initialized")
+        if command == "configurationDone" and self._tests is not None:
+            self._run_tests(self._tests)
 
     def _initialize(self, arguments: Message) -> Message:
         self._first_line = 1 if arguments.get("linesStartAt1", True) else 0
         return dict(CAPABILITIES)
 
     def _launch(self, arguments: Message) -> Message:
+        tests = find_test_run(arguments)
+        if tests is not None:
+            self._check_free()
+            self._tests, self._entry = tests, bool(arguments.get("stopOnEntry"))
+            return {}
         return self._begin(launch(arguments), bool(arguments.get("stopOnEntry")))
 
     def _attach(self, arguments: Message) -> Message:
         return self._begin(attach(arguments), bool(arguments.get("stopOnEntry")))
 
     def _begin(self, debuggee: Debuggee, entry: bool) -> Message:
-        if self._debuggee is not None:
+        try:
+            self._check_free()
+        except UsageError:
             debuggee.close()
-            raise UsageError("A program is being debugged already; disconnect first.", "dap")
-        self._debuggee = debuggee
-        self._debugger = debuggee.plc.breakpoints
-        self._debugger.output = lambda text: self._output(text + "\n", "console")
+            raise
+        self._show(debuggee)
         self._entry = entry
         return {}
+
+    def _check_free(self) -> None:
+        if self._debuggee is not None or self._tests is not None:
+            raise UsageError("A program is being debugged already; disconnect first.", "dap")
+
+    def _show(self, debuggee: Debuggee) -> None:
+        """The program that requests are about."""
+        self._debuggee = debuggee
+        self._debugger = debuggee.debugger
+        self._debugger.output = lambda text: self._output(text + "\n", "console")
 
     def _plc(self) -> Debuggee:
         if self._debuggee is None:
@@ -138,6 +162,8 @@ class Adapter:
         return self._debugger
 
     def _configuration_done(self, arguments: Message) -> Message:
+        if self._tests is not None:
+            return {}  # they run when this is answered
         debuggee, debugger = self._plc(), self._breakpoints()
         if self._entry:
             debugger.pause()
@@ -151,28 +177,70 @@ class Adapter:
         self._calls = []
 
     def _set_breakpoints(self, arguments: Message) -> Message:
-        debugger = self._breakpoints()
         path = str(arguments["source"].get("path") or arguments["source"].get("name") or "")
-        for number in self._files.pop(path, []):
-            with suppress(UsageError):
-                debugger.clear(number)
-        wanted = arguments.get("breakpoints") or [{"line": line} for line in arguments.get("lines") or []]
-        numbers = self._files.setdefault(path, [])
-        return {"breakpoints": [self._set_breakpoint(path, entry, numbers) for entry in wanted]}
+        entries = arguments.get("breakpoints") or [{"line": line} for line in arguments.get("lines") or []]
+        installs = [(int(entry["line"]), self._line_breakpoint(path, entry)) for entry in entries]
+        return {"breakpoints": self._wanted.replace(path, installs, self._present())}
 
-    def _set_breakpoint(self, path: str, wanted: Message, numbers: list[int]) -> Message:
-        try:
-            made = self._breakpoints().set(
+    def _present(self) -> Debugger | None:
+        """The debugger of the program; None before a test has one."""
+        return self._debugger if self._tests is not None else self._breakpoints()
+
+    def _line_breakpoint(self, path: str, entry: Message) -> Install:
+        def install(debugger: Debugger) -> tuple[int, Message]:
+            made = debugger.set(
                 path,
-                int(wanted["line"]) + 1 - self._first_line,
-                condition=str(wanted.get("condition") or ""),
-                hits=_hits(str(wanted.get("hitCondition") or "")),
-                log=str(wanted.get("logMessage") or ""),
+                int(entry["line"]) + 1 - self._first_line,
+                condition=str(entry.get("condition") or ""),
+                hits=hits_of(str(entry.get("hitCondition") or "")),
+                log=str(entry.get("logMessage") or ""),
             )
+            return made.number, {"line": made.line - 1 + self._first_line}
+
+        return install
+
+    # ---- data breakpoints ----
+
+    def _data_breakpoint_info(self, arguments: Message) -> Message:
+        """Which variable it would be, if it is one that is compared."""
+        try:
+            symbol = self._named(arguments)
+            check_watchable(symbol)
         except PlcError as error:
-            return {"verified": False, "line": wanted.get("line"), "message": str(error)}
-        numbers.append(made.number)
-        return {"id": made.number, "verified": True, "line": made.line - 1 + self._first_line}
+            return {"dataId": None, "description": str(error)}
+        watched = next(
+            s for s, _ in name_forced([place_of(symbol)], self._breakpoints().table.variables.values()).values()
+        )
+        text = f"{watched.name} (halts at the first statement after a change)"
+        return {"dataId": watched.name, "description": text, "accessTypes": ["write"], "canPersist": True}
+
+    def _named(self, arguments: Message) -> Symbol:
+        """A variable in an area."""
+        name, debugger = str(arguments["name"]), self._breakpoints()
+        if debugger.halt is None:
+            return debugger.table.resolve(name)
+        halted = debugger.halt.halted
+        if not arguments.get("variablesReference"):
+            return halted.in_area(name, self._call(arguments.get("frameId")))
+        symbol = self._referred(arguments).get(name)
+        if symbol is None:
+            raise UsageError(f"There is no variable {name} here.", "dap")
+        return halted.symbol_in_area(symbol)
+
+    def _set_data_breakpoints(self, arguments: Message) -> Message:
+        installs = [(None, self._data_breakpoint(entry)) for entry in arguments["breakpoints"]]
+        return {"breakpoints": self._wanted.replace(_DATA, installs, self._present())}
+
+    def _data_breakpoint(self, entry: Message) -> Install:
+        def install(debugger: Debugger) -> tuple[int, Message]:
+            if str(entry.get("accessType") or "write") != "write":
+                raise UsageError("Reads of a variable do not halt; choose changes (write).", "dap")
+            name = str(entry["dataId"])
+            hits = hits_of(str(entry.get("hitCondition") or ""))
+            made = debugger.watch(name, condition=str(entry.get("condition") or ""), hits=hits)
+            return made.number, {"message": f"{made.name} is compared before {debugger.granularity}."}
+
+        return install
 
     def _set_exception_breakpoints(self, arguments: Message) -> Message:
         return {}  # exceptions always halt
@@ -195,11 +263,20 @@ class Adapter:
         halt = self._halt()
         if arguments.get("threadId") != self._thread(halt):
             return {"stackFrames": [], "totalFrames": 0}
-        self._calls = halt.calls
+        self._calls = self._calls_of(halt)
         first = int(arguments.get("startFrame") or 0)
         count = int(arguments.get("levels") or 0) or len(self._calls)
         frames = [self._frame(i, call) for i, call in enumerate(self._calls)]
+        if not frames:  # the dump of a program that was between two cycles has variables nevertheless
+            frames, count = [{"id": 1, "name": halt.task, "line": 0, "column": 0}], 1
         return {"stackFrames": frames[first : first + count], "totalFrames": len(frames)}
+
+    def _calls_of(self, halt: Halt) -> list[Call]:
+        if self._tests is None:
+            return halt.calls
+        from plctool.st_tests import up_to_test  # which needs the compiler
+
+        return up_to_test(halt.calls)
 
     def _frame(self, i: int, call: Call) -> Message:
         path = Path(call.file)
@@ -213,7 +290,7 @@ class Adapter:
 
     def _call(self, frame: Any) -> Call | None:
         if not isinstance(frame, int) or not self._calls:
-            self._calls = self._calls or self._halt().calls
+            self._calls = self._calls or self._calls_of(self._halt())
             return self._calls[0] if self._calls else None
         if not 1 <= frame <= len(self._calls):
             raise UsageError(f"There is no frame {frame}.", "dap")
@@ -221,14 +298,15 @@ class Adapter:
 
     def _scopes(self, arguments: Message) -> Message:
         halted, call = self._halt().halted, self._call(arguments["frameId"])
-        if call is None:
-            return {"scopes": []}
         table = self._breakpoints().table
         scopes: list[tuple[str, Named, bool]] = [
-            ("Locals", lambda: halted.locals(call), False),
-            (call.pou, lambda: halted.instance(call), False),
-            ("Globals", lambda: {symbol.name: symbol for symbol in table.find([])}, True),
+            ("Globals", lambda: {symbol.name: symbol for symbol in table.find([])}, True)
         ]
+        if call is not None:
+            scopes[:0] = [
+                ("Locals", lambda: halted.locals(call), False),
+                (call.pou, lambda: halted.instance(call), False),
+            ]
         return {
             "scopes": [
                 {"name": name, "variablesReference": self._refer(named), "expensive": expensive}
@@ -324,11 +402,17 @@ class Adapter:
     def _step_cycle(self, arguments: Message) -> Message:
         return self._step(self._breakpoints().step_cycle)
 
+    def _run_to(self, arguments: Message) -> Message:
+        path, line = str(arguments["source"]["path"]), int(arguments["line"]) + 1 - self._first_line
+        return self._step(lambda: self._breakpoints().run_to(path, line))
+
     def _pause(self, arguments: Message) -> Message:
         self._breakpoints().pause()
         return {}
 
     def _restart(self, arguments: Message) -> Message:
+        if self._tests is not None:
+            raise UsageError("Tests begin again when they are launched again.", "dap")
         plc, debugger = self._plc().plc, self._breakpoints()
         plc.reset("warm")
         debugger.forget_halt()
@@ -353,8 +437,9 @@ class Adapter:
 
     def _terminate(self, arguments: Message) -> Message:
         self._running = False
+        self._done = self._done or self._tests is not None
         if self._debuggee is not None and not self._debuggee.launched:
-            self._debuggee.plc.end_debugging()
+            self._debuggee.end_debugging()
         self._sender.event("terminated")
         return {}
 
@@ -384,8 +469,10 @@ class Adapter:
         body: Message = {"reason": reason, "threadId": self._thread(halt), "allThreadsStopped": True}
         if halt.exception:
             body |= {"description": str(halt), "text": halt.exception}
-        if halt.breakpoints:
-            body["hitBreakpointIds"] = [b.number for b in halt.breakpoints]
+        if halt.changed:
+            body |= {"description": str(halt), "text": ", ".join(map(str, halt.changed))}
+        if halt.breakpoints or halt.changed:
+            body["hitBreakpointIds"] = self._wanted.ids(self._breakpoints(), halt)
         self._sender.event("stopped", body)
 
     def _look_for_exception(self, debuggee: Debuggee) -> None:
@@ -396,6 +483,68 @@ class Adapter:
         if debuggee.launched:
             self._running = False
             self._sender.event("terminated")
+
+    # ---- tests ----
+
+    def _run_tests(self, tests: TestRun) -> None:
+        """The requests of the editor are handled before time passes, and while a program is halted."""
+        status = 1
+        try:
+            with watched_by(self):
+                status = tests.run(lambda text: self._output(text, "stdout"))
+        except KeyboardInterrupt:
+            pass  # the editor has ended them
+        except PlcError as error:
+            self._output(f"{error}\n", "stderr")
+        self._running = False
+        with suppress(BrokenPipeError, ConnectionError):
+            self._sender.event("exited", {"exitCode": status})
+            self._sender.event("terminated")
+
+    def made(self, plc: Simulator) -> None:
+        """A test has a program."""
+        try:
+            self._show(TestedDebuggee(plc))
+        except PlcError as error:
+            self._output(f"{error}\n", "stderr")
+            return
+        debugger = self._breakpoints()
+        for changed in self._wanted.install(debugger):
+            self._sender.event("breakpoint", {"reason": "changed", "breakpoint": changed})
+        self._go_on()
+
+    def before(self, plc: Simulator) -> None:
+        """A test lets time pass."""
+        while not self._done and not self._requests.empty():
+            self._one_turn()
+        self._check_not_done()
+        if self._entry and self._debugger is not None:
+            self._debugger.pause()
+
+    def halted(self, plc: Simulator) -> None:
+        """A program is halted: returns when it has gone on."""
+        if self._debuggee is None or self._debuggee.plc is not plc:
+            self._show(TestedDebuggee(plc))
+        debugger = self._breakpoints()
+        halt = debugger.wait(0)
+        if halt is None:
+            return
+        self._say_halted(halt)
+        while debugger.halt is not None and not self._done:
+            self._one_turn()
+        self._check_not_done()
+
+    def _check_not_done(self) -> None:
+        if self._done:
+            self._close()
+            raise KeyboardInterrupt
+
+    def closed(self, plc: Simulator) -> None:
+        """A test has ended its program."""
+        if self._debuggee is not None and self._debuggee.plc is plc:
+            if self._debugger is not None:
+                self._wanted.forget(self._debugger)
+            self._debuggee = self._debugger = None
 
     def _output(self, text: str, category: str) -> None:
         self._sender.event("output", {"category": category, "output": text})
@@ -412,16 +561,6 @@ def _parts(symbol: Symbol) -> dict[str, Symbol]:
     return {part.name.removeprefix(symbol.name).removeprefix("."): part for part in symbol.parts()}
 
 
-def _hits(text: str) -> int:
-    """From the hit on that a hit condition says. Raises UsageError."""
-    if not text:
-        return 1
-    match = _HITS.fullmatch(text)
-    if match is None or match[1] in ("=", "=="):
-        raise UsageError(f"'{text}' is not a number of hits; write for example 5, or > 5.", "hits")
-    return int(match[2]) + (match[1] == ">")
-
-
 def _shown(value: Any) -> str:
     return str(value).upper() if isinstance(value, bool) else str(value)
 
@@ -432,6 +571,8 @@ _REQUESTS: dict[str, Callable[[Adapter, Message], Message]] = {
     "attach": Adapter._attach,
     "configurationDone": Adapter._configuration_done,
     "setBreakpoints": Adapter._set_breakpoints,
+    "dataBreakpointInfo": Adapter._data_breakpoint_info,
+    "setDataBreakpoints": Adapter._set_data_breakpoints,
     "setExceptionBreakpoints": Adapter._set_exception_breakpoints,
     "threads": Adapter._threads,
     "stackTrace": Adapter._stack_trace,
@@ -449,6 +590,7 @@ _REQUESTS: dict[str, Callable[[Adapter, Message], Message]] = {
     "terminate": Adapter._terminate,
     "disconnect": Adapter._disconnect,
     "stepCycle": Adapter._step_cycle,  # ours, as the next ones
+    "runTo": Adapter._run_to,
     "force": Adapter._force,
     "unforce": Adapter._unforce,
 }

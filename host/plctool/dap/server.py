@@ -38,12 +38,13 @@ def serve(stream: BinaryIO, write: Callable[[bytes], object]) -> None:
 
 def serve_standard_streams() -> None:
     """Nothing else may be written to the standard output, so what is printed goes to the standard error."""
-    output = sys.stdout.buffer
-    sys.stdout = sys.stderr
+    sys.stdout.flush()
+    output = os.dup(sys.stdout.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
 
     def write(data: bytes) -> None:
-        output.write(data)
-        output.flush()
+        while data:
+            data = data[os.write(output, data) :]
 
     # A thread may still wait for the input when the process ends: not in the stream that Python closes then.
     serve(os.fdopen(os.dup(sys.stdin.fileno()), "rb", closefd=False), write)

@@ -116,6 +116,10 @@ class Target(Memory, Protocol):
 
     def table(self) -> SymbolTable: ...
 
+    def halted(self, status: BpStatus, table: SymbolTable) -> Halted:
+        """What a halted program shows."""
+        return Halted(status, table, self)
+
     def task_names(self) -> list[str]: ...
 
 
@@ -326,9 +330,11 @@ class Debugger:
         return None
 
     def _explained(self, status: BpStatus) -> Halt | None:
-        halted = Halted(status, self.table, self._target)
+        halted = self._target.halted(status, self.table)
         names = self._target.task_names()
         task = names[status.task] if status.task < len(names) else f"task {status.task}"
+        if not status.code:
+            return Halt("dump", task, halted)
         if status.code != lib.RTSEXCPT_BREAKPOINT:
             return Halt("exception", task, halted, [], exception_name(status.code))
         here = [b for b in self._breakpoints.values() if status.code_offset in b.offsets]
@@ -404,8 +410,8 @@ class Debugger:
         self._go(lib.BP_GO, status.serial, "")
 
     def _go(self, how: int, serial: int, asked: str) -> None:
-        self._halt, self._asked, self._how = None, asked, how
         self._target.go(how, serial)
+        self._halt, self._asked, self._how = None, asked, how
 
     def step_over(self) -> None:
         """To the next line of the same POU, or to where it was called."""

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from plctool.compiler import CompileError, IoFiles, Sources, io_sources, library_sources, program_files
 from plctool.compiler.base.internal import bugs_reported
@@ -30,7 +30,7 @@ from plctool.iec.dialect import find_dialect
 from plctool.iec.value_texts import literal
 from plctool.iec.values import decode
 from plctool.image.targets import find_target, host_target
-from plctool.sim import Simulator
+from plctool.sim import Simulator, is_debugged
 from plctool.st_tests.coverage import Coverage, marked
 from plctool.st_tests.devices import Devices
 from plctool.st_tests.report import TEST_NAME, Failure, Outcome, Report
@@ -72,10 +72,12 @@ def run_tests(
     program = TestProgram(
         paths, level=level, warnings=warnings, io=io, libraries=libraries, coverage=coverage, dialect=dialect
     )
-    chosen = [i for i, case in enumerate(program.cases) if _fits(case.name.casefold(), pattern.casefold())]
-    if not chosen:
-        what = f"no test matches '{pattern}'" if program.cases else "there are no tests: write TEST 'name' ... END_TEST"
-        raise UsageError(f"{what[:1].upper()}{what[1:]}.", "no-tests")
+    return run_chosen(program, program.find(pattern), begin)
+
+
+def run_chosen(program: TestProgram, chosen: Sequence[int], begin: float | None = None) -> Report:
+    """Runs the tests with these indices. `begin`: when the work for the report began."""
+    begin = time.perf_counter() if begin is None else begin
     outcomes = list(program.run(chosen))
     return Report(outcomes, time.perf_counter() - begin, program.sources, program.diagnostics, program.coverage)
 
@@ -83,7 +85,7 @@ def run_tests(
 class TestProgram:
     """A program with its tests, compiled when the first one runs. `cases`: the tests, in the order of the sources;
     `diagnostics`: warnings of the compiler; `io`: inputs and outputs; `coverage`: which statements ran, if that is
-    wanted. Raises CompileError when the program has errors."""
+    wanted; `debug`: for a debugger. Raises CompileError when the program has errors."""
 
     __test__ = False  # nothing for pytest to collect
 
@@ -97,6 +99,7 @@ class TestProgram:
         libraries: Sequence[Path | str] = (),
         coverage: bool = False,
         dialect: str | None = None,
+        debug: bool = False,
     ) -> None:
         files = program_files(paths, io, libraries)
         description, imported = files.load_io(), files.load_libraries()
@@ -105,6 +108,7 @@ class TestProgram:
         marks = StatementMarks() if coverage else None
         self._suite = TestSuite(marks)
         self._level = level
+        self._debug = debug
         with _power(), bugs_reported():
             checked = check_sources(
                 self.sources,
@@ -126,8 +130,19 @@ class TestProgram:
     @cached_property
     def _built(self) -> BuildResult:
         with bugs_reported():
-            options = Options(find_target(host_target()), self._level)
+            debug = self._debug or is_debugged()
+            options = Options(find_target(host_target()), 0 if debug else self._level, debug=debug)
             return build_program(self._program, options, keeps=False)  # each test starts on fresh variables
+
+    def find(self, pattern: str) -> list[int]:
+        """The tests whose name matches a pattern (with * and ?) or contains it. Raises UsageError if none does."""
+        chosen = [i for i, case in enumerate(self.cases) if _fits(case.name.casefold(), pattern.casefold())]
+        if not chosen:
+            what = (
+                f"No test matches '{pattern}'" if self.cases else "There are no tests: write TEST 'name' ... END_TEST"
+            )
+            raise UsageError(f"{what}.", "no-tests")
+        return chosen
 
     def run(self, numbers: Iterable[int]) -> Iterator[Outcome]:
         """Runs the tests with these indices in `cases`, each from a cold start."""
@@ -241,5 +256,18 @@ def _calls(exception: ExceptionInfo) -> list[SourceLine]:
     """The calls between the test and the exception. What calls the test is ours."""
     if _IN_TEST.fullmatch(exception.pou or ""):
         return []
-    first = next((i for i, call in enumerate(exception.calls) if _IN_TEST.fullmatch(call.pou)), len(exception.calls))
-    return exception.calls[: first + 1]
+    return up_to_test(exception.calls)
+
+
+class _HasPou(Protocol):
+    @property
+    def pou(self) -> str: ...
+
+
+_C = TypeVar("_C", bound=_HasPou)
+
+
+def up_to_test(calls: Sequence[_C]) -> list[_C]:
+    """Calls, the nearest first, without what calls the test."""
+    first = next((i for i, call in enumerate(calls) if _IN_TEST.fullmatch(call.pou)), len(calls))
+    return list(calls[: first + 1])
