@@ -7,6 +7,7 @@ each does its own way is abstract.
 from __future__ import annotations
 
 import re
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -76,6 +77,8 @@ from plctool.link.traces import (
     encode_config,
 )
 
+_CONDITION_S = 2.0  # a debugger needs less for a condition, unless its machine is very busy
+_CONDITION_POLL_S = 0.01
 RESET_OPTIONS = {
     "warm": lib.RESET_OPTION_WARM,
     "cold": lib.RESET_OPTION_COLD,
@@ -280,8 +283,7 @@ class Controller(ABC):
             status = self._status_before(data)
             if not unchecked:
                 _check_base(data, status.image_crc)
-            if status.state is AppState.HALTED:
-                raise DeviceError("A debugger has halted the program; let it go on first.", "halted")
+            self._wait_for_conditions(status)
             self.end_debugging()  # its breakpoints are in the old code
             forced, ended = self._release_removed(status.image_crc, image_crc(data))
             begin = self._now()
@@ -312,6 +314,17 @@ class Controller(ABC):
             "first, or download the program with 'plctool flash'.",
             error.code,
         )
+
+    def _wait_for_conditions(self, status: Status) -> None:
+        """A debugger that evaluates a condition halts the program for some milliseconds. Raises DeviceError when it
+        stays halted."""
+        end = time.monotonic() + _CONDITION_S
+        own = self._debugger is not None and self._debugger.halt is not None
+        while status.state is AppState.HALTED:
+            if own or time.monotonic() > end:
+                raise DeviceError("A debugger has halted the program; let it go on first.", "halted")
+            time.sleep(_CONDITION_POLL_S)
+            status = self.raw_status()
 
     def _release_removed(self, before: int, after: int) -> tuple[dict[str, Any], list[str]]:
         """Ends the force and the traces of variables that the new program does not have, or has at another place.

@@ -481,6 +481,7 @@ class _DebuggedPlc(Target):
         self._session = session
 
     def attach(self, keep: bool) -> None:
+        self._session.forget_application()  # another tool may have replaced it
         breakpoint_services.attach(self._session, keep=keep)
 
     def detach(self) -> None:

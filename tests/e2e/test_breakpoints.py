@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,10 +15,12 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from breakpoints import FILE, Breaking, build, halt
+from breakpoints import FILE, PROGRAM, Breaking, build, halt
 
 from plctool import connect
+from plctool.compiler import compile_sources
 from plctool.device import Plc
+from plctool.image.targets import host_target
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.waiting import eventually
 
@@ -92,6 +95,53 @@ def test_a_download_replaces_a_halted_program(plc: Plc, tmp_path: Path) -> None:
     plc.flash(build(tmp_path, level=2))
     plc.breakpoints.forget_halt()
     eventually(lambda: plc.read("Main.cycles") > 10)
+
+
+def test_breakpoints_that_another_tool_ends_are_set_again(plc: Plc, link: str) -> None:
+    said: list[str] = []
+    debugger = plc.breakpoints
+    debugger.output = said.append
+    debugger.set(FILE, 15)
+    debugger.watch("Main.divisor")
+    with connect(link) as other:
+        other.breakpoints.clear_all()
+        other.end_debugging()
+    assert [b.line for b, _ in debugger.list()] == [15]
+    assert "another tool has ended the breakpoints: they are set again" in said[0]
+    assert halt(debugger).calls[0].line == 15
+
+
+def test_a_program_that_another_tool_downloads_has_the_breakpoints_of_its_lines(
+    plc: Plc, link: str, tmp_path: Path
+) -> None:
+    said: list[str] = []
+    debugger = plc.breakpoints
+    debugger.output = said.append
+    debugger.set(FILE, 15)
+    debugger.set(FILE, 35)
+    folder = tmp_path / "shorter"
+    folder.mkdir()
+    (folder / FILE).write_text(PROGRAM.partition("PROGRAM Other")[0] + "PROGRAM Other\nEND_PROGRAM\n")
+    built = compile_sources([folder / FILE], target=host_target(), level=0, debug=True)
+    built.write(folder / "halting.cdl")
+    with connect(link) as other:
+        other.flash(folder / "halting.cdl")
+    assert [b.line for b, _ in debugger.list()] == [15]
+    assert any("Breakpoint 2 has ended: the program has no " in text for text in said)
+    assert halt(debugger).calls[0].line == 15
+
+
+def test_an_online_change_waits_for_a_condition_that_another_tool_evaluates(plc: Plc, link: str) -> None:
+    plc.breakpoints.set(FILE, 15)
+    halt(plc.breakpoints)
+    go = threading.Timer(0.3, lambda: (plc.breakpoints.clear_all(), plc.breakpoints.go()))
+    with connect(link) as other:
+        go.start()
+        try:
+            other._wait_for_conditions(other.raw_status())
+        finally:
+            go.join()
+        assert other.status().state == "run"
 
 
 def test_plcrt_ends_while_a_program_is_halted(plc: Plc, plcrt: Plcrt) -> None:

@@ -253,9 +253,25 @@ class Debugger:
             self.clear(number)
 
     def list(self) -> list[tuple[Breakpoint, int]]:
-        """The breakpoints, and how often the controller met each."""
+        """The breakpoints, and how often the controller met each. Those that have ended there are set again."""
+        self._keep_set(self._target.status())
         hits = self._target.hits()
         return [(b, max((hits.get(offset, 0) for offset in b.offsets), default=0)) for b in self._breakpoints.values()]
+
+    def _keep_set(self, status: BpStatus) -> bool:
+        """Sets the breakpoints again that the controller has forgotten, and says so. False: it has them."""
+        offsets = {offset for b in self._breakpoints.values() for offset in b.offsets}
+        if status.attached and status.breakpoints >= len(offsets):
+            return False
+        had = {b.number: f"{b.file}:{b.line}" for b in self._breakpoints.values()}
+        had |= {b.number: b.name for b in self._watches.listed.values()}
+        reason = "has another program" if status.attached else "has heard nothing of this debugger for 5 s"
+        self.output(f"The controller {reason}, or another tool has ended the breakpoints: they are set again.")
+        self.install_again()
+        for number, place in had.items():
+            if number not in self._breakpoints and number not in self._watches.listed:
+                self.output(f"Breakpoint {number} has ended: the program has no {place} any more.")
+        return True
 
     def forget_halt(self) -> None:
         """The program has gone on by other means."""
@@ -321,12 +337,17 @@ class Debugger:
 
     def _look(self) -> Halt | None:
         """The halt, if there is one that concerns the user; the program goes on from others."""
-        while (status := self._target.status()).halted:
+        status = self._target.status()
+        if self._keep_set(status):
+            self._asked = ""
+            status = self._target.status()
+        while status.halted:
             halt = self._explained(status)
             if halt is not None:
                 self._asked = ""
                 return halt
             self._target.go(self._how if self._asked == "step" else lib.BP_GO, status.serial)
+            status = self._target.status()
         return None
 
     def _explained(self, status: BpStatus) -> Halt | None:
