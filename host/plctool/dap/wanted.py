@@ -16,7 +16,7 @@ _HITS = re.compile(r"\s*(>=|>|=|==)?\s*(\d{1,9})\s*")
 _LATER = "It is set when a test runs a program that has this line."
 
 Install = Callable[[Debugger], tuple[int, Message]]
-"""Sets a breakpoint, and returns its number and what the editor is told of it."""
+"""Sets a breakpoint, and returns its number and what the editor gets to see of it."""
 
 
 def hits_of(text: str) -> int:
@@ -40,18 +40,18 @@ class Wanted:
     numbers: dict[Debugger, int] = field(default_factory=dict)
 
     def install_in(self, debugger: Debugger | None) -> Message:
-        """What the editor is told. None: there is no program yet."""
-        told: Message = {"id": self.id, "verified": False}
+        """Returns what the editor shows. None: there is no program yet."""
+        shown: Message = {"id": self.id, "verified": False}
         if self.line is not None:
-            told["line"] = self.line
+            shown["line"] = self.line
         if debugger is None:
-            return told | {"message": _LATER}
+            return shown | {"message": _LATER}
         try:
             number, found = self.install(debugger)
         except PlcError as error:
-            return told | {"message": str(error)}
+            return shown | {"message": str(error)}
         self.numbers[debugger] = number
-        return told | {"verified": True} | found
+        return shown | {"verified": True} | found
 
 
 class WantedBreakpoints:
