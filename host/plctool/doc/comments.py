@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
+from functools import lru_cache
 from textwrap import dedent
 
 from plctool.compiler.syntax.plain_text import FLAT_COMMENT, comment_ends
@@ -17,6 +18,7 @@ _TRIVIA = re.compile(
     re.ASCII | re.DOTALL,
 )
 _BETWEEN = re.compile(r"(?:\s|\{[^{}]*\}|\bTYPE\b)*", re.IGNORECASE)
+_OWN_LINE = re.compile(r"\}|\bTYPE\b", re.IGNORECASE)  # what may have a line between
 _NOT_DOCUMENTATION = re.compile(r"\s*(?:SPDX-License-Identifier|fmt:|region\b|endregion\b|@)", re.IGNORECASE)
 
 
@@ -25,7 +27,7 @@ class Comments:
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._spans = list(_spans(text))
+        self._spans = spans(text)
         self._ends = [end for _, end in self._spans]
 
     def about(self, offset: int, end: int) -> str:
@@ -39,7 +41,7 @@ class Comments:
         for at in range(bisect_right(self._ends, begin) - 1, -1, -1):
             start, end = self._spans[at]
             between = self._text[end:begin]
-            if not _BETWEEN.fullmatch(between) or between.count("\n") - between.count("}") > 1:
+            if not _BETWEEN.fullmatch(between) or between.count("\n") - len(_OWN_LINE.findall(between)) > 1:
                 break
             if self._text[self._line_of(start) : start].strip():
                 break  # about what stands before it in its line
@@ -58,6 +60,13 @@ class Comments:
             found.append(_said(self._text[start:end]))
             at = end
         return _joined(found)
+
+    def of_line(self, offset: int) -> str:
+        """What the comments say of the declaration at an offset: above it, else at the end of its line."""
+        line_end = self._text.find("\n", offset)
+        end = len(self._text) if line_end < 0 else line_end
+        start = next((start for start, _ in self._from(offset) if offset <= start < end), None)
+        return self.before(offset) or ("" if start is None else self.after(start))
 
     def first_inside(self, offset: int) -> str:
         """What the comments directly after the head of a POU say, before anything else."""
@@ -89,7 +98,14 @@ class Comments:
         return line + len(before) - len(before.lstrip())
 
 
-def _spans(text: str) -> list[tuple[int, int]]:
+@lru_cache(maxsize=8)
+def comments_in(text: str) -> Comments:
+    """Returns the comments of a text. Editors ask for the same ones again and again."""
+    return Comments(text)
+
+
+def spans(text: str) -> list[tuple[int, int]]:
+    """Returns where each comment begins and ends; one without an end goes to the end of the text."""
     found: list[tuple[int, int]] = []
     at = 0
     while match := _TRIVIA.search(text, at):
@@ -105,7 +121,7 @@ def _said(comment: str) -> str:
     """The text of a comment without its marks, and without the stars of a frame."""
     if comment.startswith("//"):
         return re.sub(r"^//[/!]? ?", "", comment).rstrip()
-    inner = re.sub(r"^[*!]+(?= |\n|$)", "", comment[2:-2]).rstrip("* \t\n")
+    inner = re.sub(r"^[*!]+(?= |\n|$)", "", comment[2:].removesuffix(f"*{comment[-1]}")).rstrip("* \t\n")
     lines = inner.expandtabs(4).split("\n")
     framed = all(re.match(r"\s*\*(?!\*)", line) for line in lines[1:] if line.strip())
     if framed and len(lines) > 1:

@@ -21,7 +21,7 @@ Place = tuple[str, str]
 
 @dataclass(frozen=True)
 class Monitor:
-    """`names`: the variable of each place that has one. `values`: their values as strings."""
+    """`names`: the variable of each place that has one. `values`: of each variable, as text."""
 
     names: Mapping[Place, str] = field(default_factory=dict)
     values: Mapping[str, str] = field(default_factory=dict)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from plctool.compiler.syntax import ast
-from plctool.lsp.comments import comment_of
+from plctool.doc.comments import comments_in
 from plctool.lsp.items import Item, Kind
 from plctool.lsp.names import STANDARD, Names, expression, written
 
@@ -87,7 +87,7 @@ def _unit(item: Item) -> str:
 
 def comment(item: Item) -> str:
     """Returns the comment about a declaration."""
-    return comment_of(item.source.text, item.offset)
+    return comments_in(item.source.text).of_line(item.offset)
 
 
 def detail(item: Item, names: Names) -> str:

@@ -8,9 +8,9 @@ from lsprotocol import types as lsp
 
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.lexer import KEYWORDS
+from plctool.doc.comments import spans
 from plctool.iec.types import ELEMENTARY
 from plctool.lsp import describe
-from plctool.lsp.comments import COMMENT
 from plctool.lsp.items import Item, Kind
 from plctool.lsp.names import STANDARD, Names
 from plctool.lsp.outline import SECTIONS, UNITS, Block
@@ -220,14 +220,14 @@ def _comment_lines(text: str) -> Iterator[tuple[int, int]]:
     """The first and last lines of comments of several lines, and of line comments that follow each other."""
     run: list[int] = []
     line = at = 0
-    for match in COMMENT.finditer(text):
-        line += text.count("\n", at, match.start())
-        at = match.start()
-        lines = match.group().count("\n")
+    for start, end in spans(text):
+        line += text.count("\n", at, start)
+        at = start
+        lines = text.count("\n", start, end)
         alone = not text[text.rfind("\n", 0, at) + 1 : at].strip()
         if lines:
             yield line, line + lines
-        elif alone and match.group().startswith("//"):
+        elif alone and text.startswith("//", start):
             if run and run[1] == line - 1:
                 run[1] = line
                 continue

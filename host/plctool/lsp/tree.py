@@ -10,11 +10,12 @@ from functools import cached_property
 from plctool.compiler.base.source import Source
 from plctool.compiler.syntax.lexer import SOFT, Lexer, Token
 from plctool.compiler.syntax.parser import parse_all
-from plctool.lsp.comments import COMMENT
+from plctool.compiler.syntax.plain_text import FLAT_COMMENT
 from plctool.lsp.items import ItemsOf
 from plctool.lsp.outline import SECTIONS, UNITS, Block, outline
 
 _FOLLOWED_BY_NAME = re.compile(r"\s+[^\W\d]|\s*'")
+_COMMENT = re.compile(FLAT_COMMENT, re.DOTALL)
 _OPEN_COMMENT = re.compile(r"//[^\n]*\Z|\(\*(?:(?!\*\)).)*\Z|/\*(?:(?!\*/).)*\Z|\{[^}]*\Z", re.DOTALL)
 _OPEN_STRING = re.compile(r"'(?:[^'$\n]|\$[^\n])*\Z|\"(?:[^\"$\n]|\$[^\n])*\Z")
 
@@ -132,8 +133,8 @@ class Tree:
         if token.type in ("STRING", "TYPED") and token.text.endswith(("'", '"')) and token.pos < offset < token.end:
             return True
         gap = self.source.text[min(token.end, offset) : offset]
-        for match in COMMENT.finditer(gap):
+        for match in _COMMENT.finditer(gap):
             if match.end() == len(gap) and match.group().startswith("//"):
                 return True
-        gap = COMMENT.sub(" ", gap)
+        gap = _COMMENT.sub(" ", gap)
         return _OPEN_COMMENT.search(gap) is not None or _OPEN_STRING.search(gap) is not None
