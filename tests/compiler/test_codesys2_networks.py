@@ -163,6 +163,12 @@ def test_what_is_not_known_is_refused_by_name(tmp_path: Path, networks: list[str
     assert at.strip() == line
 
 
+def test_a_rung_that_is_too_deep_is_refused(tmp_path: Path) -> None:
+    deep = "_LD_AND\n_LD_OPERATOR : 1\n" * 5000 + contact("a") + sign(False) * 5000
+    ((_, message),) = messages(tmp_path, export("LD", [rung(deep, ("o", "="))], "a, o : BOOL;"))
+    assert message == "the diagram PLC_PRG cannot be compiled: it is too deep"
+
+
 def test_an_error_stands_in_its_line(tmp_path: Path) -> None:
     ((line, message),) = messages(tmp_path, export("LD", [rung(contact("missing"), ("o", "="))], "o : BOOL;"))
     assert (line, "missing" in message) == ("o", True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import test_codesys2_networks as codesys2
+import twincat_archive
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plcopen_support import pou, project, variables
@@ -36,6 +38,39 @@ LADDER = pou(
     variables("localVars", "a:BOOL", "b:BOOL", "n:INT", "TON0:TON"),
 )
 NETWORK = pou("Net", network(variable_of(1, "n"), taken(2, "n", "1")), variables("localVars", "n:INT"), "functionBlock")
+ARCHIVE = twincat_archive.archive(
+    twincat_archive.network(
+        twincat_archive.demux(3, twincat_archive.given("a", 1)),
+        twincat_archive.assign(twincat_archive.demux(3), ("o", 2), ("b", 1)),
+        twincat_archive.assign(twincat_archive.given("a", 16), ("over", 4)),
+    ),
+    twincat_archive.network(
+        twincat_archive.assign(
+            twincat_archive.item(
+                twincat_archive.box(
+                    "TON",
+                    {"IN": twincat_archive.given("a"), "PT": twincat_archive.given("T#1s")},
+                    {"Q:BOOL": "", "ET:TIME": ""},
+                    "t",
+                )
+            ),
+            ("c", 0),
+        ),
+        label="over",
+    ),
+    mode="Ld",
+)
+RUNGS = [
+    codesys2.rung(
+        codesys2.gate("OR", codesys2.contact("a"), codesys2.contact("b", negated=True)),
+        ("o", "S"),
+        boxes=(codesys2.assign(codesys2.box("REAL_TO_INT", codesys2.operand("x"), enabled=True), ("n", "=")),),
+    ),
+    codesys2.network(
+        codesys2.assign(codesys2.box("TON", codesys2.operand("a"), codesys2.operand("T#1s"), instance="t"), ("o", "=")),
+        "label",
+    ),
+]
 SAMPLES = {
     "a.xml": project(BLOCK + USER + LADDER + NETWORK, TYPES, CONFIGURATION, GLOBALS + MIXED),
     "b.xml": chart(*LOOP, more=COUNT),
@@ -44,6 +79,8 @@ SAMPLES = {
     "e.TcTTO": TASK,
     "f.st": COUNTER,
     "g.st": GENERATED,
+    "h.TcPOU": twincat_archive.unit("PROGRAM Drawn\nVAR a, b, c, o : BOOL; t : TON; END_VAR", ARCHIVE, "", "Drawn"),
+    "i.EXP": codesys2.export("LD", RUNGS, "a, b, o : BOOL; t : TON; x : REAL; n : INT;", "", "Drawn"),
 }
 SPLICES = [
     "", "<", ">", '"', "</", "]]>", "<![CDATA[", "&lt;", "&#0;", "&#10;", "'", "(*", "*)", "\0", "\ud800", "END_VAR",

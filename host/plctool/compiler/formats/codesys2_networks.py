@@ -63,8 +63,11 @@ def read_networks(
     reader = _Reader(lines, parameters)
     made = Elements(language, lines[0].at if lines else Place(1, 1), contacts, first)
     reader.skip_count("_NETWORKS")
-    while reader.more:
-        made.add(reader.network())
+    try:
+        while reader.more:
+            made.add(reader.network())
+    except RecursionError:
+        raise NotTranslatedError(made.at, "it is too deep") from None
     return made
 
 
