@@ -30,7 +30,6 @@ typedef struct {
 #if IEC_TASK_CALLS
     RTS_UI32 is_lifted; /* for this cycle */
     RTS_UI32 more_ns;   /* for this cycle: how long it was lifted */
-    bool ends_series;   /* of long cycles, if this one is long as well */
 #endif
 } GUARD;
 
@@ -41,10 +40,15 @@ typedef struct {
     GUARD guard;
     RTS_I64 watchdog_ns; /* 0: none */
     RTS_UI16 sensitivity;
-    bool has_phases;   /* anything before or after its code */
-    bool has_copies;   /* of inputs and outputs */
-    RTS_UI32 exceeded; /* cycles in a row longer than watchdog_ns */
-    RTS_UI32 ms_rest;  /* ns of context.time_ns beyond context.time_ms */
+    bool has_phases; /* anything before or after its code */
+    bool has_copies; /* of inputs and outputs */
+#if IEC_TASK_CALLS
+    RTS_UI16 exceeded; /* cycles in a row longer than watchdog_ns */
+    bool ends_series;  /* this cycle, of long ones, if it is long as well */
+#else
+    RTS_UI32 exceeded;
+#endif
+    RTS_UI32 ms_rest; /* ns of context.time_ns beyond context.time_ms */
     RTS_UI32 cycles;
     RTS_UI32 last_ns;
     RTS_UI32 min_ns;
@@ -114,7 +118,7 @@ bool IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *out)
     out->start_ns = guard->start_ns;
     out->limit_ns = guard->limit_ns;
 #if IEC_TASK_CALLS
-    if (guard->ends_series)
+    if (index < tasks.count && tasks.list[index].ends_series)
         out->limit_ns = tasks.list[index].watchdog_ns; /* aborted where it becomes too long, it has a location */
     out->limit_ns += SysAtomicLoad(&guard->more_ns);
     if (SysAtomicLoad(&guard->is_lifted) && out->limit_ns < LIFTED_NS)
@@ -390,7 +394,7 @@ static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
 #if IEC_TASK_CALLS
     task->guard.is_lifted = false;
     task->guard.more_ns = 0;
-    task->guard.ends_series = task->exceeded != 0 && task->exceeded + 1 == task->sensitivity;
+    task->ends_series = task->exceeded != 0 && task->exceeded + 1 == task->sensitivity;
 #endif
     guard_begin(&task->guard, start_ns);
 #if ONLINE_CHANGE && !RTS_ONE_CORE && BP_HOLDS_TASKS
