@@ -43,7 +43,7 @@ typedef struct {
 enum { SPEC_MAX_KEPT = 8 };
 
 typedef struct {
-    RTS_UI8 code[4096];
+    RTS_UI8 code[8192];
     RTS_UI32 code_size;
     RTS_UI32 areas[APP_AREA_CODE]; /* bytes */
     RTS_I32 function[CDL_FUNCTION_COUNT];
