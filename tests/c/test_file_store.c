@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  */
 #include "FileStore.h"
+
 #include "CmpChecksum.h"
 #include "Sim.h"
 #include "SysFileFlash.h"
@@ -29,7 +30,7 @@ static void begin(void)
     CHECK_EQUAL(SysFileGetArea(FILE_STORE)->size, SECTORS * SECTOR);
 }
 
-/* Files are told from each other by where their content begins. */
+/* The content of a file begins at its name. */
 static RTS_RESULT put(char name, RTS_UI32 sectors)
 {
     const char text[] = {name, '\0'};
@@ -161,6 +162,23 @@ static void a_full_catalog_changes_a_file_in_the_gap_at_the_start(void)
     CHECK_EQUAL(put('b', 1), ERR_OK);
     CHECK_EQUAL(FileStoreFind("b")->start, 0);
     CHECK(has('a', 1) && has('b', 1) && has('c', 1) && has('y', SECTORS - FILE_STORE_FILES));
+    CHECK_EQUAL(put('c', 1), ERR_OK); /* where b was */
+    CHECK_EQUAL(FileStoreRoom(), 0);
+}
+
+static void what_is_copied_is_in_the_file_already(void)
+{
+    begin();
+    SysFileCreateAt(FILE_STORE, 0);
+    CHECK_EQUAL(SysFileWrite(FILE_STORE, content, 100), ERR_OK);
+    CHECK_EQUAL(SysFileCopy(FILE_STORE, 0, 1), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(SysFileCopy(FILE_STORE, 101, 1), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(SysFileCopy(FILE_STORE, 0xFFFFFFFF, 1), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(SysFileCopy(FILE_STORE, 100, 150), ERR_OK); /* more than there is: what is copied is copied again */
+    CHECK_EQUAL(SysFileClose(FILE_STORE), ERR_OK);
+    CHECK_EQUAL(SysFileRead(FILE_STORE, 0, got, 250), ERR_OK);
+    CHECK(memcmp(got, content, 100) == 0 && memcmp(got + 100, content, 100) == 0);
+    CHECK(memcmp(got + 200, content, 50) == 0);
 }
 
 /* ---- a catalog that anything may have written ---- */
@@ -215,6 +233,7 @@ int main(void)
     RUN(a_file_takes_the_whole_store);
     RUN(a_file_is_put_into_the_smallest_gap_that_has_room_for_it);
     RUN(a_full_catalog_changes_a_file_in_the_gap_at_the_start);
+    RUN(what_is_copied_is_in_the_file_already);
     RUN(entries_end_with_the_store);
     RUN(there_is_no_room_within_files_that_overlap);
     return test_result();

@@ -84,10 +84,29 @@ static void what_the_configuration_says_can_be_read_from_outside(void)
     CHECK_EQUAL(IoMgrReadParameter(0, 9, text, 88, 0), ERR_OK);
     CHECK(strcmp(text, "/dev/ttyS1") == 0);
     CHECK_EQUAL(IoMgrReadParameter(0, 9, text, 88, 8), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(IoMgrReadParameter(0, 7, &value, 8, 24), ERR_OK);
+    CHECK_EQUAL(IoMgrReadParameter(0, 7, &value, 8, 25), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(IoMgrReadParameter(0, 3, &value, 9, 0), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(IoMgrReadParameter(0, 3, &value, 16, 0xFFFFFFF8), ERR_OUT_OF_LIMITS);
     CHECK_EQUAL(IoMgrReadParameter(0, 4, &value, 8, 0), ERR_NO_OBJECT);
     CHECK_EQUAL(IoMgrReadParameter(4, 7, &value, 8, 0), ERR_INVALIDID);
     CHECK_EQUAL(IoMgrWriteParameter(0, 7, &value, 8, 0), ERR_NOT_SUPPORTED);
     CHECK_EQUAL(IoMgrIdentify(4), ERR_INVALIDID);
+}
+
+static void the_connector_after_the_last_one_has_no_state(void)
+{
+    IO_DEVICE_STATE state;
+
+    begin_tree();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(IoMgrGetState(3, &state), ERR_OK);
+    CHECK_EQUAL(IoMgrGetState(4, &state), ERR_INVALIDID);
+    CHECK_EQUAL(IoMgrGetState(0xFFFFFFFF, &state), ERR_INVALIDID);
+    CHECK_EQUAL(IoMgrGetSkipped(3), 0);
+    CHECK_EQUAL(IoMgrGetSkipped(4), 0);
+    CHECK_EQUAL(IoMgrGetSkipped(0xFFFFFFFF), 0);
+    CHECK(IoMgrConfigGetConnector(0xFFFFFFFF) == NULL);
 }
 
 static const IoConfigChannelMap word = {.bits = 16};
@@ -202,6 +221,7 @@ int main(void)
     RUN(connectors_are_found_by_type_and_parent);
     RUN(parameters_are_found_by_id);
     RUN(what_the_configuration_says_can_be_read_from_outside);
+    RUN(the_connector_after_the_last_one_has_no_state);
     RUN(the_order_of_bytes_is_that_of_the_device);
     RUN(outputs_come_in_the_order_of_the_device);
     RUN(in_the_safe_state_outputs_are_what_the_configuration_says);
