@@ -20,12 +20,16 @@ from cuts import Calls, Cuts
 from debuggers import Debuggers
 from images import Images
 from kills import Kills
+from pages import Pages
 from records import Records
 from sectors import Sectors
 from simulated import die_with_parent
+from watchers import Watchers
 from workshop import Workshop, open_workshop
 
-CAMPAIGNS: tuple[type[Campaign], ...] = (Kills, Cuts, Calls, BadPrograms, Images, Records, Sectors, Debuggers)
+CAMPAIGNS: tuple[type[Campaign], ...] = (
+    Kills, Cuts, Calls, BadPrograms, Images, Records, Sectors, Debuggers, Watchers, Pages,
+)  # fmt: skip
 SHOWN = 10  # failures of a campaign that are printed
 
 
