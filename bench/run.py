@@ -17,6 +17,7 @@ import latency
 import links
 import modbus
 import overheads
+import page
 import serial_share
 import tanks
 import targets
@@ -217,6 +218,7 @@ def main() -> None:
     bench_can()
     links.main()
     tracing.main()
+    page.main()
     latency.main()
     print("\nlanguage server, 10 000 lines in 100 files (median / 95 %)")
     editor_speed.report(line)
