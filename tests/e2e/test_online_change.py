@@ -93,6 +93,16 @@ def test_edited_project_is_changed_in_the_program_that_runs(project: Path, plcrt
     assert "Online change, CRC" in tool("log", "--tcp", plcrt.tcp).out
 
 
+def test_sources_of_a_changed_program_can_be_kept_on_the_device(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    """With the places that variables have, which only the program before the change explains."""
+    (project / "main.st").write_text(program(BODY).replace("VAR n, seen", "VAR more : LINT; n, seen"))
+    tool.ok("flash", "--online-change", "--tcp", plcrt.tcp)
+    crc = tool.ok("source", "put", "--tcp", plcrt.tcp)["crc"]
+    got = tool.ok("source", "get", "--tcp", plcrt.tcp, "-o", "again")
+    built = Tool(folder=project / "again").ok("build", *got["build"], "-o", "same.cdl")
+    assert got["crc"] == crc == built["crc"]
+
+
 def test_impossible_edit_is_refused_before_anything_is_sent(project: Path, plcrt: Plcrt, tool: Tool) -> None:
     (project / "main.st").write_text(program(BODY).replace("T#5ms", "T#6ms"))
     done = tool("flash", "--online-change", "--tcp", plcrt.tcp)

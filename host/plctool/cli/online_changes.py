@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from plctool.cli.documents import Document
 from plctool.errors import UsageError, counted
+from plctool.project import SYMBOL_SUFFIX
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
@@ -39,11 +40,13 @@ def with_base(settings: Settings, args: argparse.Namespace) -> Settings:
 
 
 def base_of(image: Path) -> SymbolTable:
-    """The symbols of an image that runs, from beside it or from the cache. Raises UsageError."""
-    from plctool.debug.symbols import find_symbols
+    """The symbols of an image that runs, from beside it or from the cache, or a symbol file. Raises UsageError."""
+    from plctool.debug.symbols import find_symbols, load_symbols
     from plctool.files import read_image
     from plctool.image.file import check_image, image_crc
 
+    if image.suffix == SYMBOL_SUFFIX:
+        return load_symbols(image)
     data = read_image(image)
     check_image(image, data)
     return find_symbols(image_crc(data), image)

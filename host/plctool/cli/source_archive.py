@@ -20,9 +20,11 @@ from plctool.link.file_services import SOURCE_NAME
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
     from plctool.compiler.sources.program_files import ProgramFiles
+    from plctool.debug.symbols import SymbolTable
 
 _FACTS = "plctool-source.json"
 _FORMAT = 1
+_BASE = "plctool-base.sym"
 _NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same sources are the same archive
 
 
@@ -94,12 +96,16 @@ def _refused(why: str) -> DeviceError:
     )
 
 
-def archive_of(settings: Settings, crc: int, target: str) -> Archive:
+def archive_of(settings: Settings, crc: int, target: str, base: SymbolTable | None = None) -> Archive:
     """The sources of an image with that CRC, made for a target. They are compiled again from the archive: raises
-    UsageError unless that gives the same image."""
+    UsageError unless that gives the same image. `base`: the symbols of the image that this one has replaced in an
+    online change, which say where its variables are."""
     settings = replace(settings, target=settings.target or target)
     root = Path(os.path.commonpath(list(_folders(settings))))
     archive = Archive(crc, _words(settings, root), {_below(root, path): path.read_bytes() for path in _files(settings)})
+    if base is not None:
+        archive.files[_BASE] = base.to_json().encode()
+        archive.build.extend(["--base", _BASE])
     with tempfile.TemporaryDirectory(prefix="plctool-source-") as folder:
         found = _built_crc(archive, Path(folder))
     if found != crc:
@@ -163,6 +169,7 @@ def _words(settings: Settings, root: Path) -> list[str]:
 def _built_crc(archive: Archive, folder: Path) -> int:
     from plctool.cli.arguments import add_build_arguments
     from plctool.cli.builds import compiled
+    from plctool.cli.online_changes import with_base
     from plctool.cli.parser import Parser
     from plctool.cli.projects import settings_of
 
@@ -173,6 +180,6 @@ def _built_crc(archive: Archive, folder: Path) -> int:
         parser = Parser(prog="plctool build")
         add_build_arguments(parser)
         args = parser.parse_args([*archive.build, "--no-limits", "-o", "app.cdl"])
-        return compiled(settings_of(args)).crc
+        return compiled(with_base(settings_of(args), args)).crc
     finally:
         os.chdir(before)

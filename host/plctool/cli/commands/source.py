@@ -69,7 +69,9 @@ def prepared_source(settings: Settings, crc: int, image: Path | None = None) -> 
     make that image."""
     symbols = find_symbols(crc, image)
     text = symbols.to_json().encode()
-    return archive_of(settings, crc, symbols.target), gzip.compress(text, mtime=0)
+    replaced = symbols.online.get("base")
+    base = None if replaced is None else find_symbols(replaced)
+    return archive_of(settings, crc, symbols.target, base), gzip.compress(text, mtime=0)
 
 
 def store_source(

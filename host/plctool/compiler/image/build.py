@@ -116,6 +116,7 @@ def _build(
     areas = {area.value: size for area, size in program.area_sizes.items() if area is not Area.CODE}
     changes = None
     if change is not None:
+        symbols.online["base"] = change.previous.crc
         check_facts(change, symbols.online, target.name)
         code += bytes(-len(code) % _CODE_ALIGN)
         changes = _image_change(program, lowered, linked, target, change, len(code), areas)
