@@ -16,6 +16,7 @@ import editor_speed
 import latency
 import links
 import modbus
+import online_changes
 import overheads
 import page
 import serial_share
@@ -219,6 +220,7 @@ def main() -> None:
     links.main()
     tracing.main()
     page.main()
+    online_changes.main()
     latency.main()
     print("\nlanguage server, 10 000 lines in 100 files (median / 95 %)")
     editor_speed.report(line)

@@ -23,8 +23,10 @@
 #include "CmpRetain.h"
 #include "IecCycle.h"
 #include "SysFlash.h"
+#include "SysTime.h"
 
 #define U(value) ((unsigned)(value))
+#define NS_PER_US 1000u
 
 /* On the stack of main: the tables are of the image that is to run next. */
 typedef struct {
@@ -38,6 +40,7 @@ typedef struct {
     AREA_ADDRESS gone;     /* that */
     bool dangles;
     RTS_UI32 exception; /* of what initialises */
+    RTS_UI32 pause_ns;  /* how long no task could begin a cycle */
 } CHANGE;
 
 /* ---- steps ---- */
@@ -368,6 +371,7 @@ static RTS_RESULT check_all(CHANGE *change, APP_REFUSAL *refusal)
 static void begin(void *arg)
 {
     CHANGE *change = arg;
+    RTS_I64 start_ns = SysTimeGetNs();
 
     for_steps(change, check_step);
     if (change->dangles)
@@ -375,6 +379,7 @@ static void begin(void *arg)
     for_steps(change, lead_on);
     for_steps(change, write_step);
     AppExchange(change->image, change->code, &change->tables);
+    change->pause_ns = (RTS_UI32)(SysTimeGetNs() - start_ns);
 }
 
 static void go_back(void *arg)
@@ -469,8 +474,11 @@ static RTS_RESULT take_place(const APP_IMAGE *image, APP_REFUSAL *refusal)
     if (result == ERR_OK)
         result = change_to(&change, refusal);
     SysFlashReleaseCode(result == ERR_OK ? change.old.file : image->file);
-    if (result == ERR_OK)
+    if (result == ERR_OK) {
+        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Tasks waited %u us for the exchange",
+               U(change.pause_ns / NS_PER_US));
         AppBeginProof();
+    }
     return result;
 }
 

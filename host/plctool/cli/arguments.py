@@ -38,7 +38,7 @@ def add_build_arguments(parser: Parser) -> None:
     )
     parser.add_argument(
         "--base", type=usable_path, metavar="OLD.cdl",
-        help="keep the places that variables have in this image, or by its symbol file, so that the new one can replace it "
+        help="keep the places that variables have in this image or symbol file, so that the new one can replace it "
         "while it runs",
     )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="with --base: say what the change does, write nothing")
