@@ -112,6 +112,7 @@ enum {
     CMPID_IecTaskCalls = 0x00A1,
     CMPID_CmpLogKeep = 0x00AC,
     CMPID_IecSocket = 0x0073,
+    CMPID_IecCom = 0x0074,
 };
 
 /* Name of a component, "" when unknown. */

@@ -51,6 +51,9 @@
 #if HAS_IecSocket && !HAS_CmpAppCalls
 #error "HAS_IecSocket needs HAS_CmpAppCalls in cmp_list.c."
 #endif
+#if HAS_IecCom && !HAS_CmpAppCalls
+#error "HAS_IecCom needs HAS_CmpAppCalls in cmp_list.c."
+#endif
 #if HAS_CmpTraceMgr && TRACE_BUFFER == 0
 #error "HAS_CmpTraceMgr: set TRACE_BUFFER, the bytes that traces may use, in rts_config_port.h."
 #endif
@@ -148,6 +151,9 @@ enum {
 #endif
 #if HAS_IecSocket
     CMP_ONE(IecSocket)
+#endif
+#if HAS_IecCom
+    CMP_ONE(IecCom)
 #endif
 #if HAS_IecCan
     CMP_ONE(IecCan)

@@ -78,6 +78,9 @@ X(IecFile)
 #if HAS_IecSocket
 X(IecSocket)
 #endif
+#if HAS_IecCom
+X(IecCom)
+#endif
 #if HAS_IecClock
 X(IecClock)
 #endif

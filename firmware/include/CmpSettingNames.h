@@ -35,6 +35,7 @@ SETTING_FLAG(TunnelDrive, "ModbusTunnel", "Drive", "tunnel-drive", "whether the 
 SETTING_OPTION(MetricsFile, "Metrics", "File", "metrics", "file with figures for Prometheus")
 SETTING_OPTION(MetricsPeriod, "Metrics", "Period", "metrics-every", "how often it is written [s]; 15 if not given")
 SETTING_OPTION(ProgramNet, "IecSocket", "Allow", "net", "what the program may reach: ADDRESS[/BITS][:PORT[-PORT]],...")
+SETTING_OPTION(ProgramCom, "IecCom", "Lines", "com", "serial devices that the program may open, as ports 1, 2 ..")
 SETTING_OPTION(FlashFile, "SysFlash", "File", "flash", "file that stands for the flash memory")
 SETTING_FLAG(MdnsAnnounce, "SysMdns", "Announce", "mdns", "whether name and TCP port are announced by multicast DNS")
 SETTING_OPTION(Board, "SysTarget", "Board", "board", "what device.toml calls this machine")

@@ -37,6 +37,10 @@ typedef struct {
  * SysComDiscard. */
 RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index);
 
+/* Opens the line that programs know by a number, from 1 on, and returns its index. ERR_NO_OBJECT: they may open none of this
+ * number; else as SysComOpenPort. Only a firmware with IEC_COMS needs it. */
+RTS_RESULT SysComOpenProgram(RTS_UI32 number, const SYSCOM_SETTINGS *settings, RTS_UI32 *index);
+
 /* When the last byte came that SysComRead has returned, or a later one, or when it was read, if the port cannot know better
  * (SysTimeGetNs). SYSCOM_BYTE_TIMES 1. */
 RTS_I64 SysComGetByteNs(RTS_UI32 index);

@@ -354,6 +354,12 @@
 #define IEC_SOCKETS 0
 #endif
 
+/* Serial ports that a program may have open at a time (IecCom.h); 8 bytes of RAM for each. With HAS_IecCom in cmp_list.c and
+ * one of EVENT_MAX_CALLBACKS. 0: it may open none, which it learns by an error. */
+#ifndef IEC_COMS
+#define IEC_COMS 0
+#endif
+
 /* 1: a program may ask about its tasks, and disable their watchdog for a cycle (IecTaskCalls.h); 24 bytes for each task. It
  * needs HAS_IecTaskCalls in cmp_list.c, and one of EVENT_MAX_CALLBACKS. 0: no flash for it, and a program that does is
  * refused. */

@@ -50,6 +50,7 @@ _FILE_STORE = (1 << 20) - _KEPT_LOG  # bytes for files, as on plcrt; the program
 _PROGRAM_UNIT = 8
 MAX_NS = 2**62  # at once; the clock goes twice as far
 _TRACE_MESSAGE = 64 * 1024  # bytes of samples at a time
+_SERIAL = 64 * 1024  # bytes that a serial line holds
 _NEVER = 2**63 - 1  # the last moment of that clock [ns]
 # What the C core runs before Python is asked whether the user wants it to end.
 _CYCLES_AT_ONCE = 100_000
@@ -412,6 +413,17 @@ class Simulator(Controller):
     def can_receive(self) -> list[CanFrame]:
         """The frames that the device has sent on the CAN bus since the last call, the 4096 newest at most."""
         return take_frames(self._core)
+
+    def serial_send(self, port: int, data: bytes) -> None:
+        """Bytes for a serial port of the program, from 1 on. Raises DeviceError unless it takes all of them."""
+        if self._lib.SimComPutPort(port, bytes(data), len(data)) != len(data):
+            message = f"Serial port {port} does not take {len(data)} bytes: the program has to open it."
+            raise DeviceError(message, "serial")
+
+    def serial_receive(self, port: int) -> bytes:
+        """The bytes that the program has written to a serial port since the last call."""
+        room = self._ffi.new("RTS_UI8[]", _SERIAL)
+        return bytes(self._ffi.buffer(room)[: self._lib.SimComGetPort(port, room, _SERIAL)])
 
     def udp_send(self, data: bytes, port: int, *, sender: tuple[str, int] = ("192.168.0.1", 1)) -> None:
         """A datagram of another host to a port of the program: it is there when time passes."""

@@ -19,6 +19,7 @@ COMPONENTS = {
     "CmpAppCalls.functions": "CmpAppCalls",
     "IecFile.functions": "IecFile",
     "IecSocket.functions": "IecSocket",
+    "IecCom.functions": "IecCom",
     "IecCan.functions": "IecCan",
     "CanopenCalls.functions": "IoDrvCanopen",
     "IecClock.functions": "IecClock",

@@ -28,10 +28,13 @@
 #include <termios.h>
 #include <unistd.h>
 
-enum { LINES = 1 + PORT_MAX_BUS_LINES + 1 }; /* with that of --tunnel */
+enum {
+    LINES = 1 + PORT_MAX_BUS_LINES + 1 + IEC_COMS, /* with that of --tunnel */
+    PATH_SIZE = 256,
+};
 
 typedef struct {
-    char path[256]; /* of the device, "" for a pseudo terminal */
+    char path[PATH_SIZE]; /* of the device, "" for a pseudo terminal */
     SYSCOM_SETTINGS settings;
     PORT_SOURCE source; /* what is read and written; no file while the device is away */
     bool open;
@@ -507,6 +510,41 @@ RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS
         return ERR_NOT_SUPPORTED;
     }
     return ERR_OK;
+}
+
+/* ---- lines of programs ---- */
+
+static struct {
+    RTS_UI32 count;
+    char path[IEC_COMS][PATH_SIZE];
+} program_lines;
+
+bool PortComAllow(const char *list)
+{
+    program_lines.count = 0; /* those of the command line replace those of --config */
+    do {
+        size_t length = strcspn(list, ",");
+        if (length == 0 || length >= PATH_SIZE || program_lines.count == IEC_COMS) {
+            return false;
+        }
+        char *path = program_lines.path[program_lines.count++];
+        memcpy(path, list, length);
+        path[length] = '\0';
+        list += length;
+    } while (*list++ == ',');
+    return true;
+}
+
+RTS_RESULT SysComOpenProgram(RTS_UI32 number, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)
+{
+    if (number < 1 || number > program_lines.count) {
+        return ERR_NO_OBJECT;
+    }
+    RTS_RESULT result = SysComOpenPort(program_lines.path[number - 1], settings, index);
+    if (result == ERR_OK) { /* a program that does not read what comes would keep main busy */
+        PortWaitRemove(&lines[*index].source);
+    }
+    return result;
 }
 
 void SysComClose(RTS_UI32 index)

@@ -27,6 +27,7 @@
 #define HAS_CmpAppCalls 1
 #define HAS_IecFile 1
 #define HAS_IecSocket 1
+#define HAS_IecCom 1
 #define HAS_CmpCan 1
 #define HAS_IecCan 1
 #define HAS_IecClock 1

@@ -71,9 +71,10 @@ static const char usage[] =
     "             [--udp ADDRESS[:PORT]] [--mdns] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
     "             [--tunnel PATH] [--tunnel-unit N] [--tunnel-baud N] [--tunnel-parity even|odd|none] "
     "[--tunnel-drive]\n"
-    "             [--board NAME] [--event NAME=PIPE]... [--dump FILE] [--metrics FILE] [--metrics-every SECONDS]\n"
-    "             [--config FILE]\n"
-    "             [--net ADDRESSES] [--set-clock]\n"
+    "             [--board NAME] [--event NAME=PIPE]... [--dump FILE] [--metrics FILE] [--metrics-every SECONDS]
+"
+    "             [--config FILE] [--net ADDRESSES] [--com LINES] [--set-clock]
+"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
@@ -123,6 +124,8 @@ static const char usage[] =
     "  --net LIST      addresses that the program may reach by UDP and TCP: ADDRESS[/BITS][:PORT[-PORT]] with commas "
     "between;\n"
     "                  only this machine if not given: docs/sockets.md\n"
+    "  --com LIST      serial devices that the program may open as ports 1, 2 .., with commas between: "
+    "docs/library.md\n"
     "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
     "  --version       prints the version\n"
     "  --help          prints this\n"
@@ -207,6 +210,7 @@ enum {
     OPTION_CONFIG,
     OPTION_HELP_CONFIG,
     OPTION_NET,
+    OPTION_COM,
 };
 
 /* clang-format off */
@@ -240,6 +244,7 @@ static const struct option long_options[] = {
     {"config", required_argument, NULL, OPTION_CONFIG},
     {"help-config", no_argument, NULL, OPTION_HELP_CONFIG},
     {"net", required_argument, NULL, OPTION_NET},
+    {"com", required_argument, NULL, OPTION_COM},
     {NULL, 0, NULL, 0},
 };
 /* clang-format on */
@@ -277,6 +282,14 @@ static void take_net(const char *text)
 {
     if (!PortNetAllow(text)) {
         refuse("--net %s is not a list of addresses: write for example 192.168.1.0/24,10.0.0.5:1202", text);
+    }
+}
+
+static void take_com(const char *text)
+{
+    if (!PortComAllow(text)) {
+        refuse("--com %s is not a list of at most %d serial devices: write for example /dev/ttyS1,/dev/ttyUSB0", text,
+               IEC_COMS);
     }
 }
 
@@ -411,6 +424,9 @@ static void take_option(OPTIONS *options, int option)
         break;
     case OPTION_EVENT:
         take_event(options, optarg);
+        break;
+    case OPTION_COM:
+        take_com(optarg);
         break;
     case OPTION_NET:
         take_net(optarg);

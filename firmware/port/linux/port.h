@@ -104,6 +104,8 @@ void PortComClose(void);
  * terminal stays open, so that it outlives the child. */
 void PortComHandOver(void);
 /* Whether SysComOpenPort will be able to open a line like that, now or when its device comes. */
+/* The lines that programs may open as ports 1, 2 ..: "PATH,PATH..". False if the list is not valid. */
+bool PortComAllow(const char *list);
 bool PortComCheck(const char *path, const SYSCOM_SETTINGS *settings, PORT_REASON *reason);
 /* Name of the pseudo terminal, which is its link if it has one; NULL when the line is none. */
 const char *PortComPtyName(void);

@@ -42,6 +42,7 @@
 #define APP_CALL_DATA 4096
 #define IEC_FILES 16
 #define IEC_SOCKETS 64
+#define IEC_COMS 8
 #define APP_POWER_FAIL 1
 #define IEC_TASK_CALLS 1
 #define TRACE_BUFFER (4 * 1024 * 1024)

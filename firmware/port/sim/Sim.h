@@ -142,6 +142,12 @@ RTS_RESULT SimGetFile(RTS_UI32 index, char name[36], RTS_UI32 *size);
 /* Reads all of a file. ERR_NO_OBJECT; ERR_SIZE_MISMATCH: it has another size. */
 RTS_RESULT SimReadFile(const char *name, RTS_UI8 *data, RTS_UI32 size);
 
+/* ---- serial ports of programs ---- */
+
+/* Bytes for the program, and from it, on port `number`, from 1 on: how many were taken, or there were. */
+RTS_UI32 SimComPutPort(RTS_UI32 number, const RTS_UI8 *data, RTS_UI32 size);
+RTS_UI32 SimComGetPort(RTS_UI32 number, RTS_UI8 *data, RTS_UI32 size);
+
 /* ---- network ---- */
 
 enum { SIM_NET_DATA = 2048 };

@@ -1,5 +1,5 @@
 /*
- * SimCom.c - serial line 0: two queues of bytes. All other lines are of field buses (SimBus).
+ * SimCom.c - serial line 0 and the ports of programs: two queues of bytes each. All other lines are of field buses (SimBus).
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -14,11 +14,16 @@ typedef struct {
     RTS_UI32 count;
 } QUEUE;
 
-static struct {
+typedef struct {
     QUEUE to_device;
     QUEUE from_device;
     bool open;
-} line;
+} LINE;
+
+enum { FIRST_PORT = 0x10000 }; /* past the lines of buses */
+
+static LINE line;
+static LINE ports[IEC_COMS];
 
 static RTS_UI32 put(QUEUE *queue, const RTS_UI8 *data, RTS_UI32 size)
 {
@@ -46,7 +51,51 @@ void SimComPowerOn(void)
     line.to_device.count = 0;
     line.from_device.count = 0;
     line.open = false;
+    for (RTS_UI32 i = 0; i < IEC_COMS; i++) {
+        ports[i].to_device.count = 0;
+        ports[i].from_device.count = 0;
+        ports[i].open = false;
+    }
 }
+
+/* ---- ports of programs ---- */
+
+static LINE *find_port(RTS_UI32 index)
+{
+    return index >= FIRST_PORT && index - FIRST_PORT < IEC_COMS ? &ports[index - FIRST_PORT] : NULL;
+}
+
+/* What comes while the program has not opened it is lost. */
+RTS_UI32 SimComPutPort(RTS_UI32 number, const RTS_UI8 *data, RTS_UI32 size)
+{
+    LINE *port = find_port(FIRST_PORT + number - 1);
+
+    return port != NULL && port->open ? put(&port->to_device, data, size) : 0;
+}
+
+RTS_UI32 SimComGetPort(RTS_UI32 number, RTS_UI8 *data, RTS_UI32 size)
+{
+    LINE *port = find_port(FIRST_PORT + number - 1);
+
+    return port != NULL ? get(&port->from_device, data, size) : 0;
+}
+
+RTS_RESULT SysComOpenProgram(RTS_UI32 number, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)
+{
+    LINE *port = number <= IEC_COMS ? find_port(FIRST_PORT + number - 1) : NULL;
+
+    RTS_UNUSED(settings);
+    if (port == NULL)
+        return ERR_NO_OBJECT;
+    if (port->open)
+        return ERR_DUPLICATE;
+    port->open = true;
+    port->to_device.count = 0;
+    *index = FIRST_PORT + number - 1;
+    return ERR_OK;
+}
+
+/* ---- SysCom.h ---- */
 
 RTS_UI32 SimComPut(const RTS_UI8 *data, RTS_UI32 size)
 {
@@ -73,7 +122,7 @@ RTS_RESULT SysComOpen(RTS_UI32 index)
 
 static bool is_of_bus(RTS_UI32 index)
 {
-    return index != 0 && SimBus != NULL;
+    return index != 0 && index < FIRST_PORT && SimBus != NULL;
 }
 
 void SysComClose(RTS_UI32 index)
@@ -82,12 +131,16 @@ void SysComClose(RTS_UI32 index)
         SimBus->close(index);
     else if (index == 0)
         line.open = false;
+    else if (find_port(index) != NULL)
+        find_port(index)->open = false;
 }
 
 RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
 {
     if (is_of_bus(index))
         return SimBus->read(index, data, size);
+    if (find_port(index) != NULL)
+        return get(&find_port(index)->to_device, data, size);
     return index == 0 && line.open ? get(&line.to_device, data, size) : 0;
 }
 
@@ -95,6 +148,8 @@ RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
 {
     if (is_of_bus(index))
         return SimBus->write(index, data, size);
+    if (find_port(index) != NULL)
+        return put(&find_port(index)->from_device, data, size);
     return index == 0 && line.open ? put(&line.from_device, data, size) : 0;
 }
 

@@ -20,6 +20,7 @@
 #define HAS_CmpAppCalls 1
 #define HAS_IecFile 1
 #define HAS_IecSocket 1
+#define HAS_IecCom 1
 #define HAS_IecClock 1
 #define HAS_IecTaskCalls 1
 #define HAS_CmpTraceMgr 1

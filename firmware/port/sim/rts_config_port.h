@@ -41,6 +41,7 @@
 #define APP_CALL_DATA 2048
 #define IEC_FILES 16
 #define IEC_SOCKETS 64
+#define IEC_COMS 8
 #define APP_POWER_FAIL 1
 #define IEC_TASK_CALLS 1
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */

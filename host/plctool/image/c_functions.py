@@ -36,6 +36,8 @@ _FUNCTIONS = {
     "IecSocket": """
         socket_call(UDINT,UDINT,UDINT):DINT                 80   112
         socket_session():UDINT                              16    16""",
+    "IecCom": """
+        com_call(UDINT,UDINT,UDINT):DINT                    80   112""",
     "IecCan": """
         can_send(USINT,DWORD,USINT,USINT,LWORD):DINT            160   208
         can_sent(DINT):DINT                                     64   80

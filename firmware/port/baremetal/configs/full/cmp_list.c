@@ -21,6 +21,7 @@
 #define HAS_CmpAppCalls (APP_CALLS > 0)
 #define HAS_IecFile (IEC_FILES > 0)
 #define HAS_IecSocket (APP_CALLS > 0)
+#define HAS_IecCom (APP_CALLS > 0)
 #define HAS_CmpAppBP (BP_MAX > 0)
 #define HAS_IecClock (APP_CALLS > 0)
 #define HAS_IecTaskCalls IEC_TASK_CALLS
