@@ -119,3 +119,24 @@ def test_program_reads_writes_and_commands_a_foreign_node(hub: CanHub, plc: Plc)
         foreign.node.emcy.send(0x8130, 0x11, b"\1\2\3\4\5")
         assert do(plc, "emcy") == (True, 0)
         assert (plc.read("Main.emcy.DEVICE"), plc.read("Main.emcy.ERRORINFO.EMCY_ERROR_CODE")) == (NODE, 0x8130)
+
+
+def test_tool_reads_and_writes_objects_of_a_node_through_the_controller(hub: CanHub, plc: Plc, tool: Any) -> None:
+    link = ("--can", f"slcan:{hub.paths[1]}", "--node", "5")
+    plc.close()
+    with ForeignNode(hub.paths[2]) as foreign:
+        eventually(lambda: foreign.node.nmt.state == "OPERATIONAL")
+        read = tool("io", "param", "get", "Valves", "2001:00", *link)
+        assert (read.status, read.out.strip()) == (0, "Valves 2001:00 = 700"), read.err
+        text = tool("io", "param", "get", "Valves", "2000:00", "--type", "STRING[40]", *link)
+        assert "press twenty-five" in text.out, text.err
+        written = tool("io", "param", "set", "Valves", "2001:00=650", "--type", "UINT", *link)
+        assert (written.status, foreign.node.sdo[0x2001].raw) == (0, 650), written.err
+        for arguments, message in (
+            (("set", "Valves", "2001:00=650"), "give its type, for example --type UINT"),
+            (("get", "Valves", "5555:00"), "the device refuses; the log has its reason"),
+            (("get", "Valves", "2001:00", "--type", "BYTE"), "it has another length"),
+        ):
+            refused = tool("io", "param", *arguments, *link)
+            assert refused.status != 0
+            assert message in refused.err

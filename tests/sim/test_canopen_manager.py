@@ -16,11 +16,20 @@ from canopen_programs import OTHERS, write_program
 from plctool.compiler.syntax.diagnostics import CompileError
 from plctool.errors import UsageError
 from plctool.iec.types import UDINT
+from plctool.io.canopen import manager
 from plctool.sim import Simulator
 
 NMT, SDO, HEARTBEAT = 0x000, 0x600, 0x700
 RESERVED = 0x202
 EMERGENCIES = 0x8005
+REFUSED = """
+[[canopen.device]]
+name = "Refused"
+node = 12
+eds = "valves.eds"
+optional = true
+set = { "2001" = 5 }
+"""
 BOOT_MS = 400  # for all nodes to be in operation
 
 
@@ -258,3 +267,16 @@ def test_mistakes_about_objects_are_reported(tmp_path: Path, old: str, new: str,
     description.write_text(text.replace(old, new, 1))
     with pytest.raises((CompileError, UsageError), match=message):
         Simulator.from_sources(path)
+
+
+def test_optional_node_that_is_refused_is_not_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = manager.concise_dcf
+    of_refused = (0x2001, 0, b"\x05\x00")
+    monkeypatch.setattr(manager, "concise_dcf", lambda writes: made(writes)[: -1 if of_refused in writes else None])
+    path = write_program(tmp_path, others=REFUSED)
+    with Simulator.from_sources(path) as plc:
+        plc.run_for(5000)
+        assert in_operation(plc, "Valves")
+        assert not plc.read("Refused.ok")
+        assert [f for f in plc.can_receive() if f.id == SDO + 12 or f.data == b"\x82\x0c"] == []
+        assert any("its concise DCF is damaged" in entry.text for entry in plc.log())

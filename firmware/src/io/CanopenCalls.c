@@ -8,7 +8,8 @@
 #include <string.h>
 
 #include "AppState.h"
-#include "CmpItf.h"
+#include "CmpIoMgrEmbedded.h"
+#include "CmpLog.h"
 #include "SysAtomic.h"
 #include "SysTime.h"
 
@@ -24,6 +25,7 @@ enum {
     AGAIN_MS = 10,                /* for one that waits for the transfer of another */
     DEFAULT_TIMEOUT_MS = 1000,
     ABANDONED_MS = 60000,
+    TOOL_MS = 5000, /* so long a tool may take to ask again */
 };
 
 /* Values of CIA405_CANOPEN_KERNEL_ERROR. */
@@ -100,12 +102,13 @@ static struct {
     RTS_UI32 lost[CAN_CONTROLLERS]; /* an emergency had no room, and no block knows */
     EMERGENCY emergencies[CAN_CONTROLLERS][EMERGENCIES];
     QUIET quiet[CAN_CONTROLLERS][NODES];
-    CALL calls[CANOPEN_MAX_CALLS];
+    CALL calls[CANOPEN_MAX_CALLS + 1]; /* the last one is that of tools */
 } all;
 
 static RTS_UI32 taken; /* slots ever */
 
-#define FOR_EACH_CALL(call) for (CALL *call = all.calls; call < all.calls + CANOPEN_MAX_CALLS; call++)
+#define TOOL (all.calls + CANOPEN_MAX_CALLS)
+#define FOR_EACH_CALL(call) for (CALL *call = all.calls; call <= TOOL; call++)
 
 static RTS_I32 new_number(const CALL *call)
 {
@@ -150,9 +153,9 @@ static RTS_I32 check(RTS_UI32 network, RTS_UI8 node, RTS_UI8 kind, RTS_UI32 size
 
 static CALL *find_free(void)
 {
-    FOR_EACH_CALL(call)
-    if (SysAtomicReplace(&call->state, SLOT_FREE, SLOT_TAKEN))
-        return call;
+    for (CALL *call = all.calls; call < TOOL; call++)
+        if (SysAtomicReplace(&call->state, SLOT_FREE, SLOT_TAKEN))
+            return call;
     return NULL;
 }
 
@@ -590,7 +593,8 @@ void CanopenCallsPoll(bool is_running, RTS_UI32 now_ms)
         forget_emergencies();
     FOR_EACH_CALL(call)
     {
-        free_abandoned(call, is_running, now_ms);
+        if (call != TOOL)
+            free_abandoned(call, is_running, now_ms);
         run(call, now_ms);
     }
     for (RTS_UI32 i = 0; i < all.setup->device_count; i++)
@@ -602,6 +606,105 @@ void CanopenCallsPoll(bool is_running, RTS_UI32 now_ms)
             device->node.is_asked_elsewhere = true;
     }
 }
+
+/* ---- tools ---- */
+
+static bool is_same(const CALL *call, const CALL *other)
+{
+    return is_same_node(call, other->network, other->node) && call->index == other->index && call->sub == other->sub &&
+           call->kind == other->kind && call->size == other->size && memcmp(call->data, other->data, other->size) == 0;
+}
+
+/* Begins what a tool asks for; true: it has ended. */
+static bool ask(const CALL *wanted, RTS_RESULT *result)
+{
+    RTS_UI32 now_ms = SysTimeGetMs();
+    bool is_known = TOOL->state != SLOT_FREE && is_same(TOOL, wanted);
+
+    *result = ERR_PENDING;
+    if (TOOL->state == SLOT_ENDED && is_known && now_ms - TOOL->since_ms < TOOL_MS)
+        return true;
+    if (TOOL->state == SLOT_FREE || TOOL->state == SLOT_ENDED) {
+        *TOOL = *wanted;
+        TOOL->state = SLOT_WAITS;
+        TOOL->sequence = SysAtomicAdd(&all.sequence, 1);
+        TOOL->since_ms = now_ms;
+    } else if (!is_known) {
+        *result = ERR_NOBUFFER;
+    }
+    return false;
+}
+
+/* What has become of it. */
+static RTS_RESULT answer(CANOPEN_DEVICE *device)
+{
+    TOOL->state = SLOT_FREE;
+    if (TOOL->result > 0)
+        return ERR_OK;
+    if (TOOL->result == -KERNEL_OVERFLOW)
+        return ERR_OUT_OF_LIMITS;
+    if (TOOL->result != -KERNEL_OTHER)
+        return ERR_TIMEOUT;
+    device->node.counters.aborts++;
+    device->node.counters.last_abort = TOOL->sdo.abort;
+    LogAdd(CMPID_IoDrvCanopen, LOG_WARNING, ERR_DEVICE, "%s refuses 0x%X:0x%X, 0x%X",
+           IoMgrConfigGetName(device->connector), (unsigned)TOOL->index, (unsigned)TOOL->sub,
+           (unsigned)TOOL->sdo.abort);
+    return ERR_DEVICE;
+}
+
+static RTS_UI8 network_of(const CANOPEN_DEVICE *device)
+{
+    RTS_UI8 network = 0;
+
+    while (all.setup->lines[network].by_node[device->node.node] != device)
+        network++; /* one of them has it: it is used */
+    return network;
+}
+
+static CALL describe(const CANOPEN_DEVICE *device, RTS_UI32 id, RTS_UI8 kind)
+{
+    return (CALL){.network = network_of(device),
+                  .node = device->node.node,
+                  .index = (RTS_UI16)(id >> 8),
+                  .sub = (RTS_UI8)id,
+                  .kind = kind};
+}
+
+RTS_RESULT CanopenCallsRead(CANOPEN_DEVICE *device, RTS_UI32 id, void *data, RTS_UI32 bits)
+{
+    RTS_RESULT result;
+
+    if (id >> 24 != 0 || !device->used)
+        return ERR_NO_OBJECT;
+    CALL wanted = describe(device, id, KIND_READ);
+    if (!ask(&wanted, &result))
+        return result;
+    result = answer(device);
+    if (result == ERR_OK && TOOL->sdo.done > bits / 8)
+        return ERR_OUT_OF_LIMITS;
+    if (result == ERR_OK) {
+        memset(data, 0, (bits + 7) / 8);
+        memcpy(data, TOOL->data, TOOL->sdo.done);
+    }
+    return result;
+}
+
+RTS_RESULT CanopenCallsWrite(CANOPEN_DEVICE *device, RTS_UI32 id, const void *data, RTS_UI32 bits)
+{
+    RTS_RESULT result;
+
+    if (id >> 24 != 0 || !device->used)
+        return ERR_NO_OBJECT;
+    CALL wanted = describe(device, id, KIND_WRITE);
+    if (bits == 0 || bits % 8 != 0 || bits / 8 > sizeof(wanted.data))
+        return ERR_OUT_OF_LIMITS;
+    wanted.size = bits / 8;
+    memcpy(wanted.data, data, wanted.size);
+    return ask(&wanted, &result) ? answer(device) : result;
+}
+
+/* ---- time ---- */
 
 static RTS_UI32 wait_of(const CALL *call, RTS_UI32 now_ms)
 {
@@ -633,6 +736,24 @@ RTS_UI32 CanopenCallsGetWaitMs(RTS_UI32 now_ms)
     return wait_ms;
 }
 #else
+RTS_RESULT CanopenCallsRead(CANOPEN_DEVICE *device, RTS_UI32 id, void *data, RTS_UI32 bits)
+{
+    RTS_UNUSED(device);
+    RTS_UNUSED(id);
+    RTS_UNUSED(data);
+    RTS_UNUSED(bits);
+    return ERR_NOT_SUPPORTED;
+}
+
+RTS_RESULT CanopenCallsWrite(CANOPEN_DEVICE *device, RTS_UI32 id, const void *data, RTS_UI32 bits)
+{
+    RTS_UNUSED(device);
+    RTS_UNUSED(id);
+    RTS_UNUSED(data);
+    RTS_UNUSED(bits);
+    return ERR_NOT_SUPPORTED;
+}
+
 RTS_RESULT CanopenCallsRegister(void)
 {
     return ERR_OK;

@@ -25,6 +25,12 @@ bool CanopenCallsTake(RTS_UI32 network, const CAN_FRAME *frame, RTS_UI32 now_ms)
 /* In main, in each pass, before the nodes. */
 void CanopenCallsPoll(bool is_running, RTS_UI32 now_ms);
 
+/* From main, again and again while the result is ERR_PENDING: reads or writes an object of a node for a tool. ERR_TIMEOUT:
+ * no reply; ERR_DEVICE: refused, the log has the abort code; ERR_OUT_OF_LIMITS: it has more bits; ERR_NOBUFFER: another
+ * tool is at it. */
+RTS_RESULT CanopenCallsRead(CANOPEN_DEVICE *device, RTS_UI32 id, void *data, RTS_UI32 bits);
+RTS_RESULT CanopenCallsWrite(CANOPEN_DEVICE *device, RTS_UI32 id, const void *data, RTS_UI32 bits);
+
 /* How long it is until a transfer has something to do without a frame [ms]; UINT32_MAX: never. */
 RTS_UI32 CanopenCallsGetWaitMs(RTS_UI32 now_ms);
 

@@ -30,6 +30,7 @@ typedef struct {
 
 typedef struct {
     const IoConfigConnector *connector;
+    bool used; /* it was not refused */
     CANOPEN_NODE node;
     CANOPEN_PDO_STATE *pdos;
     RTS_UI32 pdo_count;

@@ -36,8 +36,9 @@ static const CAN_FILTER filters[] = {{0, 0, false}}; /* all frames of 11 bits */
 #define FOR_EACH_LINE(line)                                                              \
     for (CANOPEN_LINE *line = setup.lines; line < setup.lines + CAN_CONTROLLERS; line++) \
         if (line->connector != NULL)
-#define FOR_EACH_DEVICE(line, device) \
-    for (CANOPEN_DEVICE *device = (line)->devices; device < (line)->devices + (line)->device_count; device++)
+#define FOR_EACH_DEVICE(line, device)                                                                         \
+    for (CANOPEN_DEVICE *device = (line)->devices; device < (line)->devices + (line)->device_count; device++) \
+        if (device->used)
 
 CANOPEN_SETUP *IoDrvCanopenGetSetup(void)
 {
@@ -161,6 +162,16 @@ static RTS_RESULT attach(CANOPEN_LINE *line)
     return ERR_OK;
 }
 
+/* An optional node that was refused is not started. */
+static void leave_out_refused(CANOPEN_LINE *line)
+{
+    for (CANOPEN_DEVICE *device = line->devices; device < line->devices + line->device_count; device++) {
+        device->used = IoMgrConfigIsMine(device->connector, &driver);
+        if (!device->used)
+            line->by_node[device->node.node] = NULL;
+    }
+}
+
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
     RTS_RESULT result = CanopenSetUp(&setup, &driver);
@@ -168,8 +179,10 @@ static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
     if (result == ERR_OK)
         result = IoMgrConfigEachChannel(task_maps, count, &driver, check_channel);
     FOR_EACH_LINE (line)
-        if (result == ERR_OK)
+        if (result == ERR_OK) {
+            leave_out_refused(line);
             result = attach(line);
+        }
     is_running = result == ERR_OK;
     return result;
 }
@@ -438,11 +451,11 @@ static void note_bus(CANOPEN_LINE *line, RTS_UI32 now_ms)
     bool off = state.bus == CAN_BUS_OFF || state.bus == CAN_BUS_STOPPED;
     if (off && !line->was_off)
         IoMgrConfigSetDiagnosis(line->connector, CF_CONNECTOR_BUS_ERROR);
-    if (off)
-        FOR_EACH_DEVICE (line, device)
-            CanopenNodeLose(&device->node, MASTER_WHY_BUS, now_ms);
-    else
+    if (!off)
         IoMgrConfigNoteData(line->connector);
+    FOR_EACH_DEVICE (line, device)
+        if (off)
+            CanopenNodeLose(&device->node, MASTER_WHY_BUS, now_ms);
     line->was_off = off;
     line->is_passive = state.bus == CAN_BUS_PASSIVE;
 }
@@ -509,10 +522,12 @@ static void cycle(void)
 static RTS_RESULT read_parameter(const IoConfigConnector *connector, RTS_UI32 id, void *data, RTS_UI32 bits,
                                  RTS_UI32 bit_offset)
 {
-    const CANOPEN_DEVICE *device = CanopenFindDevice(&setup, connector);
+    CANOPEN_DEVICE *device = CanopenFindDevice(&setup, connector);
     RTS_UI32 index = id - CANOPEN_PARAM_BOOTS;
     RTS_UI32 value;
 
+    if (device != NULL && id >= CANOPEN_PARAM_OBJECT && bit_offset == 0)
+        return CanopenCallsRead(device, id, data, bits);
     if (device == NULL || (index >= sizeof(CANOPEN_COUNTERS) / sizeof(value) && id != CANOPEN_PARAM_STATE))
         return ERR_NO_OBJECT;
     if (bit_offset != 0 || bits != 8 * sizeof(value))
@@ -522,6 +537,16 @@ static RTS_RESULT read_parameter(const IoConfigConnector *connector, RTS_UI32 id
         memcpy(&value, (const RTS_UI8 *)&device->node.counters + index * sizeof(value), sizeof(value));
     memcpy(data, &value, sizeof(value));
     return ERR_OK;
+}
+
+static RTS_RESULT write_parameter(const IoConfigConnector *connector, RTS_UI32 id, const void *data, RTS_UI32 bits,
+                                  RTS_UI32 bit_offset)
+{
+    CANOPEN_DEVICE *device = CanopenFindDevice(&setup, connector);
+
+    if (device == NULL || id < CANOPEN_PARAM_OBJECT || bit_offset != 0)
+        return ERR_NO_OBJECT;
+    return CanopenCallsWrite(device, id, data, bits);
 }
 
 /* ---- life ---- */
@@ -534,6 +559,7 @@ static const ICmpIoDrv functions = {
     .IoDrvWriteOutputs = write_outputs,
     .IoDrvStartBusCycle = start_bus_cycle,
     .IoDrvReadParameter = read_parameter,
+    .IoDrvWriteParameter = write_parameter,
     .IoDrvExplainLoss = explain_loss,
 };
 

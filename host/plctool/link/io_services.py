@@ -16,6 +16,8 @@ NO_PARENT = int(lib.IO_CONFIG_NONE)
 NEVER_MS = 0xFFFF_FFFF  # age of data that never came, or longer ago
 _PENDING_POLL = 0.1  # s
 _PENDING_LIMIT = 600.0  # s that a scan may take to go on: 247 silent units of a Modbus gateway
+_ANSWER_POLL = 0.02  # s
+_ANSWER_LIMIT = 40.0  # s that a parameter may take: a node is waited for, then it has up to 30 s
 _MOST_MODULES = 1000  # on one bus; a Modbus line has 247
 
 _STATE = Layout("IO_STATE")
@@ -88,7 +90,7 @@ def _list_from(session: Session, start: int) -> list[IoDevice]:
 def read_parameter(session: Session, connector: int, number: int, bits: int) -> bytes:
     """The first `bits` of a parameter. Raises DeviceError if there is none, or its driver does not let it be read."""
     place = _PARAMETER.pack(connector=connector, id=number, bits=bits)
-    tags = _call(session, lib.SRV_IO_READ_PARAMETER, bintag.raw(lib.TAG_IO_PARAMETER, place))
+    tags = _answered(session, lib.SRV_IO_READ_PARAMETER, bintag.raw(lib.TAG_IO_PARAMETER, place))
     _check(tags, f"reading of parameter {number}")
     size = -(-bits // 8)
     return tags.bytes(lib.TAG_IO_DATA, size)[:size]
@@ -98,7 +100,17 @@ def write_parameter(session: Session, connector: int, number: int, bits: int, da
     """Sets the first `bits` of a parameter."""
     place = _PARAMETER.pack(connector=connector, id=number, bits=bits)
     content = (bintag.raw(lib.TAG_IO_PARAMETER, place), bintag.raw(lib.TAG_IO_DATA, data))
-    _check(_call(session, lib.SRV_IO_WRITE_PARAMETER, *content), f"writing of parameter {number}")
+    _check(_answered(session, lib.SRV_IO_WRITE_PARAMETER, *content), f"writing of parameter {number}")
+
+
+def _answered(session: Session, service: int, *tags: bintag.Tag) -> bintag.Tags:
+    """The reply; one that the device on the bus has to give first is asked for again and again."""
+    deadline = time.monotonic() + _ANSWER_LIMIT
+    while True:
+        reply = _call(session, service, *tags)
+        if reply.u16(lib.TAG_IO_RESULT) != lib.ERR_PENDING or time.monotonic() >= deadline:
+            return reply
+        time.sleep(_ANSWER_POLL)
 
 
 def identify(session: Session, connector: int) -> None:
@@ -151,6 +163,10 @@ _ADVICE = {
     "ERR_INVALIDID": "there is no such device any more",
     "ERR_NO_OBJECT": "it has no driver, or no such parameter",
     "ERR_NOT_SUPPORTED": "its driver does not do that",
+    "ERR_DEVICE": "the device refuses; the log has its reason",
+    "ERR_OUT_OF_LIMITS": "it has another length; give its type by --type",
+    "ERR_TIMEOUT": "the device on the bus does not reply",
+    "ERR_NOBUFFER": "another tool is asking a device, try again",
     "ERR_PENDING": "the device has not answered yet, try again",
 }
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from plctool.iec.types import Type
 
 _LAST_PARAMETER = 0xFFFF_FFFF
+_OBJECT = re.compile(r"([0-9A-F]{4}):([0-9A-F]{1,2})", re.ASCII | re.IGNORECASE)
 _STRING = re.compile(r"STRING\[([1-9]\d?|1\d\d|2[0-4]\d|25[0-5])\]", re.ASCII)
 
 
@@ -45,7 +46,9 @@ def io_arguments(command: Parser) -> None:
     param = action("param", "read or set a parameter of a device, until the program is loaded again", _param)
     param.add_argument("verb", choices=["get", "set"], metavar="get|set")
     param.add_argument("io_device", type=utf8, metavar="DEVICE", help="its name in 'plctool io status'")
-    param.add_argument("parameter", type=utf8, metavar="NAME|ID[=VALUE]", help="set: with its value")
+    param.add_argument(
+        "parameter", type=utf8, metavar="NAME|ID[=VALUE]", help="set: with its value; INDEX:SUB of a CANopen node"
+    )
     param.add_argument("--type", metavar="TYPE", help="of one that the description does not have; default: UDINT")
     add_link(param, symbols=True)
 
@@ -145,10 +148,19 @@ def parameter(plc: Plc, device: str, parameter: str, type_name: str | None, text
     from plctool.iec.value_texts import literal, parse_value
 
     number, t = _parameter(plc, device, parameter, type_name)
+    if text is not None and type_name is None and _object(parameter):
+        message = f"The node needs the length of {parameter}: give its type, for example --type UINT."
+        raise UsageError(message, "bad-type")
     if text is not None:
         plc.io_write_parameter(device, number, t, parse_value(t, text))
     value = plc.io_read_parameter(device, number, t)
     return {"device": device, "parameter": parameter, "id": number, "value": value, "text": literal(t, value)}
+
+
+def _object(parameter: str) -> int | None:
+    """The parameter that an object of a CANopen node is, `6041:00`; None for other parameters."""
+    match = _OBJECT.fullmatch(parameter)
+    return None if match is None else int(match[1], 16) << 8 | int(match[2], 16)
 
 
 def _parameter(plc: Plc, device: str, parameter: str, type_name: str | None) -> tuple[int, Type]:
@@ -161,7 +173,7 @@ def _parameter(plc: Plc, device: str, parameter: str, type_name: str | None) -> 
         known = next((d["parameters"] for d in devices if d["name"].casefold() == device.casefold()), [])
     number = None
     with suppress(ValueError):
-        number = int(parameter, 0)
+        number = _object(parameter) or int(parameter, 0)
     found = next((p for p in known if p["id"] == number or p["name"].casefold() == parameter.casefold()), None)
     if number is not None and not 0 <= number <= _LAST_PARAMETER:
         raise UsageError(f"{parameter} is not the number of a parameter; they are of 32 bits.", "unknown-parameter")
