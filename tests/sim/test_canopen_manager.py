@@ -280,3 +280,62 @@ def test_optional_node_that_is_refused_is_not_started(tmp_path: Path, monkeypatc
         assert not plc.read("Refused.ok")
         assert [f for f in plc.can_receive() if f.id == SDO + 12 or f.data == b"\x82\x0c"] == []
         assert any("its concise DCF is damaged" in entry.text for entry in plc.log())
+
+
+SUB = "[{index:04X}sub{sub}]\nParameterName=x\nDataType=0x{type:04X}\nAccessType={access}\n{more}\n"
+
+
+def with_more_pdos(text: str, count: int) -> str:
+    """valves.eds with `count` TPDOs, and three more inputs of 64 bits."""
+    added = []
+    for n in range(1, count):
+        added.append(f"[{0x1800 + n:04X}]\nParameterName=x\nObjectType=0x9\nSubNumber=3\n\n")
+        for sub, kind, value in ((0, 5, "5"), (1, 7, f"$NODEID+0x{0x80000180 + n:X}"), (2, 5, "255"), (5, 6, "0")):
+            access, more = "rw" if sub else "const", f"DefaultValue={value}\n"
+            added.append(SUB.format(index=0x1800 + n, sub=sub, type=kind, access=access, more=more))
+        added.append(f"[{0x1A00 + n:04X}]\nParameterName=x\nObjectType=0x9\nSubNumber=2\n\n")
+        for sub, kind in ((0, 5), (1, 7)):
+            added.append(SUB.format(index=0x1A00 + n, sub=sub, type=kind, access="rw", more="DefaultValue=0\n"))
+    added.append(f"[6444]\nParameterName=x\nObjectType=0x8\nSubNumber={count + 4}\n\n")
+    added.append(SUB.format(index=0x6444, sub=0, type=5, access="const", more=f"DefaultValue={count + 3}\n"))
+    for sub in range(1, count + 4):
+        added.append(SUB.format(index=0x6444, sub=f"{sub:X}", type=0x1B, access="ro", more="PDOMapping=1\n"))
+    listed = [*(0x1800 + n for n in range(1, count)), *(0x1A00 + n for n in range(1, count)), 0x6444]
+    text = text.replace(
+        "[OptionalObjects]\nSupportedObjects=11", f"[OptionalObjects]\nSupportedObjects={11 + len(listed)}"
+    )
+    lines = "".join(f"{12 + i}=0x{index:04X}\n" for i, index in enumerate(listed))
+    return text.replace("11=0x6401\n", "11=0x6401\n" + lines) + "\n" + "".join(added)
+
+
+def of_many_pdos(folder: Path, count: int, inputs: int) -> Path:
+    names = [f"big{n}" for n in range(1, inputs + 1)]
+    source = (
+        f"PROGRAM Main VAR {', '.join(names)} : ULINT; sum : ULINT; END_VAR\nsum := {' + '.join(names)};\nEND_PROGRAM"
+    )
+    path = write_program(folder, source=source)
+    eds = folder / "valves.eds"
+    eds.write_text(with_more_pdos(eds.read_text(), count))
+    channels = ", ".join(f'"6444:{n:02X}" = "Main.big{n}"' for n in range(1, inputs + 1))
+    node = f'[[canopen.device]]\nname = "Valves"\nnode = 9\neds = "valves.eds"\nin = {{ {channels} }}\n'
+    (folder / "app.io.toml").write_text('[[canopen]]\nname = "Bus"\nnode = 127\n' + node)
+    return path
+
+
+def test_node_may_have_more_than_four_pdos_in_a_direction(tmp_path: Path) -> None:
+    with Simulator.from_sources(of_many_pdos(tmp_path, 8, 6)) as plc:
+        plc.run_for(BOOT_MS)
+        assert in_operation(plc, "Valves")
+        off = [index for index, sub in written(plc, 9) if sub == 1 and 0x1806 <= index <= 0x1807]
+        assert off == []  # they are off in the node
+        for n in range(1, 7):
+            plc.set_input(f"Main.big{n}", 10**n)
+        plc.run_for(50)
+        assert plc.read("Main.sum") == 1_111_110
+        sent = {f.id for f in plc.can_receive() if len(f.data) == 8 and (f.id & 0x780 < 0x580 or 0x680 <= f.id < 0x6E0)}
+        assert sent == {0x189, 0x289, 0x389, 0x489, 0x6DF, 0x6DE}
+
+
+def test_more_inputs_than_a_node_has_pdos_for_are_reported(tmp_path: Path) -> None:
+    with pytest.raises(CompileError, match="Valves has 5 PDOs for inputs, which have no room for 6444:06"):
+        Simulator.from_sources(of_many_pdos(tmp_path, 5, 6))

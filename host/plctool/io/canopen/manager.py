@@ -30,7 +30,7 @@ from plctool.iec.types import BYTE, LREAL, REAL, UDINT, ArrayType, Type
 from plctool.io.canopen.data_types import Value
 from plctool.io.canopen.eds import WRITABLE, Eds, load_eds
 from plctool.io.canopen.eds import Entry as EdsEntry
-from plctool.io.canopen.pdo_layout import Direction, Item, Layout, lay_out
+from plctool.io.canopen.pdo_layout import FREE_COBS, Direction, Item, Layout, lay_out
 from plctool.io.channels import channel_of
 from plctool.io.common import read_connector
 from plctool.io.mistakes import Mistakes
@@ -57,6 +57,7 @@ class CanopenLine(Connector):
     node: int = 0
     sync: bool = False
     nodes: dict[int, str] = field(default_factory=dict)
+    free_cobs: list[int] = field(default_factory=lambda: list(FREE_COBS))
 
 
 @dataclass(eq=False)
@@ -127,7 +128,7 @@ def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
         made.writes.append((_HEARTBEAT, 0, (heartbeat // 1000).to_bytes(2, "little")))
     if settings is not None:
         made.writes += _settings(settings, eds, table.mistakes)
-    _add_pdos(made, eds, channels, table, bool(synchronous), every)
+    _add_pdos(made, eds, channels, table, line, bool(synchronous), every)
     made.add_bytes(int(lib.CANOPEN_PARAM_CONFIG), concise_dcf(made.writes), "config")
     made.parameters.sort(key=lambda p: p.id)
     return made
@@ -242,18 +243,22 @@ def _add_pdos(
     eds: Eds,
     channels: list[tuple[Entry, bool]],
     table: Table,
+    line: CanopenLine,
     synchronous: bool,
     every_us: int | None,
 ) -> None:
     for direction in Direction:
         output = direction is Direction.TO_NODE
         items = _items([entry for entry, is_output in channels if is_output is output], output, eds, table.mistakes)
-        layout = lay_out(items, direction, made.node, eds)
+        layout = lay_out(items, direction, made.node, eds, line.free_cobs)
         if layout.missing:
-            table.error(
+            what = (
                 f"{made.name} has {len(layout.available)} PDOs for {'outputs' if output else 'inputs'}, which have no"
-                f" room for {layout.missing[0].entry.place}; name fewer objects"
             )
+            if len(layout.pdos) < len(layout.available):
+                free = f"0x{FREE_COBS[-1]:X} to 0x{FREE_COBS[0]:X}"
+                what = f"the identifiers {free}, for more than four PDOs of a node, have no"
+            table.error(f"{what} room for {layout.missing[0].entry.place}; name fewer objects")
         every_ms = (every_us or 0) // 1000
         kind = _ON_SYNC if synchronous else _ON_CHANGE
         made.writes += layout.writes(kind, 0 if output else every_ms, eds)

@@ -12,6 +12,7 @@ from plctool.io.model import Channel
 _MAPPING = 0x200  # from the parameters of a PDO to its mapping
 _INVALID = 0x8000_0000
 _DEFAULT_PDOS = 4  # that have an identifier of their own by the number of the node
+FREE_COBS = range(0x6DF, 0x67F, -1)  # identifiers of CiA 301 that belong to no node, in the order of their use
 _COB, _KIND, _EVENT = 1, 2, 5  # sub-indices of the parameters
 
 
@@ -80,23 +81,32 @@ class Layout:
             if pdo is not None:
                 yield from _mapping(parameters, pdo, kind, event_ms, eds)
             elif _is_writable(eds, parameters, _COB):
-                default = eds.entry(parameters, _COB)
-                assert default is not None
-                cob = 0 if default.default is None else default.default.at(0)
-                yield parameters, _COB, _u32(_INVALID | (cob if isinstance(cob, int) else 0))
+                cob = _default_cob(eds, parameters)
+                if number < _DEFAULT_PDOS or not cob & _INVALID:
+                    yield parameters, _COB, _u32(_INVALID | cob)
 
 
-def lay_out(items: list[Item], direction: Direction, node: int, eds: Eds) -> Layout:
-    """Puts objects into the PDOs that a node has, the largest first, so that all but bits begin at a byte."""
+def _default_cob(eds: Eds, parameters: int) -> int:
+    default = eds.entry(parameters, _COB)
+    cob = default.default.at(0) if default is not None and default.default is not None else 0
+    return cob if isinstance(cob, int) else 0
+
+
+def lay_out(items: list[Item], direction: Direction, node: int, eds: Eds, free: list[int]) -> Layout:
+    """Puts objects into the PDOs that a node has, the largest first, so that all but bits begin at a byte. `free`:
+    identifiers for PDOs beyond the first four, of which those that are used are taken out."""
     first, cob = direction.value
-    available = [number for number in eds.pdos(first) if number < _DEFAULT_PDOS]
+    available = [n for n in eds.pdos(first) if n < _DEFAULT_PDOS or _is_writable(eds, first + n, _COB)]
     layout = Layout(direction, [], available, [])
     for item in sorted(items, key=lambda item: -item.bits):
         pdo = next((p for p in layout.pdos if p.bits + item.bits <= MAX_PDO_BITS), None)
         if pdo is None and len(layout.pdos) < len(available):
             number = available[len(layout.pdos)]
-            pdo = Pdo(number, cob + 0x100 * number + node)
-            layout.pdos.append(pdo)
+            if number < _DEFAULT_PDOS:
+                pdo = Pdo(number, cob + 0x100 * number + node)
+            elif free:
+                pdo = Pdo(number, free.pop(0))
+            layout.pdos += [] if pdo is None else [pdo]
         if pdo is None:
             layout.missing.append(item)
         else:
