@@ -71,10 +71,8 @@ static const char usage[] =
     "             [--udp ADDRESS[:PORT]] [--mdns] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
     "             [--tunnel PATH] [--tunnel-unit N] [--tunnel-baud N] [--tunnel-parity even|odd|none] "
     "[--tunnel-drive]\n"
-    "             [--board NAME] [--event NAME=PIPE]... [--dump FILE] [--metrics FILE] [--metrics-every SECONDS]
-"
-    "             [--config FILE] [--net ADDRESSES] [--com LINES] [--set-clock]
-"
+    "             [--board NAME] [--event NAME=PIPE]... [--dump FILE] [--metrics FILE] [--metrics-every SECONDS]\n"
+    "             [--config FILE] [--net ADDRESSES] [--com LINES] [--set-clock]\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
