@@ -5,8 +5,8 @@ from __future__ import annotations
 import random
 
 from plctool.core import lib
-from plctool.debug.breakpoints import DeviceCondition, Target
 from plctool.debug.forced import ForcedPlace
+from plctool.debug.target import DeviceCondition, Target
 
 CODE = 1 << 12  # offsets are below that, mostly in the code of the program
 

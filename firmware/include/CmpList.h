@@ -164,6 +164,9 @@ enum {
 #if HAS_IecTaskCalls
     CMP_ONE(IecTaskCalls)
 #endif
+#if HAS_IoDrvCanopen
+    CMP_ONE(IoDrvCanopen)
+#endif
 #if HAS_IoDrvModbus
     CMP_ONE(IoDrvModbus)
 #endif

@@ -43,8 +43,8 @@ enum {
     CANOPEN_PARAM_LAST_ABORT = 0x8004,
     CANOPEN_PARAM_EMCY = 0x8005,
     CANOPEN_PARAM_LAST_EMCY = 0x8006,
-    CANOPEN_PARAM_SHORT = 0x8007, /* PDOs that were shorter than their mapping, and not used */
-    CANOPEN_PARAM_STATE = 0x8008, /* of its last heartbeat */
+    CANOPEN_PARAM_SHORT = 0x8007,   /* PDOs that were shorter than their mapping, and not used */
+    CANOPEN_PARAM_STATE = 0x8008,   /* of its last heartbeat */
     CANOPEN_PARAM_OBJECT = 0x10000, /* from here on index << 8 + sub-index: an object of the node, by SDO */
 };
 

@@ -13,12 +13,13 @@ from typing import Any, cast
 from plctool.archives import MAX_BYTES, ArchiveError, inflate
 from plctool.controller import Closed, Controller, OtherTool
 from plctool.core import lib
-from plctool.debug.breakpoints import Debugger, DeviceCondition, Target
+from plctool.debug.breakpoints import Debugger
 from plctool.debug.forced import ForcedPlace, ForceList
 from plctool.debug.halted import BpStatus
 from plctool.debug.recording import Recording
 from plctool.debug.registers import Registers
 from plctool.debug.symbols import SymbolTable, load_symbols
+from plctool.debug.target import DeviceCondition, Target
 from plctool.debug.variables import Change, Reading, Symbol, unreachable
 from plctool.errors import DeviceError, LinkError, UsageError, did_you_mean
 from plctool.gateway.client import GatewayConnection, GatewaySession, connect_gateway

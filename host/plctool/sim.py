@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any, Protocol, SupportsFloat, SupportsIndex
 
 from plctool.controller import Closed, Controller
 from plctool.core import Core, error_name, give_back_core, lib, take_core
-from plctool.debug.breakpoints import Debugger, DeviceCondition, Target
+from plctool.debug.breakpoints import Debugger
 from plctool.debug.forced import ForcedPlace, ForceList
 from plctool.debug.halted import BpStatus
 from plctool.debug.recording import Recording
 from plctool.debug.symbols import SymbolTable, find_symbols
+from plctool.debug.target import DeviceCondition, Target
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Change, Symbol, unreachable
 from plctool.errors import DeviceError, UsageError

@@ -13,7 +13,7 @@ import pytest
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 BLANK = FIRMWARE / "port/baremetal/blank"
 ROOMS = {"CMP_EXT_TABLE_ROOM": "CMRegisterExternal", "SRV_GROUP_ROOM": "SrvRegisterGroup"}
-PARTS = {"ModbusCalls": "IoDrvModbus"}  # sources whose component has another name
+PARTS = {"CanopenCalls": "IoDrvCanopen", "ModbusCalls": "IoDrvModbus"}  # sources whose component has another name
 DEFINERS = ("CmpMgr", "CmpSrv")
 RUNTIME = "#define HAS_CmpLog 1\n#define HAS_COMMUNICATION 1\n#define HAS_CmpBlkDrvSimpleCom 1\n"
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from plctool import compiler
 from plctool.controller import Controller
+from plctool.dap.dump_target import DumpTarget
 from plctool.dap.test_runs import programs_of
 from plctool.debug.breakpoints import Debugger
-from plctool.debug.dump_target import DumpTarget
 from plctool.device import Plc, connect
 from plctool.dump_file import Dump, load
 from plctool.errors import UsageError

@@ -11,14 +11,14 @@ from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 from plctool.core import exception_name, lib
 from plctool.debug.expressions import NAME, check_expression
 from plctool.debug.forced import ForcedPlace, name_forced, place_of
-from plctool.debug.halted import BpStatus, Call, Halted, Memory
+from plctool.debug.halted import BpStatus, Call, Halted
 from plctool.debug.statements import CodeOfLine, Statements
 from plctool.debug.symbols import SymbolTable
+from plctool.debug.target import DeviceCondition, Target
 from plctool.debug.variables import Symbol
 from plctool.debug.watches import Changed, DataBreakpoint, Watches, check_watchable
 from plctool.errors import DeviceError, PlcError, UsageError
@@ -31,15 +31,6 @@ _RELATIONS = {
 _SIMPLE = re.compile(rf"\s*({NAME.pattern})\s*(<=|>=|<>|=|<|>)\s*([-\w.#:+']+)\s*")
 _SIZES = (1, 2, 4, 8)
 _SHORTEST = 1e-6  # time that passes [s]
-
-
-@dataclass(frozen=True)
-class DeviceCondition:
-    """What the controller compares itself: a place, with the value in it, and BP_EQUAL .."""
-
-    place: ForcedPlace
-    relation: int
-    kind: int
 
 
 @dataclass(frozen=True)
@@ -84,43 +75,6 @@ class Halt:
 
 Places = Callable[[int], set[int]]
 """Where a step from an offset may lead."""
-
-
-class Target(Memory, Protocol):
-    """What a controller does for a debugger."""
-
-    def attach(self, keep: bool) -> None: ...
-
-    def detach(self) -> None: ...
-
-    def status(self) -> BpStatus: ...
-
-    def set(self, offset: int, skip: int, condition: DeviceCondition | None) -> None: ...
-
-    def clear(self, offset: int) -> None: ...
-
-    def hits(self) -> dict[int, int]:
-        """How often each breakpoint was met, by its offset."""
-
-    def watch(self, places: Sequence[ForcedPlace], offsets: Sequence[int]) -> None:
-        """A task that finds one of these changed, at one of these offsets, halts. In place of all of before."""
-
-    def temporary(self, offsets: Sequence[int]) -> None: ...
-
-    def go(self, how: int, serial: int) -> None: ...
-
-    def pause(self) -> None: ...
-
-    def pass_time(self, seconds: float) -> float:
-        """Waits so long, or less, and returns how long; a simulator lets virtual time pass, until the program halts."""
-
-    def table(self) -> SymbolTable: ...
-
-    def halted(self, status: BpStatus, table: SymbolTable) -> Halted:
-        """What a halted program shows."""
-        return Halted(status, table, self)
-
-    def task_names(self) -> list[str]: ...
 
 
 class Debugger:

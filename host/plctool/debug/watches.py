@@ -16,9 +16,9 @@ from plctool.errors import DeviceError, UsageError
 from plctool.iec.types import ArrayType, StructType
 
 if TYPE_CHECKING:
-    from plctool.debug.breakpoints import Target
     from plctool.debug.halted import BpStatus, Halted
     from plctool.debug.statements import Statements
+    from plctool.debug.target import Target
 
 _SIZES = (1, 2, 4, 8)
 EACH_STATEMENT = "each statement"

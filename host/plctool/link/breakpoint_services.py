@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from plctool.core import lib
-from plctool.debug.breakpoints import DeviceCondition
 from plctool.debug.forced import ForcedPlace
 from plctool.debug.halted import BpStatus
+from plctool.debug.target import DeviceCondition
 from plctool.errors import DeviceError
 from plctool.link import bintag, l7
 from plctool.link.session import Session

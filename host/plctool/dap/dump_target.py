@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NoReturn
 
-from plctool.debug.breakpoints import DeviceCondition, Target
 from plctool.debug.call_frames import StackFrame
 from plctool.debug.forced import ForcedPlace
 from plctool.debug.halted import BpStatus, Halted
 from plctool.debug.symbols import SymbolTable
+from plctool.debug.target import DeviceCondition, Target
 from plctool.debug.variables import Change, Symbol
 from plctool.dump_file import Dump
 from plctool.errors import DeviceError, UsageError
