@@ -10,6 +10,8 @@
 # make test-linux-arm  the C tests and tests/e2e with these, in QEMU's user mode (ARGS="-k force"); some are in `make test`
 # make test-arm-system  plcrt on Debian's kernel for arm64 in a virtual machine, and a power cut
 # make deb    dist/*.deb for this architecture (ARCHS="amd64 arm64"); make deb-test tries them in a small Debian
+# make test-windows  the simulator for Windows: its C tests, and all programs of tests/st, by Wine
+# make wheel-windows  dist/*win_amd64.whl; what cannot be tried here is said in the README
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
@@ -35,7 +37,7 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test test-whole quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak fuzz properties habits tree-sitter vsix test-editors all clean
+.PHONY: demo test test-whole test-windows wheel-windows quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak fuzz properties habits tree-sitter vsix test-editors all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm run-test-arm-system
 VSCODE := editors/vscode
 NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
@@ -77,6 +79,24 @@ run-test-linux-arm: build/build.ninja $(LINUX_ARM:%=%/build.ninja)
 quick: build/build.ninja
 	@ninja --quiet -C build under_attack
 	@$(BIN)/python tests/quick.py $(ARGS)
+
+# The simulator for Windows is built by Debian's compiler for it and tried by Wine.
+build-windows/build.ninja: $(VENV)/dev
+	./bootstrap.sh --windows
+	$(MESON) setup build-windows --cross-file cross/x86_64-windows.ini
+
+test-windows: build-windows/build.ninja build/build.ninja
+	$(MESON) compile -C build-windows
+	$(MESON) test -C build-windows --no-rebuild
+	ninja --quiet -C build under_attack
+	TEST_WHOLE=1 PYTHONPATH=host:build/host $(BIN)/python -m pytest tests/same_results -k windows $(ARGS)
+
+wheel-windows: build-windows/build.ninja build/build.ninja
+	$(MESON) compile -C build-windows rts_sim_bus
+	ninja --quiet -C build under_attack
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist/local .
+	$(BIN)/python packages/make_windows_wheel.py dist/local/*.whl build-windows build/host/_plccore.c dist
+	rm -r dist/local
 
 # CAN of a real kernel, in a small Linux of its own; skipped with the reason where that cannot run.
 test-vcan: build/build.ninja

@@ -6,6 +6,7 @@
 # bootstrap.sh --node   installs Node.js and npm, for `make vsix`
 # bootstrap.sh --editors  the same, Neovim and Emacs, for `make test-editors`
 # bootstrap.sh --fuzz   installs clang, with which libFuzzer runs the fuzz targets
+# bootstrap.sh --windows  installs a compiler for Windows, and Wine, which runs what it makes
 # bootstrap.sh --packages  installs what makes and tries Debian packages
 #
 # Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the others what
@@ -57,6 +58,17 @@ fi
 if [ "$1" = --fuzz ]; then
     install clang libclang-rt-dev llvm ||
         echo "libFuzzer is left out; for it: sudo apt-get install clang libclang-rt-dev llvm" >&2
+    exit 0
+fi
+
+if [ "$1" = --windows ]; then
+    set --
+    command -v x86_64-w64-mingw32-gcc-posix >/dev/null || set -- "$@" gcc-mingw-w64-x86-64-posix
+    command -v wine >/dev/null || set -- "$@" wine wine64
+    [ $# = 0 ] || install "$@" || {
+        echo "Missing: $*. Install them, on Debian with: sudo apt-get install $*" >&2
+        exit 1
+    }
     exit 0
 fi
 

@@ -22,8 +22,15 @@ typedef struct {
     const RTS_PFN *imports;        /* resolved external functions, in the order of their table */
 } IEC_CONTEXT;
 
+/* Compiled code is called as C code is on Linux, also on Windows. */
+#if defined(_WIN32) && !defined(RTS_CFFI)
+#define IEC_CODE __attribute__((sysv_abi))
+#else
+#define IEC_CODE
+#endif
+
 /* Entry of a task (all its programs in order), of CodeInit and GlobalExit. */
-typedef void (*IEC_ENTRY)(const IEC_CONTEXT *context);
+typedef void(IEC_CODE *IEC_ENTRY)(const IEC_CONTEXT *context);
 
 /*
  * An application begins in three steps. The runtime sets all areas to zero, and CodeInit gives all variables those
@@ -31,7 +38,7 @@ typedef void (*IEC_ENTRY)(const IEC_CONTEXT *context);
  * GlobalInit runs what the program itself does to begin: initial values that are calculated, FB_Init. `init_retains` is
  * 0 when the RETAIN variables are kept, else 1.
  */
-typedef void (*IEC_GLOBAL_INIT)(const IEC_CONTEXT *context, RTS_UI32 init_retains);
+typedef void(IEC_CODE *IEC_GLOBAL_INIT)(const IEC_CONTEXT *context, RTS_UI32 init_retains);
 
 /*
  * The external function "ieckept" (interface text below), which GlobalInit may call: whether a value among the `size`

@@ -277,7 +277,8 @@ enum {
     TARGET_ID_CORTEX_M4F = 0x9005,
     TARGET_ID_CORTEX_M7 = 0x9006,
     TARGET_ID_RV32IMAC = 0x9007,
-    TARGET_ID_ARMV7_LINUX = 0x9008, /* Thumb-2, REAL in registers of the FPU */
+    TARGET_ID_ARMV7_LINUX = 0x9008,    /* Thumb-2, REAL in registers of the FPU */
+    TARGET_ID_X86_64_WINDOWS = 0x9009, /* of the simulator: code as on Linux, C functions as on Windows */
 };
 
 #ifndef RTS_CFFI

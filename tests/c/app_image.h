@@ -21,6 +21,13 @@
 #include "packer.h"
 #include "rts_config.h"
 
+/* Of the machine code here. */
+#if defined(_WIN32)
+#define OWN_TARGET_ID TARGET_ID_X86_64_WINDOWS
+#else
+#define OWN_TARGET_ID TARGET_ID_X86_64_LINUX
+#endif
+
 #if defined(__x86_64__)
 #define NEEDS_X86_64
 #else
@@ -390,7 +397,7 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
     h.header_size = CDL_HEADER_SIZE;
     h.total_size = image->size;
     h.device_type = TARGET_TYPE_PROGRAMMABLE;
-    h.device_id = TARGET_ID_X86_64_LINUX;
+    h.device_id = OWN_TARGET_ID;
     h.device_version = 0x01000000;
     h.code_area_size = h.code.size;
     h.code_area_index = APP_AREA_CODE;

@@ -278,7 +278,7 @@ static void firmware_that_refuses_it_for_some_starts_costs_nothing(void)
         build_image(&image, &spec);
         CHECK(download(&image) != ERR_OK); /* it is not for this device either */
     }
-    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, TARGET_ID_X86_64_LINUX, 0x01000000);
+    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, OWN_TARGET_ID, 0x01000000);
     CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK_EQUAL(running_step(), 1);
 }
@@ -296,20 +296,20 @@ static void start_with_the_firmware_before(RTS_UI32 id, RTS_UI32 version, const 
     header.device_version = version;
     image_set_header(&newest, header);
     CHECK_EQUAL(download(&newest), ERR_OK);
-    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, TARGET_ID_X86_64_LINUX, 0x01000000);
+    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, OWN_TARGET_ID, 0x01000000);
     CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK_EQUAL(app_state(), AS_NONE);
     CHECK(log_has(reason));
     SimSetTarget(TARGET_TYPE_PROGRAMMABLE, id, version);
     CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK_EQUAL(running_step(), 2);
-    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, TARGET_ID_X86_64_LINUX, 0x01000000);
+    SimSetTarget(TARGET_TYPE_PROGRAMMABLE, OWN_TARGET_ID, 0x01000000);
 }
 
 static void a_program_for_another_device_waits_for_its_firmware(void)
 {
     start_with_the_firmware_before(7, 0x01000000, "Boot project refused: The image is for device id");
-    start_with_the_firmware_before(TARGET_ID_X86_64_LINUX, 0x02000000,
+    start_with_the_firmware_before(OWN_TARGET_ID, 0x02000000,
                                    "Boot project refused: The image is for device version 2.x");
 }
 

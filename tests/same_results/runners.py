@@ -34,16 +34,18 @@ _BARE_SOURCES = [
     *(HERE / "bare").glob("*.c"),
 ]
 _OF_PLCTOOL = ("SimBoards.c", "SimCanBus.c", "SimCanopen.c", "SimModbus.c", "SimWire.c")
-_LINUX_SOURCES = [
+_HOSTED_SOURCES = [
     *_PORTABLE,
     *(FIRMWARE / "src").glob("comm/*.c"),
     *(s for s in (FIRMWARE / "src/io").glob("*.c") if not any(bus in s.name for bus in ("Canopen", "Modbus"))),
-    *(s for s in (FIRMWARE / "port/sim").glob("*.c") if s.name not in _OF_PLCTOOL),
-    *(
-        FIRMWARE / "port/linux" / name
-        for name in ("IecStack.c", "IecStackSwitch.S", "SysDebug.c", "SysExcept.c", "SysMem.c")
-    ),
+    *(s for s in (FIRMWARE / "port/sim").glob("*.c") if s.name not in (*_OF_PLCTOOL, "SimMemory.c")),
+    FIRMWARE / "port/linux/SysMem.c",
 ]
+_OF_LINUX = [
+    *(FIRMWARE / "port/linux" / name for name in ("IecStack.c", "IecStackSwitch.S", "SysDebug.c", "SysExcept.c")),
+    FIRMWARE / "port/sim/SimMemory.c",
+]
+_OF_WINDOWS = sorted((FIRMWARE / "port/windows").glob("*.c"))
 _ARM_SOURCES = [
     FIRMWARE / "port/baremetal/common/CmpCompilerCalls.c",
     *(FIRMWARE / "port/baremetal/cortexm" / name for name in ("IecCall.c", "ThumbStep.c")),
@@ -72,6 +74,7 @@ class Runner:
     command: tuple[str, ...]  # the program's path follows
     bare: bool = True
     family: str = "cortexm"  # of port/baremetal, if bare
+    windows: bool = False
 
     def missing(self) -> list[str]:
         """The tools that are not installed."""
@@ -86,12 +89,13 @@ class Runner:
 
     def compile(self, folder: Path, main: Path = HERE / "runner.c", *extra: str) -> Path:
         """A program of the runtime with `main`, in `folder`; `extra`: more flags."""
-        program = folder / f"{main.stem}-{self.target}"
+        program = folder / f"{main.stem}-{self.target}{'.exe' if self.windows else ''}"
         include = [f"-I{FIRMWARE / name}" for name in ("include", "port/sim", "src/app", "src/cycle")]
         flags = [*(_BARE_FLAGS if self.bare else []), *self.flags, *_WARNINGS, *include, *extra]
         entry = FIRMWARE / "port/baremetal" / self.family / "IecCall.c"
-        linux = [*_LINUX_SOURCES, *(_ARM_SOURCES if "arm" in self.compiler else [])]
-        sources = [*_BARE_SOURCES, entry] if self.bare else linux
+        hosted = [*_HOSTED_SOURCES, *(_OF_WINDOWS if self.windows else _OF_LINUX)]
+        hosted += _ARM_SOURCES if "arm" in self.compiler else []
+        sources = [*_BARE_SOURCES, entry] if self.bare else hosted
         subprocess.run([self.compiler, *flags, "-o", program, main, *sources, "-lm"], check=True)
         return program
 
@@ -155,6 +159,8 @@ RUNNERS = {
             family="riscv",
         ),
         Runner("aarch64-linux", "aarch64-linux-gnu-gcc", ("-static", "-pthread"), ("qemu-aarch64",), bare=False),
+        Runner("x86_64-windows", "x86_64-w64-mingw32-gcc-posix",
+               ("-static", "-pthread", f"-I{FIRMWARE / 'port/windows'}"), ("wine",), bare=False, windows=True),
         Runner("armv7-linux", "arm-linux-gnueabihf-gcc", ("-static", "-pthread"), ("qemu-arm",), bare=False),
     )
 }  # fmt: skip

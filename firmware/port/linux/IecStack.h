@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Shared by the linux and the sim port. A program that writes beyond a local array destroys what IEC code left there,
+ * Shared by the linux and the sim port; on Windows, a fiber is such a stack (../windows/SysExcept.c). A program that writes beyond a local array destroys what IEC code left there,
  * or meets a guard; what the thread goes on with afterwards is on the stack it came from. Only the stack record, which
  * is found through a thread-local variable, leads back there.
  */
@@ -50,7 +50,11 @@ RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 
 /* The record of the calling thread, NULL without: found whatever its registers hold. Reading it in a handler never
  * allocates. */
+#if defined(_WIN32)
+extern __thread IEC_STACK *IecStackOfThread;
+#else
 extern __thread IEC_STACK *IecStackOfThread __attribute__((tls_model("initial-exec"), visibility("hidden")));
+#endif
 
 /* For C code that goes on after IEC code, which may have set flags with which C code faults: that string instructions go
  * backwards, which the kernel clears for a handler, and that alignment is checked, which it does not. IecStackSwitch does

@@ -295,30 +295,20 @@ static void free_cells(CELLS *cells)
     memset(cells, 0, sizeof *cells);
 }
 
-static RTS_UI8 *map_shared(int file, RTS_UI32 size)
+static RTS_UI8 *map_shared(RTS_UI32 size)
 {
-    int flags = file < 0 ? MAP_SHARED | MAP_ANONYMOUS : MAP_SHARED;
-    void *memory = mmap(NULL, size, PROT_READ | PROT_WRITE, flags, file, 0);
+    void *memory = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 
     return memory == MAP_FAILED ? NULL : memory;
 }
 
 static bool allocate_cells(CELLS *cells, RTS_UI32 size)
 {
-    int file = memfd_create("flash", MFD_CLOEXEC);
-
-    if (file < 0)
-        return false;
     cells->size = size;
     cells->owner = getpid();
-    cells->programmed = map_shared(-1, size);
-    cells->touched = map_shared(-1, pages_of(size));
-    if (ftruncate(file, (off_t)size) == 0) {
-        cells->data = map_shared(file, size);
-        cells->change = map_shared(file, size);
-    }
-    close(file);
-    if (cells->data != NULL && cells->programmed != NULL && cells->change != NULL && cells->touched != NULL)
+    cells->programmed = map_shared(size);
+    cells->touched = map_shared(pages_of(size));
+    if (SimMapTwice(size, &cells->data, &cells->change) && cells->programmed != NULL && cells->touched != NULL)
         return true;
     free_cells(cells);
     return false;

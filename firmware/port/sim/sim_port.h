@@ -20,6 +20,9 @@ RTS_RESULT SimFlashPowerOn(void);
 void SimComPowerOn(void);
 void SimNetPowerOn(void);
 
+/* Maps new memory at two addresses, NULL where that fails; munmap takes each of them back. Shared with child processes. */
+bool SimMapTwice(RTS_UI32 size, RTS_UI8 **first, RTS_UI8 **second);
+
 /* Starts the thread that aborts endless loops, once per process. */
 void SimSuperviseStart(void);
 

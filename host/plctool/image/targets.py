@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 import struct
+import sys
 from dataclasses import dataclass
 from enum import Enum
 
@@ -32,7 +33,8 @@ class Target:
     size work at any address. `vectors`: 16-byte vector compares are cheap. `registers`: that carry arguments inside the
     image, for addresses and integers, and for reals (0: reals are like integers). `probes`: a function that is entered
     touches each page of its frame, so that a large one does not pass over the guard at the end of the stack.
-    `hosted`: programs run in a process of Linux, with memory in plenty. `divides`: an instruction divides words.
+    `hosted`: programs run in a process of Linux or Windows, with memory in plenty. `divides`: an instruction divides
+    words.
     `features_for_speed`: those of level 3 besides. A processor that executes one instruction after the other gains
     nothing from their order, and the search for a good one costs registers.
     """
@@ -52,9 +54,7 @@ class Target:
     probes: bool = False
     hosted: bool = False
     divides: bool = True
-    external_convention: str = (
-        ""  # LLVM calling convention of C functions that take or return floats; "" is the default
-    )
+    external_convention: str = ""  # LLVM calling convention of C functions; "" is the default
     features_for_speed: str = ""
 
     @property
@@ -98,6 +98,11 @@ TARGETS: dict[str, Target] = {
             "aarch64-linux", "aarch64-unknown-linux-gnu", "generic", "", Machine.AARCH64, "TARGET_ID_AARCH64_LINUX",
             pointer_size=8, registers=(8, 8), stubs=False, unaligned=True, probes=True, hosted=True,
         ),
+        Target(  # of the simulator on Windows: as on Linux in all but the C functions that programs call
+            "x86_64-windows", "x86_64-unknown-linux-gnu", "x86-64", "", Machine.X86_64, "TARGET_ID_X86_64_WINDOWS",
+            pointer_size=8, registers=(6, 8), stubs=False, unaligned=True, vectors=True, probes=True, hosted=True,
+            external_convention="win64cc",
+        ),
         Target(  # what Debian's armhf runs on: a Cortex-A8 neither divides nor has all of the others' registers
             "armv7-linux", "thumbv7a-none-unknown", "generic", "+reserve-r9,-neon,-d32", Machine.THUMB,
             "TARGET_ID_ARMV7_LINUX", pointer_size=4, registers=(4, 8), stubs=True, unaligned=True, hosted=True,
@@ -134,6 +139,8 @@ DEFAULT_TARGET = "x86_64-linux"
 def host_target() -> str:
     """The target whose programs run in this process."""
     machine = platform.machine()
+    if sys.platform == "win32":
+        return "x86_64-windows"
     if struct.calcsize("P") == _ARMV7_POINTER and machine.startswith(("arm", "aarch64")):
         machine = "armv7"  # also a process of 32 bits on a kernel of 64
     here = f"{machine}-linux"

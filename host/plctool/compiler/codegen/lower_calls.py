@@ -153,8 +153,7 @@ def _call_instruction(
     unit, fn = frame.unit, frame.fn
     returned = returned_variable(pou, None)
     if pou.external:
-        convention = f"{unit.target.external_convention} " if unit.target.external_convention else ""
-        value = frame.call_import(pou.external, returned_type(returned), arguments, unit.external_call, convention)
+        value = frame.call_import(pou.external, returned_type(returned), arguments, unit.external_call)
         if value is not None and returned is not None and is_bool(returned.type):
             return to_bool(frame, value, BOOL)  # TRUE is not 1 everywhere in C
         return value

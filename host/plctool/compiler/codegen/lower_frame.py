@@ -233,12 +233,10 @@ class Frame:
             self._bases[area] = base
         return base
 
-    def call_import(
-        self, external: External, result: str, arguments: list[str], attributes: str, convention: str = ""
-    ) -> Value | None:
+    def call_import(self, external: External, result: str, arguments: list[str], attributes: str) -> Value | None:
         """Calls a C function, whose result is of the LLVM type `result`. `arguments` with their types."""
-        target = self.unit.imported(external, result, arguments, convention) or self._loaded_import(external)
-        text = f"call {convention}{result} {target}({', '.join(arguments)}) {attributes}"
+        target = self.unit.imported(external, result, arguments) or self._loaded_import(external)
+        text = f"call {self.unit.external_convention}{result} {target}({', '.join(arguments)}) {attributes}"
         if result != "void":
             return self.fn.value(text)
         self.fn.do(text)

@@ -265,14 +265,20 @@ class Unit:
             )
         return slot
 
-    def imported(self, external: External, result: str, arguments: list[str], convention: str) -> str | None:
+    @property
+    def external_convention(self) -> str:
+        """What a call or declaration of a C function begins with."""
+        convention = self.target.external_convention
+        return f"{convention} " if convention else ""
+
+    def imported(self, external: External, result: str, arguments: list[str]) -> str | None:
         """The symbol of a C function, where the linker makes a stub for it; None where its address has to be loaded,
         also of those that a stub does not reach on each processor when compiler calls come after them."""
         if not self.target.stubs or self.import_slot(external) >= STUBS_REACH:
             return None
         symbol = import_symbol(external.name)
         types = ", ".join(argument.split()[0] for argument in arguments)
-        self.module.declare(symbol, f"declare {convention}{result} @{symbol}({types})")
+        self.module.declare(symbol, f"declare {self.external_convention}{result} @{symbol}({types})")
         return f"@{symbol}"
 
     def helper(self, name: str) -> str:
