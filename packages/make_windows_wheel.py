@@ -1,7 +1,7 @@
 """Makes the wheel for Windows on x86-64 from that for Linux: `make_windows_wheel.py WHEEL BUILD MODULE OUTPUT`.
 
-WHEEL: for Linux; BUILD: the build folder of cross/x86_64-windows.ini; MODULE: the source of _plccore. Python's own library
-for Windows is not needed: the module names python3.dll, which every Python from 3.11 on has.
+WHEEL: for Linux; BUILD: the build folder of cross/x86_64-windows.ini; MODULE: the source of _plccore. Python's own
+library for Windows is not needed: the module names python3.dll, which every Python from 3.11 on has.
 
 Checks what can be checked elsewhere than on Windows: what the module imports and exports.
 """
