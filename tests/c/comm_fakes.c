@@ -433,6 +433,14 @@ const EXCEPT_TRACE *SysExceptGetTrace(void)
 }
 #endif
 
+#if EXCEPT_REGISTERS > 0
+const EXCEPT_FRAME *SysExceptGetRegisters(void)
+{
+    static const EXCEPT_FRAME unknown;
+    return &unknown;
+}
+#endif
+
 const char *AppGetInfo(RTS_UI32 index)
 {
     static const char *const texts[] = {"project", "author", "1.2.3", "", "profile"};
