@@ -235,11 +235,14 @@ def _area(entry: dict[str, Any]) -> AreaContent:
 
 
 def _record(kind: type[_T], entry: dict[str, Any]) -> _T:
-    """A dataclass of numbers and strings. Raises ValueError, KeyError for what does not fit it."""
-    values = {}
+    """A dataclass of numbers, perhaps None, and strings. Raises ValueError, KeyError for what does not fit it."""
+    values: dict[str, object] = {}
     for field in fields(kind):  # type: ignore[arg-type]
-        value = entry[field.name]
-        values[field.name] = _text(value) if field.type == "str" else _number(value, -(1 << 63))
+        if field.type == "int | None" and entry.get(field.name) is None:
+            values[field.name] = None
+        else:
+            value = entry[field.name]
+            values[field.name] = _text(value) if field.type == "str" else _number(value, -(1 << 63))
     return kind(**values)
 
 

@@ -40,6 +40,12 @@ static bool store_code(uintptr_t address, RTS_UI8 unit)
     return true;
 }
 
+RTS_UI32 SysDebugTrapSize(uintptr_t address)
+{
+    RTS_UNUSED(address);
+    return 1;
+}
+
 RTS_RESULT SysDebugWriteTrap(uintptr_t address, RTS_UI32 *original)
 {
     *original = *(const RTS_UI8 *)address;
