@@ -234,6 +234,20 @@ class Breaking:
         assert plc.read("Other.n") > before + 2
         assert plc.status().state == "run"
 
+    def test_each_task_goes_on_from_where_it_halted(self, plc: Controller) -> None:
+        debugger = plc.breakpoints
+        for line, task in ((35, "Slow"), (23, "Fast")):
+            number = debugger.set(FILE, line).number
+            for _ in range(5):
+                found = halt(debugger)
+                assert (found.task, place(found)[1], found.exception) == (task, line, "")
+                debugger.go()
+            debugger.clear(number)
+            if debugger.wait(0) is not None:
+                debugger.go()
+        self.wait(debugger)
+        assert plc.status().state == "run"
+
     def wait(self, debugger: Debugger) -> None:
         assert debugger.wait(0.3) is None
 

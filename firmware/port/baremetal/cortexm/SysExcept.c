@@ -435,6 +435,7 @@ static struct {
     SYS_DEBUG_STOP stop; /* of the halted task */
     FRAME *frame;
     FRAME *first;
+    FRAME entered_over; /* what enter_try overwrites: the outermost stack begins there, which may be that of the task */
     RTS_UI32 exc_return;
     RTS_UI32 saved[SAVED];
 #ifdef __ARM_FP
@@ -623,6 +624,7 @@ static RTS_UI32 resume(RTS_UI32 *saved)
     SYS_DEBUG_STOP stop = debug.stop;
     RTS_UI32 goes_to;
 
+    *try->first = debug.entered_over;
     try->first = debug.first;
     allow_stack(stack_slot(try));
     set_process_stack(debug.frame);
@@ -644,6 +646,7 @@ static RTS_UI32 resume(RTS_UI32 *saved)
 bool SysDebugResume(RTS_EXCEPTION *exception)
 {
     FRAME *first = state.tries[0].first;
+    debug.entered_over = *first;
     bool ended = SysExceptTry(resume_halted, (void *)(uintptr_t)debug.stop.arg, exception);
 
     state.tries[0].first = first;
