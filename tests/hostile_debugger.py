@@ -12,7 +12,7 @@ CODE = 1 << 12  # offsets are below that, mostly in the code of the program
 
 
 def act(target: Target, chooser: random.Random) -> None:
-    action = chooser.randrange(8)
+    action = chooser.randrange(9)
     offset = chooser.choice((chooser.randrange(CODE), chooser.randrange(1 << 32)))
     if action == 0:
         target.set(offset, 0, None)
@@ -28,16 +28,23 @@ def act(target: Target, chooser: random.Random) -> None:
         target.read_stack(chooser.randrange(1 << 20), chooser.randrange(1, 4096))
     elif action == 6:
         target.write_stack(chooser.randrange(1 << 9), chooser.randbytes(chooser.randrange(1, 64)))
+    elif action == 7:
+        places = [_place(chooser) for _ in range(chooser.randrange(7))]
+        target.watch(places, [chooser.randrange(CODE) for _ in range(chooser.choice((0, 1, 300, 6000)))])
     else:
         target.clear(offset)
 
 
-def _condition(chooser: random.Random) -> DeviceCondition:
-    """A comparison of anything with anything."""
+def _place(chooser: random.Random) -> ForcedPlace:
+    """Anything, in no area or in one."""
     size = chooser.choice((1, 2, 4, 8, 3, 255))
     hops = tuple(chooser.randrange(1 << 32) for _ in range(chooser.randrange(lib.PLACE_POINTERS + 1)))
-    place = ForcedPlace(
+    return ForcedPlace(
         chooser.choice((0, 1, 2, 3, 0xFF)), chooser.choice((0, 8, chooser.randrange(1 << 32))), hops, size,
         chooser.choice((0xFF, 1, 0)), chooser.randbytes(8),
     )  # fmt: skip
-    return DeviceCondition(place, chooser.randrange(256), chooser.randrange(256))
+
+
+def _condition(chooser: random.Random) -> DeviceCondition:
+    """A comparison of anything with anything."""
+    return DeviceCondition(_place(chooser), chooser.randrange(256), chooser.randrange(256))

@@ -6,13 +6,12 @@ import random
 import sys
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
-from campaign import NEWEST, STOPPED, Campaign, Case
+from campaign import NEWEST, STOPPED
+from hostile_tools import PROGRAM, Attack, HostileTools
 from look import expect_running
 from process import Runtime, eventually
-from simulated import PLCRT
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
@@ -23,44 +22,18 @@ from plctool.device import Plc
 from plctool.errors import PlcError
 from plctool.link.services import AppState
 
-COUNT = 120
 ACTIONS = 40
 GONE_S = 7.0  # more than BP_ALIVE_MS
-ENDS = ("detaches", "vanishes", "vanishes while it is halted")
-NAME = "good1"
 
 
-@dataclass(frozen=True)
-class Attack:
-    """`seed` of what the debugger does, and how it ends."""
-
-    seed: int
-    end: str
-
-
-class Debuggers(Campaign):
+class Debuggers(HostileTools):
     name = "debugger"
     promise = "after a debugger has gone, the program runs on, or is stopped with the cause in the log"
     short = 6
+    tool = "a debugger"
+    ends = ("detaches", "vanishes", "vanishes while it is halted")
 
-    def cases(self) -> list[Case]:
-        chooser = random.Random(self.shop.seed)
-        attacks = [Attack(chooser.randrange(1 << 30), ENDS[number % len(ENDS)]) for number in range(COUNT)]
-        return [Case(f"a debugger with seed {a.seed} that {a.end}", a) for a in attacks]
-
-    def run(self, case: Case) -> str:
-        attack: Attack = case.data
-        flash = self.shop.folder / f"debugger-{attack.seed}.flash"
-        flash.write_bytes(self.shop.history(PLCRT, NAME))
-        try:
-            with Runtime(self.shop, flash) as runtime:
-                runtime.power_on()
-                runtime.look("before the attack")
-                return self._attacked(attack, runtime)
-        finally:
-            flash.unlink()
-
-    def _attacked(self, attack: Attack, runtime: Runtime) -> str:
+    def attacked(self, attack: Attack, runtime: Runtime) -> str:
         with suppress(PlcError), plctool.connect(f"serial:{runtime.port}") as plc:
             _debug(plc, attack)
 
@@ -76,7 +49,7 @@ class Debuggers(Campaign):
         if seen.exception and seen.causes:
             outcome = STOPPED
         else:
-            expect_running(seen, self.shop, (NAME,))
+            expect_running(seen, self.shop, (PROGRAM,))
         runtime.check_can_be_flashed()
         return outcome
 

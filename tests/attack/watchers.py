@@ -5,13 +5,12 @@ from __future__ import annotations
 import random
 import sys
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
-from campaign import NEWEST, STOPPED, Campaign, Case
+from campaign import NEWEST, STOPPED
+from hostile_tools import PROGRAM, Attack, HostileTools
 from look import expect_running
 from process import Runtime
-from simulated import PLCRT
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
@@ -21,43 +20,17 @@ import plctool
 from plctool.device import Plc
 from plctool.errors import PlcError
 
-COUNT = 120
 ACTIONS = 60
-ENDS = ("leaves", "vanishes", "loses the power of the controller", "kills its worker")
-NAME = "good1"
 
 
-@dataclass(frozen=True)
-class Attack:
-    """`seed` of what the tool does, and how it ends."""
-
-    seed: int
-    end: str
-
-
-class Watchers(Campaign):
+class Watchers(HostileTools):
     name = "watcher"
     promise = "after forces and traces have ended, the program runs, or is stopped with the cause in the log"
     short = 4
+    tool = "a tool that forces and traces,"
+    ends = ("leaves", "vanishes", "loses the power of the controller", "kills its worker")
 
-    def cases(self) -> list[Case]:
-        chooser = random.Random(self.shop.seed)
-        attacks = [Attack(chooser.randrange(1 << 30), ENDS[number % len(ENDS)]) for number in range(COUNT)]
-        return [Case(f"a tool with seed {a.seed} that forces and traces, and {a.end}", a) for a in attacks]
-
-    def run(self, case: Case) -> str:
-        attack: Attack = case.data
-        flash = self.shop.folder / f"watcher-{attack.seed}.flash"
-        flash.write_bytes(self.shop.history(PLCRT, NAME))
-        try:
-            with Runtime(self.shop, flash) as runtime:
-                runtime.power_on()
-                runtime.look("before the attack")
-                return self._attacked(attack, runtime)
-        finally:
-            flash.unlink()
-
-    def _attacked(self, attack: Attack, runtime: Runtime) -> str:
+    def attacked(self, attack: Attack, runtime: Runtime) -> str:
         with suppress(PlcError), plctool.connect(f"serial:{runtime.port}") as plc:
             self._abuse(plc, attack)
             if attack.end == "vanishes":
@@ -70,7 +43,7 @@ class Watchers(Campaign):
         seen = runtime.look("after the attack")
         outcome = STOPPED if seen.exception and seen.causes else NEWEST
         runtime.ask(_recover, "while forces and traces were ended")
-        expect_running(runtime.look("after forces and traces had ended"), self.shop, (NAME,))
+        expect_running(runtime.look("after forces and traces had ended"), self.shop, (PROGRAM,))
         runtime.check_can_be_flashed()
         return outcome
 
@@ -78,7 +51,7 @@ class Watchers(Campaign):
         chooser = random.Random(attack.seed)
         for _ in range(ACTIONS):
             with suppress(PlcError):
-                act(plc, plc._session, self.shop[NAME].crc, chooser)
+                act(plc, plc._session, self.shop[PROGRAM].crc, chooser)
 
 
 def _recover(plc: Plc) -> None:
