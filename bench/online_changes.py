@@ -31,7 +31,7 @@ END_RESOURCE END_CONFIGURATION"""
 
 
 def measure() -> tuple[int, float]:
-    """How long tasks waited for the exchange [us], and how long the change took [s]."""
+    """Returns the time that tasks waited for the exchange [us], and the time of the whole change [s]."""
     with tempfile.TemporaryDirectory() as name, Plcrt(Path(name) / "plc.flash", "--tcp", "0") as plcrt:
         folder = Path(name)
 

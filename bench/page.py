@@ -1,4 +1,4 @@
-"""What `plctool ui` and plcrt take of a processor while browsers show 500 values that change, over TCP."""
+"""Measures the processor time of `plctool ui` and plcrt while browsers show 500 changing values over TCP."""
 
 from __future__ import annotations
 

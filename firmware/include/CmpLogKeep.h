@@ -12,10 +12,10 @@
 
 #include "CmpLog.h"
 
-/* How the logger with these entries is called. */
+/* Name of the logger with these entries. */
 #define LOG_KEPT_NAME "KeptLog"
 
-/* Where a kept entry is from. */
+/* Origin of a kept entry. */
 typedef struct {
     RTS_I64 utc_ns; /* since 1970-01-01; 0: there was no clock, or it was not set */
     RTS_UI32 start; /* number of the power-up, from 1; its time counts from there */

@@ -230,7 +230,7 @@ static const RTS_UI32 CDL_CHANGE_NO_INIT;
 #define CDL_CHANGE_NO_INIT 0xFFFFFFFFu
 #endif
 
-/* What becomes of `size` bytes. The new ones are at `to` of `area`, those of the image that ran at `from` of `from_area`.
+/* Kinds of steps, each for `size` bytes. The new ones are at `to` of `area`, those of the image that ran at `from` of `from_area`.
  * First come the steps with kinds up to CDL_CHANGE_GONE, in ascending order of `from_area` and `from`, none over another:
  * they say where pointers lead on. What is moved has another place than all that the old image has. An instance and its
  * first member begin at the same place, and may move to different ones: CDL_CHANGE_OBJECTS in the `from_area` of a

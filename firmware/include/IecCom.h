@@ -13,7 +13,7 @@
 #include "CmpItf.h"
 #include "rts_config.h"
 
-/* What a call does. */
+/* Operations of a call. */
 enum {
     IEC_COM_OPEN = 1,  /* handle: number of the port, from 1 on; value: baud | IEC_COM_*; the result is a handle */
     IEC_COM_CLOSE = 2, /* handle */

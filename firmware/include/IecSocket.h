@@ -13,7 +13,7 @@
 #include "CmpItf.h"
 #include "rts_config.h"
 
-/* What a call does: the low half of its operation. The high half is a port number, `value` an IPv4 address, most
+/* Operation of a call, in its low half. The high half is a port number, `value` an IPv4 address, most
  * significant byte first. */
 enum {
     IEC_SOCKET_UDP_OPEN = 1,    /* own address; the result is a handle */

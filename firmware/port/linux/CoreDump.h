@@ -6,7 +6,7 @@
 #ifndef COREDUMP_H
 #define COREDUMP_H
 
-/* Where the file is written; a newer one replaces it. NULL: nowhere. `path` stays. */
+/* Sets the file of dumps, which a newer dump replaces; NULL: none. `path` must stay valid. */
 void CoreDumpSet(const char *path);
 
 /* From now on exceptions are dumped; one that the program had before was in an earlier run. From main, after CMInit. */

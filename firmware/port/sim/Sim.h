@@ -152,7 +152,7 @@ RTS_UI32 SimComGetPort(RTS_UI32 number, RTS_UI8 *data, RTS_UI32 size);
 
 enum { SIM_NET_DATA = 2048 };
 
-/* What is on the simulated network. A connection is asked for, and then accepted or refused; data and its end follow, in
+/* Packets of the simulated network. A connection is asked for, and then accepted or refused; data and its end follow, in
  * order. */
 enum { SIM_NET_DATAGRAM, SIM_NET_CONNECT, SIM_NET_ACCEPT, SIM_NET_REFUSE, SIM_NET_DATA_OF, SIM_NET_END };
 

@@ -24,7 +24,7 @@
 enum { HOLE_LOG2 = 23 };
 #define HOLE_BASE (RAM_BASE + 0x800000u)
 #else
-/* What is below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
+/* The bus below the RAM takes writes without a fault, so a large frame that passes all stacks would do harm unseen. */
 enum { HOLE_LOG2 = 16 };
 #define HOLE_BASE (RAM_BASE - (1u << HOLE_LOG2))
 #endif
