@@ -363,20 +363,12 @@ def test_an_export_without_positions_is_executed_in_the_order_of_the_file(tmp_pa
             "number 2 is needed before",
         ),
         (
-            (given(2, "x.y"), block(3, "ABS", {"IN": "2"}, order=1), taken(4, "n", "3.OUT")),
-            "the type of the result of ABS is not known",
-        ),
-        (
             (
                 contact(2, "a", "1"),
                 block(3, "SR", {"EN": "2", "S1": "1"}, "ENO Q1", "b", order=2),
                 block(4, "SR", {"S1": "3.ENO"}, "Q1", "c", order=1),
             ),
             "its ENO is needed before it is executed",
-        ),
-        (
-            (given(2, "x.y"), block(3, "ABS", {"IN": "2"}), taken(4, "n", "3.OUT"), taken(5, "n", "3.OUT", row=40)),
-            "the type of the result of ABS is not known",
         ),
     ],
 )
@@ -495,18 +487,36 @@ def test_the_outputs_of_a_block_have_the_types_that_the_library_declares(
         assert plc.read("Main.r") == plc.read("Main.other") == seen
 
 
-@pytest.mark.parametrize("values", [("n", "gone"), ("n", "40000"), ("n", "1.0"), ("5", "7")])
-def test_a_type_is_never_guessed(tmp_path: Path, values: tuple[str, str]) -> None:
+def sum_of(first: str, second: str) -> str:
+    """A program in which two outputs take a sum."""
     body = network(
-        given(1, values[0]),
-        given(2, values[1]),
+        given(1, first),
+        given(2, second),
         block(3, "ADD", {"IN1": "1", "IN2": "2"}),
         taken(4, "n", "3.OUT"),
         taken(5, "n", "3.OUT", row=40),
     )
-    text = project(pou("Main", body, variables("localVars", "n:INT")))
-    ((_, message),) = errors(tmp_path, text)
-    assert message.endswith("the type of the result of ADD is not known")
+    return project(pou("Main", body, variables("localVars", "n:INT")), instances=CYCLE)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (("n", "gone"), "unknown name gone"),
+        (("n.y", "1"), "INT has no members"),
+        (("n", "T#1s"), "cannot combine INT and TIME"),
+    ],
+)
+def test_what_has_no_type_is_an_error_as_it_is_in_text(tmp_path: Path, values: tuple[str, str], said: str) -> None:
+    messages = [message for _, message in errors(tmp_path, sum_of(*values))]
+    assert len(messages) == 1
+    assert said in messages[0]
+
+
+def test_numbers_alone_have_the_type_that_they_have_in_text(tmp_path: Path) -> None:
+    with started(tmp_path, sum_of("5", "7")) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.n") == 12
 
 
 def test_a_function_of_the_library_is_called_though_nothing_reads_its_result(tmp_path: Path) -> None:
@@ -568,13 +578,12 @@ def test_an_unknown_function_in_a_diagram_is_named(tmp_path: Path) -> None:
     assert _diagram(tmp_path, *elements, declared="v:INT") == ["unknown function VendorScale"]
 
 
-def test_a_diagram_whose_type_is_in_another_file_is_an_error_of_its_own(tmp_path: Path) -> None:
+def test_a_diagram_takes_types_from_another_file(tmp_path: Path) -> None:
     elements = (given(1, "v.speed"), given(2, "n"), block(3, "SUB", {"IN1": "1", "IN2": "2"}), *TWICE)
     body = network(*elements)
     xml = written(tmp_path, project(pou("Main", body, variables("localVars", "n:INT", "v:Vendor_Type"))))
     other = tmp_path / "other.st"
     other.write_text("TYPE Vendor_Type : STRUCT speed : INT; END_STRUCT END_TYPE\n")
-    found = check_sources(load_sources([xml, other])).diagnostics
-    assert [d.message.rpartition(": ")[2] for d in found if d.severity == "error"] == [
-        "the type of the result of SUB is not known"
-    ]
+    checked = check_sources(load_sources([xml, other]))
+    assert checked.program is not None, checked.diagnostics
+    assert [str(t) for t in checked.program.inferred.values()] == ["INT"]

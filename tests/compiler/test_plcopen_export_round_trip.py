@@ -20,6 +20,7 @@ from plctool.compiler.codegen.lower_unit import Options, parse_checks
 from plctool.compiler.formats.plcopen import read_project
 from plctool.compiler.front import CheckResult, check_sources, declared_names_asked_for
 from plctool.compiler.image.build import build_program
+from plctool.compiler.plcopen_export.inferred import with_types
 from plctool.compiler.plcopen_export.project import Written, write_project
 from plctool.compiler.syntax.library import standard_library
 from plctool.image.targets import DEFAULT_TARGET, find_target
@@ -67,9 +68,10 @@ def test_program(path: Path) -> None:
 def test_project(path: Path) -> None:
     files = program_files([path])
     sources = files.load_sources()
-    written = exported(sources)
-    assert written.ok
     original = check_with_tests(sources, load=files.load_io)
+    assert original.program is not None
+    written = exported(with_types(sources, original.program.inferred))
+    assert written.ok
     again = check_sources(read_project("p.xml", written.text), io=program_files([path], IoFiles()).load_io())
     if path.stem in ACTIONS_COME_FIRST:
         assert len(image_of(again)) == len(image_of(original))

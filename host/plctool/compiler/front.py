@@ -106,7 +106,6 @@ def check_sources(
             _check_whole_units(parsed, [DeviceTasks(), *observers])
         else:
             placed = _placed(parsed, io, guests)
-        diagnostics.settle(parsed.knows)
     program = None if placed is None or diagnostics.errors else placed.program
     change = None if placed is None else placed.change
     return CheckResult(program, diagnostics.sorted(), parsed is not None and parsed.has_tests, change)
@@ -350,6 +349,7 @@ def place(checked: Checked) -> Placed:
         externals=program.external_functions(),
         io=world.io.description,
         may_recurse=program.may_recurse,
+        inferred=world.inferred,
         trail=program.trail,
     )
     if not diagnostics.errors:

@@ -459,6 +459,8 @@ def written(spec: ast.TypeSpec) -> str:
     """Returns a type as it is written, bounds by the words of the source where they are names or numbers."""
     if isinstance(spec, ast.NamedType):
         return spec.name if spec.length is None else f"{spec.name}[{expression(spec.length)}]"
+    if isinstance(spec, ast.TypeOf):
+        return f"the type of {expression(spec.value)}"
     if isinstance(spec, ast.SubrangeSpec):
         return f"{spec.base} ({expression(spec.low)}..{expression(spec.high)})"
     if isinstance(spec, ast.EnumSpec):

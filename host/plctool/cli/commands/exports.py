@@ -56,6 +56,7 @@ def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list
     from plctool.compiler import CompileError
     from plctool.compiler.base.internal import bugs_reported
     from plctool.compiler.front import check_sources, declared_names_asked_for
+    from plctool.compiler.plcopen_export.inferred import with_types
     from plctool.compiler.plcopen_export.project import write_project
     from plctool.compiler.syntax.diagnostics import render
     from plctool.compiler.syntax.library import standard_library
@@ -83,6 +84,7 @@ def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list
         if checked.program is None:
             raise CompileError(checked.diagnostics, sources)
         declared = declared_names_asked_for(standard_library(), libraries, sources)
+        sources = with_types(sources, checked.program.inferred)
         written = write_project(sources, files.info.project or output.stem, declared, stamp)
     if not written.ok:
         raise CompileError(written.diagnostics, sources)

@@ -24,15 +24,13 @@ _PLCOPEN, _CODESYS = "http://www.plcopen.org/xml/tc6", "http://www.3s-software.c
 
 @dataclass(frozen=True)
 class Finding:
-    """What the reader of a file has to say about it. `line` and `column` count from 1. `needs`: the name of a type or
-    function that the file does not declare; if nothing else does, that is the error, not this one."""
+    """What the reader of a file has to say about it. `line` and `column` count from 1."""
 
     line: int
     column: int
     code: str
     message: str
     severity: Literal["error", "warning"] = "error"
-    needs: str = ""
 
 
 @dataclass(frozen=True)

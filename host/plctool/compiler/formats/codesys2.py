@@ -16,10 +16,10 @@ from functools import cached_property
 from plctool.compiler.base.source import Source
 from plctool.compiler.formats import il_files
 from plctool.compiler.formats.codesys2_networks import Line, read_networks
+from plctool.compiler.formats.library_units import parameters, parameters_of
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
-from plctool.compiler.formats.plcopen_result_types import parameters, parameters_of, written_type
 from plctool.compiler.formats.text import Findings, Part, Place, Text
-from plctool.compiler.formats.tree_bodies import translate_networks, types_of, units_of
+from plctool.compiler.formats.tree_bodies import translate_networks, units_of
 from plctool.compiler.formats.twincat import REFUSED
 from plctool.compiler.formats.xml_tree import Element
 from plctool.compiler.syntax import ast
@@ -239,10 +239,10 @@ class _Export:
             self._next_id = body.next_id
             self.drawn[name] = body.body
             keeps = span.kind in ("PROGRAM", "FUNCTION_BLOCK", _BLOCK_IN_ONE_WORD)
-            unit = Unit(name, keeps, self._types | types_of(self._declarations(span)), dict(self._outputs))
+            unit = Unit(name, keeps, dict(self._results))
             translate_networks(body.body, unit, made)
         except NotTranslatedError as error:
-            self._findings.add(error.at, "language", REFUSED.format(name, error), error.needs)
+            self._findings.add(error.at, "language", REFUSED.format(name, error))
             made = Body()
         self._edits.append((start, end, [("\n", self._place(start)), *made.parts]))
         if made.variables:
@@ -274,16 +274,9 @@ class _Export:
         return {unit.name.casefold(): unit for span in spans for unit in self._declarations(span)}
 
     @cached_property
-    def _types(self) -> dict[str, str]:
-        """Types of the global variables of the file."""
-        spans = [span for span in self._spans() if span.kind == "VAR_GLOBAL"]
-        inside = "\n".join(self._plain[s.start : s.end].replace("VAR_GLOBAL", "VAR", 1) for s in spans)
-        return types_of(units_of(f"PROGRAM _\n{inside}\nEND_PROGRAM")) if spans else {}
-
-    @cached_property
-    def _outputs(self) -> dict[str, dict[str, str]]:
-        """Types of the outputs of all units, by case-folded name."""
-        return {name: types_of([unit]) | {"": written_type(unit.result)} for name, unit in self._units.items()}
+    def _results(self) -> dict[str, bool]:
+        """As in Unit."""
+        return {name: unit.result is not None for name, unit in self._units.items()}
 
     def _parameters(self, kind: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         unit = self._units.get(kind.casefold())

@@ -208,7 +208,7 @@ class _Reader:
             name = self._next()
             if name.text == _OPEN:
                 raise NotTranslatedError(name.at, f"an operand is missing ({_OPEN})")
-            return Operand(name.text, name.at, self._end(), type="BOOL")
+            return Operand(name.text, name.at, self._end())
         if line.text not in _GATES:
             raise NotTranslatedError(line.at, f"a rung has {line.text[:40]}, which is not known")
         values = [self._contacts() for _ in range(self._count("_LD_OPERATOR"))]

@@ -27,13 +27,12 @@ class Rail:
 
 @dataclass(frozen=True)
 class Operand:
-    """A variable or literal. `type`: as far as the file says it."""
+    """A variable or literal."""
 
     text: str
     at: Place
     negated: bool = False
     edge: str = ""
-    type: str = ""
 
 
 class Output(NamedTuple):
@@ -47,7 +46,7 @@ class Output(NamedTuple):
 @dataclass(frozen=True)
 class Box:
     """A call. `inputs`: name and value, None for an open input; EN is one of them. `outputs`: the first is the one that
-    continues the line. `type`: of the result of an operator, if an output has none."""
+    continues the line."""
 
     kind: str
     at: Place
@@ -56,7 +55,6 @@ class Box:
     instance: str = ""
     negated: bool = False
     edge: str = ""
-    type: str = ""
 
 
 @dataclass(frozen=True)
@@ -164,7 +162,7 @@ class Elements:
             raise NotTranslatedError(item.at, "a part of it is connected to nothing")
         special = any(t.negated or t.storage for t in item.targets)
         if len(item.targets) > 1 and (special or (isinstance(value, Operand) and (value.negated or value.edge))):
-            value = _once(value, "BOOL")
+            value = _once(value)
         wires = self._plain(value) if value is not item.value else self._wires(value)
         for target in item.targets:
             self._target(target, wires)
@@ -199,8 +197,7 @@ class Elements:
             return self._branches[tree.number]
         if isinstance(tree, Box):
             return [self._box(tree)]
-        attributes = _modifiers(tree) | ({"type": tree.type} if tree.type else {})
-        return [self._element("inVariable", tree.at, attributes, [_text("expression", tree.text, tree.at)])]
+        return [self._element("inVariable", tree.at, _modifiers(tree), [_text("expression", tree.text, tree.at)])]
 
     def _left_rail(self, at: Place) -> _Wire:
         if self._rail is None:
@@ -220,8 +217,7 @@ class Elements:
             if output.target:
                 point.children.append(_text("expression", output.target, box.at))
             outputs.children.append(Element("variable", attributes, box.at, [point]))
-        kind = next((o.type for o in box.outputs if o.type and o.name.upper() != "ENO"), box.type)
-        attributes = {"typeName": box.kind, "instanceName": box.instance, "resultType": kind}
+        attributes = {"typeName": box.kind, "instanceName": box.instance}
         made = self._element("block", box.at, {k: v for k, v in attributes.items() if v}, [inputs, outputs])
         return replace(made, formal=box.outputs[0].name if box.outputs else "")
 
@@ -262,11 +258,11 @@ class Elements:
         return _Wire(local_id)
 
 
-def _once(tree: Tree, kind: str = "") -> Tree:
+def _once(tree: Tree) -> Tree:
     """A value that is computed once, whatever happens to its variables afterwards."""
     if not isinstance(tree, Operand):
         return tree
-    return Box("MOVE", tree.at, (("IN", tree),), (Output("OUT"),), type=tree.type or kind)
+    return Box("MOVE", tree.at, (("IN", tree),), (Output("OUT"),))
 
 
 def _modifiers(tree: Operand | Box) -> dict[str, str]:

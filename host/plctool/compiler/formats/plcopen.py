@@ -69,29 +69,12 @@ class _Project:
         self.lists: dict[str, Text] = {}
         self.shared: set[str] = set()  # those of files that have more than globals
         self._findings = findings
-        self._blocks: dict[str, dict[str, str]] = {}
-        self._globals: dict[str, str] = {}  # types, by case-folded name; of a list of globals its name
+        self._results: dict[str, bool] = {}  # as in Unit
         self._programs: list[Element] = []
 
     def read(self, root: Element) -> None:
         for pou in root.every("pou"):
-            outputs = [v for part in pou.all("interface") for s in part.all("outputVars") for v in s.all("variable")]
-            known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in outputs}
-            known[""] = types.type_of(pou.child("interface", "returnType"))
-            self._blocks[pou.get("name").casefold()] = known
-        for data_type in root.every("dataType", "union"):
-            struct = data_type if data_type.tag == "union" else data_type.child("baseType", "struct")
-            members = struct.all("variable") if struct is not None else []
-            known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in members}
-            known[""] = types.type_of(data_type.child("baseType"))
-            self._blocks[data_type.get("name").casefold()] = known
-        for listed in root.every("globalVars"):
-            known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in listed.all("variable")}
-            for name, spec in known.items():
-                self._globals[name] = spec if self._globals.get(name, spec) == spec else ""
-            if listed.get("name"):
-                self._blocks.setdefault(listed.get("name").casefold(), known)
-                self._globals.setdefault(listed.get("name").casefold(), listed.get("name"))
+            self._results[pou.get("name").casefold()] = pou.child("interface", "returnType") is not None
         self._walk(root)
         for configuration in _configurations(root):
             plain = plain_text(configuration)
@@ -158,11 +141,9 @@ class _Project:
         self.text.made(f"END_{keyword}\n", pou.at)
 
     def _surroundings(self, pou: Element, name: str, *, keeps: bool) -> Unit:
-        own = [s for part in pou.all("interface") for s in part.all(*types.SECTIONS)]
-        known = {v.get("name").casefold(): types.type_of(v.child("type")) for s in own for v in s.all("variable")}
         transitions = {t.get("name").casefold(): t for part in pou.all("transitions") for t in part.all("transition")}
         actions = frozenset(a.get("name").casefold() for part in pou.all("actions") for a in part.all("action"))
-        return Unit(name, keeps, self._globals | known, self._blocks, transitions, actions)
+        return Unit(name, keeps, self._results, transitions, actions)
 
     def _header(self, element: Element, keyword: str, openings: frozenset[str]) -> None:
         """Declaration and variables."""
@@ -186,8 +167,7 @@ class _Project:
 
     def _members(self, pou: Element, unit: Unit) -> None:
         for action in [a for part in pou.all("actions") for a in part.all("action")]:
-            inner = Unit(unit.name, unit.keeps, unit.types, unit.blocks, unit.transitions, unit.actions)
-            self._action(action, inner)
+            self._action(action, unit)
         for part in [*pou.all("addData"), *pou.all("Methods", "Properties")]:
             for member in part.every("Method", "Property", "Action"):
                 if member.tag == "Method":
@@ -261,7 +241,7 @@ class _Project:
                     _translate(written, unit, body)
                 except NotTranslatedError as error:
                     message = str(error) if written.tag == "IL" else _REFUSED.format(f"{name} ({written.tag})", error)
-                    self._findings.add(error.at, "language", message, error.needs)
+                    self._findings.add(error.at, "language", message)
                     return Body()
                 except RecursionError:
                     self._findings.add(

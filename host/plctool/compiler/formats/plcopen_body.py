@@ -12,12 +12,11 @@ from plctool.compiler.formats.xml_tree import Element
 
 
 class NotTranslatedError(Exception):
-    """A diagram has no translation; `at` is the part of it that has none, `needs` as in Finding."""
+    """A diagram has no translation; `at` is the part of it that has none."""
 
-    def __init__(self, at: Place, why: str, needs: str = "") -> None:
+    def __init__(self, at: Place, why: str) -> None:
         super().__init__(why)
         self.at = at
-        self.needs = needs
 
 
 @dataclass
@@ -51,12 +50,11 @@ class Body:
 
 @dataclass
 class Unit:
-    """What a body may have to know of its unit. `types`: of variables, as far as known, by case-folded name. `blocks`:
-    of outputs of the function blocks and functions of the file ("" is the result), and of members of its structures."""
+    """What a body may have to know of its unit. `results`: whether a unit of the file has a result, by case-folded
+    name; False for function blocks and programs."""
 
     name: str
     keeps: bool  # whether its variables live from one call to the next
-    types: dict[str, str]
-    blocks: dict[str, dict[str, str]]
+    results: dict[str, bool]
     transitions: dict[str, Element] = field(default_factory=dict)  # their bodies
     actions: frozenset[str] = frozenset()  # names, case-folded

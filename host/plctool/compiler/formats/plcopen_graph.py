@@ -2,11 +2,12 @@
 
 The order is that of OpenPLC Editor and Beremiz: elements with an execution number first; then coils and output
 variables from top to bottom, each with all that it needs; then the blocks that nothing needed. An export without
-positions (CODESYS, TwinCAT) is taken in the order of the file. A function is computed once, into a variable. With jumps
-or labels, what is connected is a network, and the networks run from top to bottom. In a chart of CODESYS (CFC) all
-numbers hold: what an element needs of a later one is the value of the cycle before.
+positions (CODESYS, TwinCAT) is taken in the order of the file. A function is computed once, into a variable with the
+type that the checker gives its call. With jumps or labels, what is connected is a network, and the networks run from
+top to bottom. In a chart of CODESYS (CFC) all numbers hold: what an element needs of a later one is the value of the
+cycle before.
 
-What has no such order, or needs a type that is not known here, is refused, never guessed.
+What has no such order is refused, never guessed.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -14,10 +15,11 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import cmp_to_key
 
+from plctool.compiler.formats.library_units import COMPARISONS, is_declared
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
-from plctool.compiler.formats.plcopen_result_types import COMPARISONS, ResultTypes, declared
 from plctool.compiler.formats.xml_tree import Element
 
 _SIMPLE = re.compile(r"[\w.#%\[\]^$:']+")
@@ -40,6 +42,7 @@ _MODIFIED = {
 """What may stand at an element, or at a connection of a block."""
 
 _EXECUTE = "EXECUTE"  # a box of CODESYS and OpenPLC Editor with Structured Text in it
+_RESULT = re.compile(r"\b_TMP_\w+_OUT\b")
 _TRIGGERS = {"rising": "R_TRIG", "falling": "F_TRIG"}
 
 
@@ -54,12 +57,12 @@ class Network:
         self._body = body
         self._root = element
         self._elements = {e.get("localId"): e for e in element.children if e.get("localId")}
-        self._types = ResultTypes(unit, self._elements)
         self._order = list(self._elements.values())
         self._consumers: dict[str, list[Element]] = {}
         for consumer in self._order:
             for connection in consumer.every("connection"):
                 self._consumers.setdefault(connection.get("refLocalId"), []).append(consumer)
+        self._calls: dict[str, str] = {}  # of functions, by the variable with their result, in order
         self._done: dict[str, str] = {}  # results of functions, and "" for called blocks, by local id
         self._busy: set[str] = set()
         self._now = 0  # the execution number of the block whose inputs are evaluated
@@ -76,6 +79,14 @@ class Network:
             _check_modifiers(element)
         for element in self._in_order():
             self._execute(element)
+        self._declare_results()
+
+    def _declare_results(self) -> None:
+        """Declares the variables with the results of functions, each by what is declared before it."""
+        later = dict(self._calls)
+        for name, call in self._calls.items():
+            del later[name]
+            self._body.variables[name] = (type_of(_in_full(call, name, later)), self._body.variables[name][1])
 
     def expression(self, name: str) -> str:
         """Returns the value that goes to the coil or output variable with this name, or to the only one. Raises
@@ -278,16 +289,12 @@ class Network:
             )
 
     def _is_kept(self, block: Element) -> bool:
-        """Whether the result of a function is there in the next cycle. Notes that it is needed then."""
-        own = self._unit.blocks.get(block.get("typeName").casefold())
-        spec = self._types.of_function(block) if own is None else own.get("", "")
-        if spec and self._unit.keeps:
-            self._body.variables[result_variable(block)] = (spec, block.at)
-        return bool(spec) and self._unit.keeps
+        """Whether the result of a function is there in the next cycle."""
+        return self._unit.keeps and self._unit.results.get(block.get("typeName").casefold(), True)
 
     def _may_act(self, name: str) -> bool:
         """Whether a function is called even if nothing reads its result."""
-        return name.upper() == _EXECUTE or self._unit.blocks.get(name.casefold(), declared(name)) != {}
+        return name.upper() == _EXECUTE or name.casefold() in self._unit.results or is_declared(name)
 
     def _inputs(self, block: Element, key: str) -> tuple[str, list[tuple[str, str]]]:
         """EN, "" without one, and the other inputs that are connected, with their values."""
@@ -323,33 +330,22 @@ class Network:
         if name.upper() == _EXECUTE and block.child_data("stcode"):
             self._write_statements(block, key, enable)
             return
-        outputs = [v for v in _parameters(block, "outputVariables") if v.get("formalParameter").upper() != "ENO"]
-        used = {c.get("formalParameter") for e in self._consumers.get(key, []) for c in e.every("connection")
+        used = {c.get("formalParameter").upper() for e in self._consumers.get(key, []) for c in e.every("connection")
                 if c.get("refLocalId") == key}  # fmt: skip
-        named = [v.get("formalParameter") for v, _ in _named_outputs(block)]
-        used.update(named)
-        if any(v.get("formalParameter") in used for v in outputs[1:]):
+        used |= {v.get("formalParameter").upper() for v, _ in _named_outputs(block)}
+        used.discard("ENO")
+        outputs = [v.get("formalParameter").upper() for v in _parameters(block, "outputVariables")]
+        if not used.isdisjoint([name for name in outputs if name != "ENO"][1:]):
             raise NotTranslatedError(block.at, f"more than one output of the function {name} is used")
-        own = self._unit.blocks.get(name.casefold())
-        values = [f"{n} := {v}" for n, v in inputs] if own is not None else [v for _, v in inputs]
-        call = f"{name}({', '.join(values)})"
-        spec = self._types.of_function(block) if own is None else own.get("", "")
-        if own is not None and not spec:
+        own = self._unit.results.get(name.casefold())
+        call = f"{name}({', '.join(v if own is None else f'{n} := {v}' for n, v in inputs)})"
+        if own is False or not (used or own or is_declared(name)):
             self._body.line(f"IF {enable} THEN {call}; END_IF;" if enable else f"{call};", block.at)
             self._done[key] = "FALSE"
             return
-        later = self._reads(block)
-        if not spec and (enable or later + len(named) > 1 or (later and self._number(block))):
-            needs = self._types.undeclared(block)
-            raise NotTranslatedError(block.at, f"the type of the result of {name} is not known", needs)
-        if not spec:
-            self._done[key] = call
-            only_enabled = bool(used) and {u.upper() for u in used} == {"ENO"}
-            if only_enabled or (not later and not named and (block.get("computed") or self._may_act(name))):
-                self._body.line(f"{call};", block.at)
-            return
         result = result_variable(block)
-        self._body.variables[result] = (spec, block.at)
+        self._calls[result] = call
+        self._body.variables[result] = ("", block.at)
         if enable and name.upper() in COMPARISONS and not _has_output(block, "ENO"):
             call, enable = f"{enable} AND {_operand(call)}", ""  # in a rung, as a contact
         statement = f"{result} := {call};"
@@ -364,24 +360,6 @@ class Network:
             self._body.line(f"IF {enable} THEN", block.at)
         self._body.parts += [chunk for data in block.child_data("stcode") for chunk in data.every_chunk()]
         self._body.line("\nEND_IF;" if enable else "", block.at)
-
-    def _reads(self, element: Element) -> int:
-        """How often the value of an element is evaluated."""
-        count, seen = 0, set()
-        waiting = [element]
-        while waiting:
-            at = waiting.pop()
-            for consumer in self._consumers.get(at.get("localId"), []):
-                passes = consumer.tag in ("contact", "coil", "connector")
-                count += consumer.tag == "coil" or not passes
-                if consumer.tag == "connector":
-                    count = 2  # its continuations may be many
-                elif passes and consumer.get("localId") not in seen:
-                    seen.add(consumer.get("localId"))
-                    waiting.append(consumer)
-                elif passes:
-                    count = 2  # there are two ways to it
-        return count
 
 
 def networks(order: list[Element]) -> list[list[Element]]:
@@ -421,6 +399,25 @@ def _parameters(block: Element, which: str) -> list[Element]:
 def result_variable(block: Element) -> str:
     """The variable with the result of a function."""
     return f"_TMP_{block.get('typeName').rpartition('.')[2]}{block.get('localId')}_OUT"
+
+
+def type_of(call: str) -> str:
+    """The type of what a call returns, for a declaration."""
+    return f"@type({call})"
+
+
+def _in_full(call: str, own: str, later: Mapping[str, str]) -> str:
+    """A call whose results of the cycle before, which are declared `later`, are written as the calls that they come
+    from; 0 for what leads back to its `own` result, or was written before."""
+    waiting = dict(later)
+
+    def written(name: re.Match[str]) -> str:
+        if name[0] not in later and name[0] != own:
+            return name[0]
+        text = waiting.pop(name[0], "0")
+        return f"({_RESULT.sub(written, text)})"
+
+    return _RESULT.sub(written, call)
 
 
 def enable_variable(block: Element) -> str:

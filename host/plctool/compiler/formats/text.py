@@ -43,9 +43,9 @@ class Findings:
     def __init__(self) -> None:
         self._found: dict[Finding, None] = {}
 
-    def add(self, at: Place, code: str, message: str, needs: str = "") -> None:
-        """Notes an error; `needs` as in Finding."""
-        self._found[Finding(at.line, at.column, code, message, needs=needs)] = None
+    def add(self, at: Place, code: str, message: str) -> None:
+        """Notes an error."""
+        self._found[Finding(at.line, at.column, code, message)] = None
 
     def warning(self, at: Place, code: str, message: str) -> None:
         """Notes a warning."""

@@ -10,7 +10,7 @@ import re
 from plctool.compiler.base.source import Source
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
 from plctool.compiler.formats.text import Findings, Text
-from plctool.compiler.formats.tree_bodies import Types, translate_networks, types_of, units_of
+from plctool.compiler.formats.tree_bodies import translate_networks
 from plctool.compiler.formats.twincat_networks import read_networks
 from plctool.compiler.formats.units import unit_keyword
 from plctool.compiler.formats.xml_tree import Element, XmlError, read_xml
@@ -58,7 +58,6 @@ class _Object:
     def __init__(self, text: Text, findings: Findings) -> None:
         self._text = text
         self._findings = findings
-        self._types: Types = {}  # of the variables of the unit
         self._next_id = 1  # of its networks, so that no two need variables of the same name
 
     def read(self, part: Element) -> None:
@@ -72,13 +71,10 @@ class _Object:
         if declaration is None:
             return
         keyword = unit_keyword("".join(chunk.text for chunk in declaration.chunks))
-        drawn_inside = next(part.every("NWL"), None) is not None
-        text = "".join(chunk.text for chunk in declaration.chunks)
-        self._types = types_of(units_of(f"{text}\nEND_{keyword}")) if drawn_inside else {}
         keeps = keyword in ("FUNCTION_BLOCK", "PROGRAM")
-        body = self._networks(part, part.get("Name"), self._types, keeps=keeps)
+        body = self._networks(part, part.get("Name"), keeps=keeps)
         actions = {
-            id(action): self._networks(action, f"{part.get('Name')}.{action.get('Name')}", self._types, keeps=keeps)
+            id(action): self._networks(action, f"{part.get('Name')}.{action.get('Name')}", keeps=keeps)
             for action in part.all("Action")
         }
         self._text.copied(declaration.chunks)
@@ -113,25 +109,23 @@ class _Object:
         """Declaration and body of a method, property or accessor."""
         declaration = part.child("Declaration")
         chunks = [] if declaration is None else declaration.chunks
-        text = "".join(chunk.text for chunk in chunks)
-        own = types_of(units_of(_inside(text))) if next(part.every("NWL"), None) is not None else {}
-        body = self._networks(part, name, self._types | own, keeps=False)
+        body = self._networks(part, name, keeps=False)
         if declaration is not None:
             self._text.copied(chunks)
             self._text.made("\n", part.at)
         body.write_variables(self._text)
         self._body(part, name, body)
 
-    def _networks(self, part: Element, name: str, types: Types, *, keeps: bool) -> Body:
+    def _networks(self, part: Element, name: str, *, keeps: bool) -> Body:
         """The statements of LD and FBD; none, and a finding, if they have no translation."""
         made = Body()
         for archive in [nwl for implementation in part.all("Implementation") for nwl in implementation.all("NWL")]:
             try:
                 elements = read_networks(archive, first=self._next_id)
                 self._next_id = elements.next_id
-                translate_networks(elements.body, Unit(name, keeps, types, {}), made)
+                translate_networks(elements.body, Unit(name, keeps, {}), made)
             except NotTranslatedError as error:
-                self._findings.add(error.at, "language", REFUSED.format(name, error), error.needs)
+                self._findings.add(error.at, "language", REFUSED.format(name, error))
                 return Body()
         return made
 
@@ -163,12 +157,6 @@ class _Object:
         for call in programs:
             self._text.made(f"PROGRAM {call.text} WITH {name} : {call.text};\n", call.at)
         self._text.made("END_CONFIGURATION\n", task.at)
-
-
-def _inside(declaration: str) -> str:
-    """The declaration of a method or accessor as that of a function, for its variables."""
-    blocks = declaration[declaration.upper().find("VAR") :] if "VAR" in declaration.upper() else ""
-    return f"FUNCTION _\n{blocks}\nEND_FUNCTION"
 
 
 def identifier(name: str) -> str:

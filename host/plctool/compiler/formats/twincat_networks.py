@@ -187,8 +187,7 @@ def _operand(element: Element) -> Operand | None:
     if inner is None or not text:
         return None
     negated, edge = _modifiers(inner, element)
-    kind = _value(inner, "Type").strip()
-    return Operand(text, _place(inner), negated, edge, kind if kind.isidentifier() else "")
+    return Operand(text, _place(inner), negated, edge)
 
 
 def _modifiers(owner: Element, at: Element) -> tuple[bool, str]:

@@ -14,14 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.configuration import Application
 from plctool.compiler.semantics.participants import Participant
 from plctool.compiler.semantics.program import Program
-from plctool.compiler.semantics.rules.builtin import is_built_in
 from plctool.compiler.sources.imports import ImportedLibrary
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.diagnostics import Diagnostic, Diagnostics
@@ -57,22 +55,6 @@ class Parsed:
     def has_tests(self) -> bool:
         """True if the program can be declared and has TEST blocks."""
         return not self.broken and any(isinstance(d, ast.TestDecl) for _, t in self.texts for d in t.declarations)
-
-    @cached_property
-    def _names(self) -> set[str]:
-        """Those of units and global variables, case-folded."""
-        found = {name.casefold() for name in self.library.names()}
-        found |= {name.casefold() for library in self.libraries for name in library.by_name}
-        for declaration in (d for _, text in self.texts for d in text.declarations):
-            if isinstance(declaration, ast.PouDecl | ast.TypeDecl):
-                found.add(declaration.name.casefold())
-            elif isinstance(declaration, ast.GlobalBlock):
-                found |= {name.casefold() for line in declaration.block.decls for _, name in line.names}
-        return found
-
-    def knows(self, name: str) -> bool:
-        """True if something declares the name of a function or function block."""
-        return is_built_in(name) or name.rpartition(".")[2].casefold() in self._names
 
 
 @dataclass(frozen=True)

@@ -190,6 +190,7 @@ class World:
         self._texts: dict[tuple[int | float | str, Type], Variable] = {}
         self._defaults_in_memory: dict[VarSymbol | TypeSymbol, Variable] = {}
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
+        self.inferred: dict[tuple[str, str, int], Type] = {}  # of TypeOf, by path and name of the source, and offset
         self.pools: dict[Type, Pool] = {}
         self.closers: dict[Type, Pou] = {}  # what ends the elements that a POINTER TO the type leads to
         self.clock: dict[str, Variable] = {}  # what TIME and LTIME read in unit tests

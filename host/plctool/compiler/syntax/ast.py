@@ -291,7 +291,15 @@ class StructSpec:
     pack_mode: str | None = None  # the value of the attribute
 
 
-TypeSpec = NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | StructSpec
+@dataclass(slots=True, eq=False)
+class TypeOf:
+    """`@type(value)`: the type of a value. Readers of diagrams write it; no program has it."""
+
+    pos: int
+    value: Expr
+
+
+TypeSpec = TypeOf | NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | StructSpec
 
 # ---- declarations --------------------------------------------------------------------------------------------------
 

@@ -141,6 +141,10 @@ class Builder:
     def text_type(self, name: Token, length: ast.Expr | None) -> ast.NamedType:
         return ast.NamedType(name.pos, name.text, length)
 
+    def type_of(self, word: Token, value: ast.Expr) -> ast.TypeOf:
+        self.temp(word)
+        return ast.TypeOf(word.pos, value)
+
     def subrange(self, base: tuple[int, str], low: ast.Expr, high: ast.Expr) -> ast.SubrangeSpec:
         return ast.SubrangeSpec(*base, low, high)
 

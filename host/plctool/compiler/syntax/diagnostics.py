@@ -13,7 +13,7 @@ from typing import Literal
 
 from plctool.compiler.base.missing_names import Use, library_of, table
 from plctool.compiler.base.nesting import NestingError
-from plctool.compiler.base.source import Finding, Source
+from plctool.compiler.base.source import Source
 from plctool.compiler.syntax.warnings import ALL_WARNINGS, MEANINGS, LineRanges, WarningOptions, switched_off
 from plctool.compiler.typed.nodes import Pos
 from plctool.errors import UsageError, counted
@@ -68,7 +68,6 @@ class Diagnostics:
         self._found: dict[Diagnostic, None] = {}
         self._reported: set[tuple[str, Pos]] = set()  # codes and where
         self.incomplete: set[str] = set()  # units, case-folded, that lack what has an unknown type or base
-        self.waiting: list[tuple[Pos, Finding]] = []  # until all names are known
         self.errors = 0
         self._counted = 0  # errors that are counted to the limit
         self._unknown: set[str] = set()  # what was said of unknown names: said again it does not count
@@ -136,23 +135,10 @@ class Diagnostics:
         """Takes over what the reader of a file found. Diagrams do not count: all are named, and the rest is checked."""
         for found in source.findings:
             pos = Pos(source.path, found.line, found.column)
-            if found.needs:
-                self.waiting.append((pos, found))
-            elif found.severity == "warning":
+            if found.severity == "warning":
                 self.warning(pos, found.code, found.message)
             else:
                 self._add(pos, "error", found.code, found.message, counts=found.code not in _UNCOUNTED)
-
-    def settle(self, is_known: Callable[[str], bool]) -> None:
-        """Reports the findings that waited for a name: an unknown name is the error, else it is what was found."""
-        reported = {d.missing.casefold() for d in self._found if d.missing}
-        for pos, found in self.waiting:
-            if found.needs.casefold() in reported:
-                continue
-            if is_known(found.needs):
-                self._add(pos, "error", found.code, found.message, counts=found.code not in _UNCOUNTED)
-            else:
-                self.missing(pos, found.needs, f"unknown function {found.needs}")
 
     def at(self, source: Source) -> SourceDiagnostics:
         """Reports by offset in a source."""

@@ -718,4 +718,5 @@ class TypedProgram:
     externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not
     io: Description | None = None  # the inputs and outputs, each with its address
     may_recurse: bool = False  # a call may lead back to its caller, so that the depth of calls is not known
+    inferred: dict[tuple[str, str, int], Type] = field(default_factory=dict)  # as in World
     trail: Variable | None = None  # where the way of an exception is left that passed a `__TRY`

@@ -44,6 +44,7 @@ from plctool.iec.types import (
     StructType,
     Type,
     alignment_at,
+    base_of,
 )  # fmt: skip
 
 MAX_STRING = 0xFFFF
@@ -157,10 +158,22 @@ class TypeDeclarations:
             return subrange(self._world, spec, base, scope, name)
         if isinstance(spec, ast.PointerSpec):
             return self._pointer(spec, scope), None
+        if isinstance(spec, ast.TypeOf):
+            t = self._type_of_value(spec.value, scope)
+            self._world.inferred[scope.source.path, scope.source.name, spec.pos] = t
+            return t, self.struct_default(t) if isinstance(t, StructType) else None
         if name is None:
             scope.error(spec.pos, "type", "a STRUCT is declared in a TYPE block")
             return ERROR, None
         return self._struct(spec, scope, name)
+
+    def _type_of_value(self, value: ast.Expr, scope: Scope) -> Type:
+        """The type of what the body computes as well, with hidden variables of its own and the same errors."""
+        known = 0 if scope.pou is None else len(scope.pou.locals)
+        t = Checker(self._world, scope).settled(value).type
+        if scope.pou is not None:
+            del scope.pou.locals[known:]
+        return t if isinstance(t, EnumType) else base_of(t)
 
     def named_type(self, offset: int, name: str, scope: Scope) -> Type:
         """The type of that name; ERROR after an error, if there is none."""
