@@ -21,6 +21,7 @@ from plctool.compiler.base.nesting import NestingError, room_for_nesting
 from plctool.compiler.base.source import Source
 from plctool.compiler.image.task_images import plan_images
 from plctool.compiler.semantics import lints
+from plctool.compiler.semantics.generic_blocks import with_instances
 from plctool.compiler.semantics.io_channels import IoChannels, device_variables
 from plctool.compiler.semantics.participants import DeviceTasks, Files, Guest
 from plctool.compiler.semantics.permitted import check_declarations
@@ -255,6 +256,7 @@ def declare(
     participants = [guest.begin(program) for guest in guests]
     for participant in participants:
         files = participant.after_parse(files)
+    files = with_instances(files, world.diagnostics)
     for source, declarations in files:
         world.names.register(declarations)
         world.names.register_globals(declarations, source)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from plctool.fmt.lines import LABEL
+from plctool.fmt.lines import DECLARATION, LABEL
 from plctool.fmt.scan import Item
 
 _VALUES = frozenset((
@@ -38,6 +38,8 @@ def has_blank(items: Sequence[Item], at: int, first: int, kind: str) -> bool:
         return item.type == "_DOTDOT" and previous.type == "TYPED" and previous.text[-1] in _OF_DATES
     if previous.type in ("_LPAR", "_LSQB", "_DOT", "_DOTDOT"):
         return False
+    if kind == DECLARATION and any(_is_around_constants(items, i, first) for i in (at - 1, at)):
+        return items[at].type == "_ASSIGN"
     if item.type == "_DOT":
         return previous.type == "NUMBER" or previous.type not in _VALUES
     if item.type == "_LPAR":
@@ -51,6 +53,16 @@ def has_blank(items: Sequence[Item], at: int, first: int, kind: str) -> bool:
     if previous.type == "SIGN" and is_unary(items, at - 1):
         return item.type == "SIGN"
     return True
+
+
+def _is_around_constants(items: Sequence[Item], at: int, first: int) -> bool:
+    """True for < and > of a type, `Fifo<10>`: no operator stands between the colon and the initial value."""
+    if items[at].type != "OP" or items[at].text not in ("<", ">"):
+        return False
+    depth, types = 0, [item.type for item in items[first:at]]
+    for kind in types:
+        depth += (kind in ("_LPAR", "_LSQB")) - (kind in ("_RPAR", "_RSQB"))
+    return depth == 0 and "_COLON" in types and "_ASSIGN" not in types
 
 
 def _is_assigning_word(items: Sequence[Item], at: int, first: int) -> bool:

@@ -65,7 +65,7 @@ _TEST = {Section.VAR: _CONSTANT, Section.VAR_TEMP: _CONSTANT, Section.VAR_EXTERN
 
 SECTIONS: dict[Kind, dict[Section, frozenset[Modifier]]] = {
     Kind.FUNCTION: {**_CALL, **_PARAMETERS},
-    Kind.FUNCTION_BLOCK: {**_LASTING, Section.VAR: _CONSTANT | KEEPING | ACCESS},
+    Kind.FUNCTION_BLOCK: {**_LASTING, Section.VAR: _CONSTANT | KEEPING | ACCESS, Section.VAR_GENERIC: _CONSTANT},
     Kind.CLASS: {**_CALL, Section.VAR: _CONSTANT | KEEPING | ACCESS},
     Kind.PROGRAM: {**_LASTING, Section.VAR: _CONSTANT | KEEPING | ACCESS},
     Kind.METHOD: {**_CALL, **_PARAMETERS, Section.VAR_INST: KEEPING},

@@ -233,12 +233,14 @@ Init = Expr | ArrayInit | StructInit
 @dataclass(slots=True, eq=False)
 class NamedType:
     """A type by its name; `length` for STRING[length], `inits` for the elements of `ARRAY[1..2] OF Block[(id := 1), (id
-    := 2)]`."""
+    := 2)]`. `constants`: of `Fifo<10>`, whose `template` is Fifo."""
 
     pos: int
     name: str
     length: Expr | None = None
     inits: ArrayInit | None = None
+    constants: list[Expr] = field(default_factory=list)
+    template: str = ""
 
 
 @dataclass(slots=True, eq=False)
@@ -334,6 +336,7 @@ class Section(StrEnum):
     VAR_TEMP = "VAR_TEMP"
     VAR_STAT = "VAR_STAT"
     VAR_INST = "VAR_INST"
+    VAR_GENERIC = "VAR_GENERIC"
     VAR_EXTERNAL = "VAR_EXTERNAL"
     VAR_GLOBAL = "VAR_GLOBAL"
     STEP = "STEP"  # the steps of a chart, which the compiler declares

@@ -132,8 +132,19 @@ class Builder:
         decl.modifiers = {ast.Modifier(token.text.upper()) for token in modifiers}
         return decl
 
-    def named_type(self, name: tuple[int, str]) -> ast.NamedType:
-        return ast.NamedType(*name)
+    def named_type(self, name: tuple[int, str], opening: Token | None = None, *rest: Any) -> ast.NamedType:
+        if opening is None:
+            return ast.NamedType(*name)
+        *constants, closing = rest
+        if (opening.text, closing.text) != ("<", ">"):
+            self.report(opening.pos, "syntax", "the constants of a block stand between < and >")
+        return ast.NamedType(*name, constants=constants, template=name[1])
+
+    def signed(self, sign: Token, number: Token) -> ast.Expr:
+        return ast.Unary(sign.pos, ast.Operator(sign.text), self.number(number))
+
+    def constant_name(self, name: tuple[int, str]) -> ast.Name:
+        return ast.Name(*name)
 
     def initialised_type(self, name: tuple[int, str], inits: ast.ArrayInit) -> ast.NamedType:
         return ast.NamedType(*name, inits=inits)

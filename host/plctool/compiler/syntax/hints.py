@@ -227,8 +227,6 @@ _HINTS = (
     _Hint(rf"^\s*(?P<name>{_NAME})\s*(?P<here>\[(?P<count>\d+)\]\s*):\s*(?P<type>\w+)", _array, "here", "declaration"),
     _Hint(rf":\s*\w+\s*(?P<here>,)\s*{_NAME}\s*:", "a declaration ends with ;, not with a comma", "here",
           "declaration"),
-    _Hint(rf":\s*(?:ARRAY\s*\[[^\]]*\]\s*OF\s+)?(?:{_NAME}\.)*{_NAME}\s*(?P<here><)", slips.GENERIC, "here",
-          "declaration"),
     _Hint(rf":\s*(?P<here>\*\s*(?P<name>{_NAME}))", _POINTER, "here", "declaration"),
     _Hint(rf":\s*(?P<name>{_NAME})\s*(?P<here>\*)", _POINTER, "here", "declaration"),
     _Hint(r":\s*(?P<here>CONST(?:ANT)?\s+\w+[^;]*)", _CONSTANT, "here", "declaration"),

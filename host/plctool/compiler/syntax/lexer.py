@@ -54,6 +54,7 @@ KEYWORDS = {
     **dict.fromkeys(("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "QUALIFIER"),
     **dict.fromkeys(("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_STAT", "VAR_EXTERNAL"), "VAR"),
     "VAR_INST": "VAR",
+    "VAR_GENERIC": "VAR",
     **dict.fromkeys(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "FINAL", "ABSTRACT", "OVERRIDE"), "MODIFIER"),
     "VAR_GLOBAL": "GLOBAL",
     "__TRY": "TRY",

@@ -140,14 +140,8 @@ class Refusal:
 
 _GRAPHIC = "this is a diagram; only Structured Text can be compiled"
 
-GENERIC = (
-    "blocks of any size are not supported; write one with VAR CONSTANT for each size, "
-    "or take a POINTER TO and a count whose memory the caller declares"
-)
-
 REFUSED = {
     "VIRTUAL": Refusal("every method can be overridden; leave VIRTUAL out"),
-    "VAR_GENERIC": Refusal(GENERIC, "END_VAR"),
     "_LD_BODY": Refusal(_GRAPHIC),
     "_FBD_BODY": Refusal(_GRAPHIC),
     "_CFC_BODY": Refusal(_GRAPHIC),

@@ -193,11 +193,17 @@ class TypeDeclarations:
             scope.error(spec.pos, "type", message)
             return ERROR, None
         known = _DIALECT.get(upper) or ELEMENTARY.get(upper) or scope.bindings.get(upper)
-        if known is not None:
-            return known, None
-        return self._declared(spec, scope)
+        found = (known, None) if known is not None else self._declared(spec, scope)
+        if spec.template == spec.name and found[0] is not ERROR and spec.constants:
+            message = f"{spec.name} has no VAR_GENERIC CONSTANT, so nothing follows it in < >"
+            scope.error(spec.pos, "type", message)
+        return found
 
     def _declared(self, spec: ast.NamedType, scope: Scope) -> tuple[Type, Initial | None]:
+        for name in ast.every(ast.Name, spec.constants):
+            constant = scope.lookup(name.name)
+            if isinstance(constant, VarSymbol):
+                constant.used = True
         symbol = scope.unit(spec.name)
         if symbol is not None and not scope.may_use(symbol, spec.name, spec.pos):
             return ERROR, None

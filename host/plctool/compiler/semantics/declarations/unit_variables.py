@@ -65,6 +65,7 @@ ROLES = {
     Section.VAR_TEMP: Role.TEMP,
     Section.VAR_STAT: Role.LOCAL,
     Section.VAR_INST: Role.LOCAL,
+    Section.VAR_GENERIC: Role.LOCAL,
     Section.STEP: Role.STEP,
 }
 _KINDS = {
