@@ -1,4 +1,4 @@
-"""Texts whose variables have the types that the check found for them: those of diagrams are declared by a value.
+"""Sources whose variables have the types that the check found for them: those of diagrams are declared by a value.
 
 SPDX-License-Identifier: Apache-2.0
 """
