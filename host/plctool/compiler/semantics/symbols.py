@@ -195,7 +195,8 @@ class BlockInfo:
     def make_way(self, name: str, defaults: dict[str, Initial]) -> None:
         """Puts the name of the base in front of that of a variable that the base has for itself, such as a PRIVATE one:
         the block declares another one."""
-        inherited, base = self.type.member(name), self.type.base
+        base = self.type.base
+        inherited = None if base is None else self.type.member(name)
         if inherited is None or base is None:
             return
         old, inherited.name = inherited.name, f"{base.name}.{inherited.name}"
