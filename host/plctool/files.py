@@ -30,6 +30,12 @@ class Pos(NamedTuple):
     column: int
 
 
+def cache_folder() -> Path:
+    """The folder of what plctool keeps to be quicker, or to know images again: $XDG_CACHE_HOME/plctool."""
+    root = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(root) / "plctool"
+
+
 def usable_path(text: str) -> Path:
     """A path that a user gave. Raises UsageError if no file can have it: it is too long, has a NUL or
     is a link to itself."""

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler.codegen import partition
-from plctool.compiler.codegen.emit import emit_objects
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.objects import emit_objects
 from plctool.compiler.codegen.passes import PASSES, parse_passes
 from plctool.compiler.front import Source, check_sources
 from plctool.compiler.image.build import build_program

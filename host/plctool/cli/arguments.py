@@ -43,6 +43,9 @@ def add_build_arguments(parser: Parser) -> None:
     )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="with --base: say what the change does, write nothing")
     add_build_options(parser)
+    parser.add_argument(
+        "--no-cache", action="store_true", help="compile all, also what has not changed since an earlier build"
+    )
     add_passes(parser)
     add_warnings(parser)
     add_io_files(parser)

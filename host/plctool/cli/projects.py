@@ -71,6 +71,7 @@ def _request(args: argparse.Namespace, files: ProgramFiles) -> BuildRequest:
         dialect=_dialect(args, files)[0],
         no_pass=tuple(getattr(args, "no_pass", ())),
         dump_after=getattr(args, "dump_after", None),
+        cache=not getattr(args, "no_cache", False),
     )
 
 

@@ -246,6 +246,7 @@ def _board(request: BuildRequest) -> Board | None:
 def _options(request: BuildRequest, board: Board | None, io: Description | None) -> Options:
     """What the code generator is asked for. Raises UsageError for a target that the board does not have."""
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
+    from plctool.compiler.codegen.object_cache import cache_of_user
     from plctool.compiler.codegen.passes import parse_passes
     from plctool.image.targets import find_target
 
@@ -257,7 +258,16 @@ def _options(request: BuildRequest, board: Board | None, io: Description | None)
         stacks = FirmwareStacks(request.firmware, target.machine)
     number, size = (2, True) if request.level == "s" else (request.level, False)
     passes = parse_passes(request.no_pass, request.dump_after)
-    options = Options(target, number, parse_checks(request.checks), request.debug, size, stacks, passes)
+    options = Options(
+        target,
+        number,
+        parse_checks(request.checks),
+        request.debug,
+        size,
+        stacks,
+        passes,
+        cache_of_user() if request.cache else None,
+    )
     if board is not None and board.target != target.name:
         raise UsageError(
             f"{board.title} has a {board.target}, not a {target.name}; leave the target out, or name a board that has "

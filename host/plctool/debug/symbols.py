@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 import re
 import zlib
 from bisect import bisect_right
@@ -25,7 +24,7 @@ from plctool.debug.passed_lines import TRAIL, PassedLine, passed_lines
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Symbol, Units, constant_symbol, shown, walk
 from plctool.errors import UsageError
-from plctool.files import MAX_BINARY, read_regular, write_atomically
+from plctool.files import MAX_BINARY, cache_folder, read_regular, write_atomically
 from plctool.iec.addresses import parse_address
 from plctool.iec.type_descriptions import DescribedTypes, describe
 from plctool.iec.types import ELEMENTARY, ArrayType, OpenArrayType, StructType, Type
@@ -475,8 +474,7 @@ def symbol_path(image: Path) -> Path:
 
 def cache_path(image_crc: int) -> Path:
     """Where the symbols of an image are kept for later: $XDG_CACHE_HOME/plctool/<crc>.sym."""
-    root = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(root) / "plctool" / f"{image_crc:08x}{SYMBOL_SUFFIX}"
+    return cache_folder() / f"{image_crc:08x}{SYMBOL_SUFFIX}"
 
 
 def find_symbols(image_crc: int, beside: Path | None = None) -> SymbolTable:

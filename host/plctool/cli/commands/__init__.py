@@ -49,6 +49,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
         Row("image", "images", "write what a production programmer burns: a flash with its program"),
         Row("export", "exports", "write a program as PLCopen XML, for CODESYS, TwinCAT, OpenPLC Editor and Beremiz"),
         Row("export-itf", "exports", "write a C header, and a C file to fill in, for functions implemented in C"),
+        Row("cache", "cache", "show or empty the folder of compiled code, which makes builds quicker"),
         Row("bench", "simulation", "measure the time of a cycle on this machine"),
     ),
     "devices": (

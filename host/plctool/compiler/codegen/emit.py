@@ -1,8 +1,10 @@
-"""From LLVM IR in text form to one ELF object: llvmlite parses, verifies, optimises and emits."""
+"""From LLVM IR in text form to one ELF object: llvmlite parses, verifies, optimises and emits.
+
+Its bytes are part of the key of each object that is kept (`objects.py`).
+"""
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable
 from functools import cache
@@ -33,7 +35,8 @@ _code_generator = Lock()  # its options are those of the process
 
 
 @cache
-def _initialise() -> None:
+def initialise() -> None:
+    """Prepares LLVM, once in a process."""
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     # How far back an earlier load of a variable is looked for. What is loaded once and used far apart has to be kept
@@ -49,7 +52,7 @@ def _initialise() -> None:
 def target_machine(target: Target, opt_level: int) -> llvm.TargetMachine:
     """Returns LLVM's code generator for a target: one for all programs of a process, because to make it takes a tenth
     of the time of a small program. llvmlite lets one thread at a time use it."""
-    _initialise()
+    initialise()
     features = ",".join([target.features, *([target.features_for_speed] if opt_level >= FASTEST else [])])
     return llvm.Target.from_triple(target.triple).create_target_machine(
         cpu=target.cpu, features=features, opt=opt_level, reloc="pic", codemodel="small", abiname=target.abi
@@ -173,42 +176,3 @@ def _emitted(
         finally:
             for switch in switches:
                 llvm.set_option("", f"{switch}=false")
-
-
-def emit_objects(parts: list[Part], options: Options) -> list[bytes]:
-    """The objects of the parts of a program, several if it is large: side by side in processes of their own where
-    the system can fork; the result is the same either way."""
-    alone = bool(options.passes.dump_after)  # or what the others keep would be lost
-    if alone or len(parts) < 2 or not hasattr(os, "fork") or (os.cpu_count() or 1) < 2:
-        return [emit_object(part, options) for part in parts]
-    _initialise()
-    children = [_Child(part, options) for part in parts[1:]]
-    objects = [emit_object(parts[0], options)]
-    for part, child in zip(parts[1:], children, strict=True):
-        objects.append(child.result() or emit_object(part, options))
-    return objects
-
-
-class _Child:
-    """A process that emits one of several objects. A process, because llvmlite lets one thread at a time into LLVM."""
-
-    def __init__(self, part: Part, options: Options) -> None:
-        read, write = os.pipe()
-        self._pid = os.fork()
-        if self._pid == 0:
-            status = 1
-            try:
-                with open(write, "wb") as pipe:
-                    pipe.write(emit_object(part, options))
-                status = 0
-            finally:
-                os._exit(status)
-        os.close(write)
-        self._read = read
-
-    def result(self) -> bytes:
-        """The object; empty when the process failed, which it then also does here, with a message."""
-        with open(self._read, "rb") as pipe:
-            data = pipe.read()
-        _, status = os.waitpid(self._pid, 0)
-        return data if status == 0 else b""

@@ -6,9 +6,11 @@ nothing reaches, so the lowering never has to ask whether code is dead; LLVM rem
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
+from zlib import crc32
 
 
 class Value(str):
@@ -72,35 +74,48 @@ _ARITHMETIC = " @llvm."  # an intrinsic that has a value
 
 TRUE, FALSE, NULL = Value("true"), Value("false"), Value("null")
 
+_REFERENCE = re.compile(r"!\d+|@[\w.]+")  # to a metadata node, a function or a constant
+_NODE = re.compile(r'"[^"]*"|!(\d+)')
+_MOST_NODES = (1 << 31) - 1
+
 
 class Module:
-    """Collects functions, constants, declarations and metadata of one LLVM module."""
+    """Collects functions, constants, declarations and metadata of one LLVM module.
+
+    Names and numbers come from what they stand for, and a text has only what its functions reach, in the order in which
+    they do. So the text of a part of a program stays the same when other parts change, and its object is found again
+    (`object_cache.py`).
+    """
 
     def __init__(self, triple: str) -> None:
         self._triple = triple
-        self._globals: list[str] = []
+        self._constants: dict[str, str] = {}
         self.functions: dict[str, Definition] = {}
-        self._helpers: list[str] = []
+        self._helpers: dict[str, str] = {}
         self._declarations: dict[str, str] = {}
         self._attributes: dict[str, int] = {}
-        self._metadata: list[str] = []
+        self._metadata: dict[int, str] = {}
         self._metadata_ids: dict[str, int] = {}
         self._named_metadata: list[str] = []
-        self._literals: dict[bytes, str] = {}
+        self._below: dict[int, list[int]] = {}  # the nodes that a node refers to
 
     def metadata(self, text: str) -> int:
         """The number of the metadata node `text`, e.g. '!{i64 8}'; equal nodes exist once."""
         number = self._metadata_ids.get(text)
         if number is None:
-            number = len(self._metadata)
-            self._metadata_ids[text] = number
-            self._metadata.append(text)
+            number = self._metadata_ids[text] = self._new_node(text)
+        return number
+
+    def _new_node(self, text: str) -> int:
+        number = crc32(text.encode()) & _MOST_NODES
+        while number in self._metadata:
+            number = (number + 1) & _MOST_NODES
+        self._metadata[number] = text
         return number
 
     def distinct_metadata(self, text: str) -> int:
         """A node of its own, e.g. a DISubprogram."""
-        self._metadata.append("distinct " + text)
-        return len(self._metadata) - 1
+        return self._new_node("distinct " + text)
 
     def named_metadata(self, name: str, nodes: list[int]) -> None:
         self._named_metadata.append(f"!{name} = !{{{', '.join(f'!{n}' for n in nodes)}}}")
@@ -123,45 +138,79 @@ class Module:
         return f"#{self._attributes.setdefault(text, len(self._attributes))}"
 
     def constant(self, data: bytes, align: int = 1) -> Value:
-        """The address of a read-only constant in the image; equal byte strings of alignment 1 exist once."""
-        if align == 1 and data in self._literals:
-            return Value(self._literals[data])
-        name = f"@const.{len(self._globals)}"
-        if align == 1:
-            self._literals[data] = name
-        self._globals.append(
-            f"{name} = internal unnamed_addr constant [{len(data)} x i8] {bytes_literal(data)}, align {align}"
-        )
-        return Value(name)
+        """The address of a read-only constant in the image; equal ones exist once."""
+        text = f" = internal unnamed_addr constant [{len(data)} x i8] {bytes_literal(data)}, align {align}"
+        number = crc32(text.encode())
+        while self._constants.setdefault(f"@const.{number:x}", text) != text:
+            number += 1
+        return Value(f"@const.{number:x}")
 
     def add(self, name: str, function: Function, linkage: str = "internal") -> None:
         """A function that exists once in the program. `linkage`: "" when it is called from outside."""
         self.functions[name] = Definition(function, linkage)
 
-    def add_helper(self, definition: str) -> None:
-        """A small internal function, or several, of which every part of the module has its own copy."""
-        self._helpers.append(definition)
+    def add_helper(self, name: str, definition: str) -> None:
+        """A small internal function, of which every part of the module that calls it has its own copy."""
+        self._helpers[f"@{name}"] = definition
 
     def declare(self, name: str, declaration: str) -> None:
         """A function that is not in the module; the first declaration of a name holds."""
-        self._declarations.setdefault(name, declaration)
+        self._declarations.setdefault(f"@{name}", declaration)
 
     def whole(self) -> str:
         """The module with all its functions."""
         return self.text(d.function.definition(d.linkage) for d in self.functions.values())
 
     def text(self, functions: Iterable[str]) -> str:
-        """The module in LLVM's assembly language, with these functions in it."""
+        """The module in LLVM's assembly language, with these functions and all that they refer to."""
+        written = "\n".join(functions)
+        references = dict.fromkeys(_REFERENCE.findall(written))
+        helpers = self._reached_helpers(references)
+        for helper in helpers.values():
+            references |= dict.fromkeys(_REFERENCE.findall(helper))
         parts = [f'target triple = "{self._triple}"']
-        parts += self._globals
-        parts += self._declarations.values()
-        parts += functions
-        parts += self._helpers
+        parts += [name + self._constants[name] for name in references if name in self._constants]
+        parts += [self._declarations[name] for name in references if name in self._declarations]
+        parts += [written, *helpers.values()]
         parts += [f"attributes #{number} = {{ {text} }}" for text, number in self._attributes.items()]
         parts += self._named_metadata
-        parts += [f"!{number} = {text}" for number, text in enumerate(self._metadata)]
+        references |= dict.fromkeys(_REFERENCE.findall("\n".join(self._named_metadata)))
+        nodes = self._reached_nodes([int(name[1:]) for name in references if name[0] == "!"])
+        parts += [f"!{number} = {self._metadata[number]}" for number in nodes]
         parts.append("")
         return "\n".join(parts)
+
+    def _reached_helpers(self, references: Iterable[str]) -> dict[str, str]:
+        """The helpers that are referred to, and those that they call."""
+        found: dict[str, str] = {}
+        todo = [name for name in references if name in self._helpers]
+        while todo:
+            name = todo.pop()
+            if name not in found:
+                found[name] = self._helpers[name]
+                todo += [n for n in _REFERENCE.findall(found[name]) if n in self._helpers]
+        return dict(sorted(found.items()))
+
+    def _reached_nodes(self, wanted: list[int]) -> list[int]:
+        """Metadata nodes and what they refer to, which comes first."""
+        found: dict[int, None] = {}
+        below, metadata = self._below, self._metadata
+        for root in wanted:
+            stack = [root]
+            while stack:
+                number = stack[-1]
+                if number in found:
+                    stack.pop()
+                    continue
+                if number not in below:
+                    below[number] = [int(n) for n in _NODE.findall(metadata[number]) if n]
+                missing = [n for n in below[number] if n not in found]
+                if missing:
+                    stack += missing
+                else:
+                    found[number] = None
+                    stack.pop()
+        return [*found]
 
 
 class Function:

@@ -14,6 +14,7 @@ from plctool.compiler.codegen.elf_object import ElfSymbol, Section, read_object
 from plctool.compiler.codegen.line_table import Line, in_order, read_line_table
 from plctool.compiler.codegen.lower_unit import import_symbol
 from plctool.compiler.codegen.memory_functions import MEMORY_FUNCTIONS, memory_object
+from plctool.compiler.codegen.object_cache import ObjectCache
 from plctool.compiler.codegen.relocations import (
     AARCH64_LOW12,
     ABSOLUTE,
@@ -59,17 +60,25 @@ class Linked:
     frames: Frames
 
 
-def link(objects: Sequence[bytes], target: Target, roots: Sequence[str], imports: Sequence[External]) -> Linked:
+def link(
+    objects: Sequence[bytes],
+    target: Target,
+    roots: Sequence[str],
+    imports: Sequence[External],
+    cache: ObjectCache | None = None,
+) -> Linked:
     """Links the objects of one program. `roots`: symbols that have to be in the block. `imports`: C functions that the
-    program names, in the order of their slots.
+    program names, in the order of their slots. `cache`: has the functions that all programs share.
 
     Raises UsageError naming what cannot be linked.
     """
-    return _Linker(objects, target, imports).run(roots)
+    return _Linker(objects, target, imports, cache).run(roots)
 
 
 class _Linker:
-    def __init__(self, objects: Sequence[bytes], target: Target, imports: Sequence[External]) -> None:
+    def __init__(
+        self, objects: Sequence[bytes], target: Target, imports: Sequence[External], cache: ObjectCache | None
+    ) -> None:
         self._target = target
         self._imports = {import_symbol(external.name): external for external in imports}
         self._sections: list[Section] = []
@@ -78,7 +87,7 @@ class _Linker:
         for data in objects:
             self._read(data)
         if any(not s.section and s.name in MEMORY_FUNCTIONS for s in self._symbols):
-            self._read(memory_object(target))
+            self._read(memory_object(target, cache))
         self._defined = {s.name: s for s in self._symbols if s.section and s.is_global}
         self._stubs: dict[str, int] = {}  # offset in the block, by symbol
 

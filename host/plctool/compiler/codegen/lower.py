@@ -35,6 +35,7 @@ from plctool.debug.passed_lines import PassedLine
 from plctool.errors import UsageError
 from plctool.iec.areas import EXCLUSIVE_AREAS, Area
 from plctool.iec.types import BOOL
+from plctool.image.targets import FASTEST
 
 CODE_INIT = "code_init"
 GLOBAL_INIT = "global_init"
@@ -110,11 +111,11 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
         )
     _struct_initialisers(unit)
     for name in sorted(unit.helpers):
-        unit.module.add_helper(string_function(name, unit.target, unit.strings))
+        unit.module.add_helper(name, string_function(name, unit.target, unit.strings))
     pous = {name: pou for (pou, _), name in unit.pous.items()}
     bounds = [*dict.fromkeys(unit.bounds)]
     options.passes.left(("sections", "memory", "lengths", "splice"), unit.module.whole)
-    made = parts(unit.module, cut=options.passes.runs("parts"))
+    made = parts(unit.module, cut=options.passes.runs("parts"), grouped=options.opt_level < FASTEST)
     options.passes.left(("parts",), lambda: "\n".join(f"; part {n}\n{part.text}" for n, part in enumerate(made, 1)))
     return Lowered(
         made,

@@ -24,6 +24,7 @@ from plctool.image.targets import FASTEST, Target
 
 if TYPE_CHECKING:
     from plctool.compiler.codegen.firmware_stacks import FirmwareStacks
+    from plctool.compiler.codegen.object_cache import ObjectCache
 
 _ALWAYS = 'nounwind "no-builtins"'
 _PROBES = ' "probe-stack"="inline-asm"'
@@ -60,7 +61,8 @@ def parse_checks(text: str) -> frozenset[Check]:
 @dataclass(frozen=True)
 class Options:
     """How to compile. `debug`: keep the program closer to its source (no inlining across POUs); `size`: rather small
-    than fast; `firmware`: what is known of the C functions that it will call; `passes`: which of them run."""
+    than fast; `firmware`: what is known of the C functions that it will call; `passes`: which of them run; `cache`:
+    where objects are kept."""
 
     target: Target
     opt_level: int = 2
@@ -69,6 +71,7 @@ class Options:
     size: bool = False
     firmware: FirmwareStacks | None = None
     passes: Passes = field(default_factory=Passes)
+    cache: ObjectCache | None = field(default=None, compare=False)
 
     @property
     def steps(self) -> bool:
@@ -314,7 +317,8 @@ class Unit:
         """A tag and its node. Accesses with a tag and with one of its parents may overlap."""
         known = self._tags.get(key)
         if known is None:
-            node = self.module.metadata(f'!{{!"{len(self._tags)}", !{parent}, i64 0}}')
+            name = escape(str(key).encode())
+            node = self.module.metadata(f'!{{!"{name}", !{parent}, i64 0}}')
             known = f", !tbaa !{self.module.metadata(f'!{{!{node}, !{node}, i64 0}}')}", node
             self._tags[key] = known
         return known

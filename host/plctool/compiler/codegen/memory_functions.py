@@ -1,26 +1,33 @@
 """memcpy, memset and memmove, which LLVM calls by name: an object of its own, linked when a program needs one of them.
 
 They are the same in every program, and LLVM takes longer for their loops than for a small program, so they are compiled
-once in a process.
+once in a process, or come from the cache.
 """
 
 from __future__ import annotations
 
-from functools import cache
-
-from plctool.compiler.codegen.emit import emit_object
 from plctool.compiler.codegen.ir import Function, Module, Value, number
 from plctool.compiler.codegen.lower_unit import Options, function_attributes
+from plctool.compiler.codegen.object_cache import ObjectCache
+from plctool.compiler.codegen.objects import emit_objects
 from plctool.compiler.codegen.partition import Part
 from plctool.image.targets import Target
 
 _ZERO = number(0)
 
 
-@cache
-def memory_object(target: Target) -> bytes:
+_made: dict[str, bytes] = {}  # by the name of the target
+
+
+def memory_object(target: Target, cache: ObjectCache | None = None) -> bytes:
     """The ELF object with the three functions, each in a section of its own so that the linker takes only what is
     called. It says how their frames look (.debug_frame), for the call stack of an exception in one of them."""
+    if target.name not in _made:
+        _made[target.name] = _memory_object(target, cache)
+    return _made[target.name]
+
+
+def _memory_object(target: Target, cache: ObjectCache | None) -> bytes:
     module = Module(target.triple)
     attributes = module.attributes(f"minsize optsize {function_attributes(target)}")
     module.add_compile_unit(module.metadata('!DIFile(filename: "memory", directory: "")'))
@@ -36,7 +43,7 @@ def memory_object(target: Target) -> bytes:
         fn = Function(f"ptr @{signature}", f'{attributes} section ".text.{name}"')
         write(fn)
         definitions.append(fn.definition("hidden"))
-    return emit_object(Part(module.text(definitions)), Options(target))
+    return emit_objects([Part(module.text(definitions))], Options(target, cache=cache))[0]
 
 
 MEMORY_FUNCTIONS = frozenset(("memcpy", "memset", "memmove"))

@@ -1,5 +1,5 @@
 """From the functions of a module to the sources LLVM compiles: where inlining ends, and into which parts a large module
-is cut, to be compiled side by side.
+is cut, to be compiled side by side, and only as far as they have changed.
 
 LLVM inlines what is small, and what is called once. It never looks at how large the caller becomes, and its passes take
 more than proportional time for large functions.
@@ -8,7 +8,9 @@ more than proportional time for large functions.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
+from hashlib import sha256
 
 from plctool.compiler.codegen.ir import Definition, Function, Module
 
@@ -16,6 +18,9 @@ _SMALL = 20  # instructions of a function that is inlined anywhere
 _LARGE = 10_000  # instructions up to which a function may grow
 _WHOLE = 20_000  # instructions of a module (about 5000 lines of ST) that is optimised as one
 _FEW = 5_000  # instructions for which several parts do not pay
+_GROUP = 4_000  # instructions, about, of what is compiled again when one function has changed
+_LONGEST_GROUP = 3 * _GROUP
+_COPIED = 300  # instructions of a function up to which LLVM may find it worth inlining when it is called often
 _LONG_RUN = 50  # instructions between branches, on average: `memory.py` has left little for LLVM to find
 
 
@@ -29,9 +34,10 @@ class Part:
     plain: bool = False
 
 
-def parts(module: Module, *, cut: bool = True) -> list[Part]:
-    """The parts of a module: one if it is small or not to be `cut`, else an even number of the same size, of plain
-    functions and of others. A part has copies of functions of others that may be inlined."""
+def parts(module: Module, *, cut: bool = True, grouped: bool = True) -> list[Part]:
+    """The parts of a module: one if it is small or not to be `cut`, else several, of plain functions and of others. A
+    part has copies of functions of others that may be inlined. `grouped`: many small parts, which stay the same where a
+    program does; else an even number of the same size, in which LLVM sees more at once."""
     functions = module.functions
     calls = {name: Counter(c for c in d.function.callees if c in functions) for name, d in functions.items()}
     _limit_growth(functions, calls)
@@ -42,8 +48,8 @@ def parts(module: Module, *, cut: bool = True) -> list[Part]:
         plain = {}
     found = []
     for some in (plain, {name: d for name, d in functions.items() if name not in plain}):
-        for names in _cut(some):
-            text = module.text(_part(names, functions, calls))
+        for names in _groups(some) if grouped else _cut(some):
+            text = module.text(_part(names, functions, calls, _COPIED if grouped else _LARGE))
             found.append(Part(text, large=True, plain=bool(plain) and some is plain))
     return found
 
@@ -98,8 +104,26 @@ def _cut(functions: dict[str, Definition]) -> list[list[str]]:
     return found
 
 
-def _part(own: list[str], functions: dict[str, Definition], calls: dict[str, Counter[str]]) -> list[str]:
-    """The functions of one part, and what they call in others: a copy when it may be inlined, else a declaration."""
+def _groups(functions: dict[str, Definition]) -> Iterator[list[str]]:
+    """Names of functions, in groups of some thousand instructions. A group begins at some names, whatever
+    is before them, so that a function that is longer, new or gone changes its own group only, and seldom the next."""
+    average = max(1, _size(functions) // max(1, len(functions)))
+    functions_of_group = 1 << max(0, (_GROUP // average).bit_length() - 1)
+    group: list[str] = []
+    size = 0
+    for name, definition in functions.items():
+        if group and (size > _LONGEST_GROUP or sha256(name.encode()).digest()[0] % functions_of_group == 0):
+            yield group
+            group, size = [], 0
+        group.append(name)
+        size += definition.function.size
+    if group:
+        yield group
+
+
+def _part(own: list[str], functions: dict[str, Definition], calls: dict[str, Counter[str]], copied: int) -> list[str]:
+    """The functions of one part, and what they call in others: a copy when it may be inlined and has no more than
+    `copied` instructions, else a declaration."""
     found, seen, todo = [], set(own), list(own)
     here = frozenset(own)
     while todo:
@@ -107,7 +131,7 @@ def _part(own: list[str], functions: dict[str, Definition], calls: dict[str, Cou
         function, linkage = functions[name].function, functions[name].linkage
         if name in here:
             found.append(function.definition("hidden" if linkage else ""))
-        elif function.inlining == "noinline":
+        elif function.inlining == "noinline" or (function.size > copied and not function.inlining):
             found.append(function.declaration("hidden"))
             continue
         else:

@@ -10,10 +10,10 @@ from zlib import crc32
 
 from plctool.compiler.base.garbage import no_collection
 from plctool.compiler.base.nesting import room_for_nesting
-from plctool.compiler.codegen.emit import emit_objects
 from plctool.compiler.codegen.link import Linked, link
 from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.objects import emit_objects
 from plctool.compiler.codegen.stack import CallGraph, Frames
 from plctool.compiler.image.io_configuration import assign_tasks, configuration_of, io_document
 from plctool.compiler.image.online_change import Steps, check_facts, constants_of, facts_of
@@ -98,7 +98,7 @@ def _build(
     with room_for_nesting():
         lowered = lower(program, options)
     objects = emit_objects(lowered.parts, options)
-    linked = link(objects, target, lowered.entries, lowered.imports)
+    linked = link(objects, target, lowered.entries, lowered.imports, options.cache)
     symbols = _symbols(program, lowered, linked, target, info.project, steps=options.steps)
     kept = kept_parts(v for v in program.globals if keeps and v.area is Area.RETAIN)
     code, io = linked.code, None

@@ -22,7 +22,8 @@ class BuildRequest:
     `firmware`: the ELF file of any board's firmware, which says the same. Without `limits` the program may need more
     than any device has. `dialect`: iec, codesys or twincat, where systems disagree about what a program means; None:
     that of the files. `no_pass`: passes of the code generator that are left out; `dump_after`: the pass whose result is
-    kept. `base`: the program whose place it shall take while that runs."""
+    kept. `base`: the program whose place it shall take while that runs. `cache`: code that has not changed comes from
+    the user's cache folder."""
 
     files: ProgramFiles
     target: str | None = None
@@ -37,6 +38,7 @@ class BuildRequest:
     no_pass: tuple[str, ...] = ()
     dump_after: str | None = None
     base: SymbolTable | None = None
+    cache: bool = False
 
 
 def request_of(files: ProgramFiles) -> BuildRequest:

@@ -16,6 +16,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from plctool.files import cache_folder
+
 _GRAMMAR = Path(__file__).with_name("grammar.lark")
 _VERSION = 1  # of the format of the cache
 
@@ -76,18 +78,13 @@ def load_tables() -> Tables:
     """The tables, from the cache when they are there."""
     grammar = _GRAMMAR.read_text("utf-8")
     digest = hashlib.sha256(f"{_VERSION}\n{grammar}".encode()).hexdigest()[:20]
-    path = _cache_folder() / f"grammar-{digest}.json"
+    path = cache_folder() / f"grammar-{digest}.json"
     try:
         return _decode(json.loads(path.read_text("utf-8")))
     except (OSError, ValueError, KeyError, TypeError, IndexError):
         tables = make_tables(grammar)
         _store(path, tables)
         return tables
-
-
-def _cache_folder() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME")
-    return Path(base) / "plctool" if base else Path("~/.cache/plctool").expanduser()
 
 
 def _store(path: Path, tables: Tables) -> None:
