@@ -17,6 +17,7 @@ from plctool.printable import one_line
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
+    from plctool.compiler.front import Trees
     from plctool.compiler.image.build import BuildResult
     from plctool.compiler.sources.program_files import ProgramFiles
     from plctool.debug.symbols import SymbolTable
@@ -109,8 +110,9 @@ def simulator(program: Path | Built) -> Simulator:
     return Simulator(program.image, program.symbols)
 
 
-def build(settings: Settings) -> tuple[Document, list[str]]:
+def build(settings: Settings, trees: Trees | None = None) -> tuple[Document, list[str]]:
     """Compiles to an image and the symbol file beside it. Returns the document and the warnings as users read them.
+    `trees`: keeps the syntax trees for another build in this process.
 
     Raises CompileError when the program has errors, UsageError when the image would overwrite one of its files. Files
     appear complete or not at all.
@@ -125,7 +127,7 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
     check_not_read(symbol_path(output), inputs(), f"-o {output.stem}-image.cdl")
     _check_way_of(settings)
     made_of = fingerprint(settings)  # before the sources are read: a change during the build makes the image stale
-    result = _compile(settings, settings.target)
+    result = _compile(settings, settings.target, trees)
     if result.change is not None:
         check_possible(result.change)
     result.symbols.made_of = made_of
@@ -167,11 +169,12 @@ def compiled(settings: Settings) -> BuildResult:
     return _compile(settings, settings.target)
 
 
-def _compile(settings: Settings, target: str | None) -> BuildResult:
+def _compile(settings: Settings, target: str | None, trees: Trees | None = None) -> BuildResult:
     from plctool.compiler import build
 
     is_own = target == settings.target  # else it is for this machine, whatever board the program is for
-    return build(settings if is_own else replace(settings, target=target, board=None, firmware=None))
+    request = settings if is_own else replace(settings, target=target, board=None, firmware=None)
+    return build(request, trees=trees)
 
 
 def build_text(document: dict[str, Any]) -> str:

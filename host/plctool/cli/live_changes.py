@@ -22,15 +22,16 @@ from plctool.errors import PlcError, UsageError
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
+    from plctool.compiler.front import Trees
     from plctool.controller import Controller
     from plctool.debug.symbols import SymbolTable
 
 _POLL = 0.1  # how often the files of a project are looked at [s]
 
 
-def change(plc: Controller, args: argparse.Namespace) -> Document:
+def change(plc: Controller, args: argparse.Namespace, trees: Trees | None = None) -> Document:
     """Replaces the program that runs by the image or the project that the arguments name. With --dry-run it only says
-    what that would do."""
+    what that would do. `trees`: keeps the syntax trees of the project for the next change."""
     settings = project_of(args)
     if settings is None:
         if args.dry_run:
@@ -39,7 +40,7 @@ def change(plc: Controller, args: argparse.Namespace) -> Document:
     settings = replace(settings, base=_base_of(plc, settings))
     if args.dry_run:
         return change_document(compiled(settings))
-    return _change_project(plc, settings, args)
+    return _change_project(plc, settings, args, trees)
 
 
 def _base_of(plc: Controller, settings: Settings) -> SymbolTable:
@@ -63,13 +64,13 @@ def _base_of(plc: Controller, settings: Settings) -> SymbolTable:
         ) from None
 
 
-def _change_project(plc: Controller, settings: Settings, args: argparse.Namespace) -> Document:
+def _change_project(plc: Controller, settings: Settings, args: argparse.Namespace, trees: Trees | None) -> Document:
     from plctool.cli.fresh_image import fingerprint
 
     assert settings.base is not None
     if settings.base.made_of and settings.base.made_of == fingerprint(settings):
         return {"unchanged": f"{settings.base.image_crc:08X}"}
-    document, warnings = build(settings)
+    document, warnings = build(settings, trees)
     output.print_warnings(args, warnings)
     plan: Document = document["change"]
     return plan | _sent(plc, settings.output, not args.json)
@@ -109,13 +110,15 @@ def watch(
     is said, and the program goes on."""
     if project_of(args) is None:
         raise UsageError("--watch is for a project; name its folder.", "usage")
-    seen = None
+    from plctool.compiler.front import Trees
+
+    seen, trees = None, Trees()
     while True:
         now = _state_of(args)
         if now != seen:
             seen = now
             try:
-                yield change(plc, args)
+                yield change(plc, args, trees)
             except PlcError as error:
                 _say(error)
         wait()

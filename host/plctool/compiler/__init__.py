@@ -185,8 +185,9 @@ def compile_sources(
 
 
 @no_collection()
-def build(request: BuildRequest, python: PythonFunctions | None = None) -> BuildResult:
-    """Compiles a program. `python`: functions that Python implements, in the simulator.
+def build(request: BuildRequest, python: PythonFunctions | None = None, trees: Trees | None = None) -> BuildResult:
+    """Compiles a program. `python`: functions that Python implements, in the simulator. `trees`: keeps the syntax trees
+    for another build in this process.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
@@ -220,6 +221,7 @@ def build(request: BuildRequest, python: PythonFunctions | None = None) -> Build
             python=python,
             dialect=system,
             information=files.information,
+            trees=trees,
             previous=None if request.base is None else previous_of(request.base),
         )
     if checked.program is None:
