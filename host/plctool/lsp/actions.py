@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
+from itertools import takewhile
 
 from lsprotocol import types as lsp
 
@@ -15,8 +16,11 @@ from plctool.lsp.items import Item, Kind
 from plctool.lsp.names import written
 from plctool.lsp.outline import SECTIONS, UNITS, Block
 from plctool.lsp.session import Place, Session
+from plctool.lsp.tree import Tree
+from plctool.lsp.uses import uses_of
 
 _WORD = re.compile(r"\w+")
+_MEMBER = re.compile(r"\s*\.\s*([^\W\d]\w*)")
 _SIGNS = ";|\\)|\\]|THEN|DO|OF|TO|:=|:|,"
 
 
@@ -128,8 +132,22 @@ def _word_like(found: _Found, meant: str) -> tuple[int, int] | None:
 def _did_you_mean(found: _Found, match: re.Match[str]) -> Iterator[Change]:
     meant = match["meant"]
     span = _word_like(found, meant)
-    if span is not None and found.text[slice(*span)] != meant:
-        yield Change(f"Write {meant}", *span, meant)
+    if span is None or found.text[slice(*span)] == meant:
+        return
+    change = Change(f"Write {meant}", *span, meant)
+    if _has_member(found, change):
+        yield change
+
+
+def _has_member(found: _Found, change: Change) -> bool:
+    """False if a change writes the name of something without the member that follows."""
+    member = _MEMBER.match(found.text, change.end)
+    if member is None:
+        return True
+    source = found.place.tree.source
+    tree = Tree(replace(source, text=found.text[: change.start] + change.text + found.text[change.end :]))
+    offset = change.start + len(change.text) + member.start(1) - member.start()
+    return any(use.offset == offset for use in uses_of(tree, found.place.project.names).uses)
 
 
 @_fix(r"(?P<name>[\w.]+)(?: is (?:in|a value of) several \w+)?; write (?P<all>[\w.]+\.\w+(?:(?:, | or )[\w.]+\.\w+)*)")
@@ -147,7 +165,18 @@ def _other_word(found: _Found, match: re.Match[str]) -> Iterator[Change]:
         yield Change(f"Write {match['meant']}", at, at + len(match["wrong"]), match["meant"])
 
 
-@_fix(r"is written (?:with straight quotes: )?(?P<meant>'.*'|[^\s,]+)(?:, not (?P<wrong>\S+?))?$")
+@_fix(r"^this assigns, and the value is used as well; a comparison is written =$")
+def _comparison(found: _Found, match: re.Match[str]) -> Iterator[Change]:
+    """Of an assignment that is a whole condition: elsewhere a comparison has another type than what is assigned."""
+    tree = found.place.tree
+    at = bisect_left(tree.starts, found.offset)
+    condition = takewhile(lambda t: t.text.upper() not in _AFTER_CONDITIONS, tree.tokens[at:])
+    assigned = [t for t in condition if t.type == "_ASSIGN"]
+    if at and tree.tokens[at - 1].type in _OF_CONDITIONS and len(assigned) == 1:
+        yield Change("Write =", assigned[0].pos, assigned[0].end, "=")
+
+
+@_fix(r"^(?!this assigns).*is written (?:with straight quotes: )?(?P<meant>'.*'|[^\s,]+)(?:, not (?P<wrong>\S+?))?$")
 def _is_written(found: _Found, match: re.Match[str]) -> Iterator[Change]:
     wrong = match["wrong"] or f"{found.text[found.offset]}{match['meant'][1:-1]}"
     at = found.text.find(wrong, max(0, found.offset - 1), found.line_end)
@@ -156,7 +185,7 @@ def _is_written(found: _Found, match: re.Match[str]) -> Iterator[Change]:
         yield Change(f"Write {match['meant']}", at, end, match["meant"])
 
 
-@_fix(r"; write (?P<meant>%[IQM]\w+)")
+@_fix(r"; write (?P<meant>%[IQM][A-Z]?\d[\w.]*)")
 def _address(found: _Found, match: re.Match[str]) -> Iterator[Change]:
     for token in _tokens_of_line(found):
         if token.type == "DIRECT" and token.text in found.message:
@@ -182,6 +211,8 @@ def _implements(found: _Found, match: re.Match[str]) -> Iterator[Change]:
 @_fix(rf"^expected (?P<sign>{_SIGNS})(?: after| before|$)")
 def _missing_sign(found: _Found, match: re.Match[str]) -> Iterator[Change]:
     sign = match["sign"]
+    if "Instruction List" in found.message:
+        return
     at = (
         len(found.text[: found.offset].rstrip())
         if not found.text[found.offset - 1 : found.offset].strip()
@@ -246,11 +277,18 @@ def _plain_assignment(found: _Found, match: re.Match[str]) -> Iterator[Change]:
 @_fix(r"; write (?P<function>\w+_TO_\w+)\((?:\.\.\.|[^)]*)\)")
 def _conversion(found: _Found, match: re.Match[str]) -> Iterator[Change]:
     end = _end_of_value(found)
-    if end is not None:
+    if end is not None and not _is_in_step(found):
         value = found.text[found.offset : end]
         if "#" in value and "#" not in match[0] and value.rpartition("#")[2] in match[0]:
             value = value.rpartition("#")[2]  # REAL_TO_INT(5.5) for INT#5.5
         yield Change(f"Write {match['function']}(...)", found.offset, end, f"{match['function']}({value})")
+
+
+def _is_in_step(found: _Found) -> bool:
+    """True among the actions of a step, where no expression stands."""
+    tree = found.place.tree
+    steps = (b for top in tree.blocks for b in top.every() if b.kind in ("STEP", "INITIAL_STEP"))
+    return any(tree.tokens[b.first].pos < found.offset < tree.tokens[b.last].pos for b in steps)
 
 
 def _end_of_value(found: _Found) -> int | None:
@@ -297,8 +335,18 @@ def _other_literal(found: _Found, match: re.Match[str]) -> Iterator[Change]:
 @_fix(r"write LTIME#\.\.\. for (?:less|more)")
 def _long_time(found: _Found, match: re.Match[str]) -> Iterator[Change]:
     token = found.token
-    if token is not None and token.type == "TYPED":
+    if token is not None and token.type == "TYPED" and not _is_given_to_time(found, token):
         yield Change("Write LTIME#", token.pos, token.pos + token.text.index("#"), "LTIME")
+
+
+def _is_given_to_time(found: _Found, token: Token) -> bool:
+    """True for the value of a TIME, which an LTIME does not fit."""
+    tree = found.place.tree
+    at = bisect_left(tree.starts, token.pos)
+    if at < 2 or tree.tokens[at - 1].type != "_ASSIGN":
+        return False
+    target = tree.tokens[at - 2]
+    return "TIME" in (target.text.upper(), _type_of_token(found, target).upper())
 
 
 @_fix(r"^\$\S is not an escape; write \$\$")
@@ -356,7 +404,7 @@ def _declare(found: _Found, match: re.Match[str]) -> Iterator[Change]:
     if token is None or token.text != match["name"]:
         return
     unit = _unit_around(found)
-    if unit is None:
+    if unit is None or _follows(found, token) in _OF_OTHERS:
         return
     type_name = _type_of_use(found, token)
     line = f"    {token.text} : {type_name};\n"
@@ -377,6 +425,16 @@ def _declare(found: _Found, match: re.Match[str]) -> Iterator[Change]:
     yield Change(title, after, after, f"\nVAR\n{line}END_VAR")
 
 
+_OF_OTHERS = frozenset(("_DOT", "_LPAR", "_LSQB", "_CARET", "_COLON", "_DOTDOT"))
+"""What follows a name that is not a variable of a simple type: it has members, or is a constant."""
+
+
+def _follows(found: _Found, token: Token) -> str:
+    """The type of the token after another one."""
+    tree = found.place.tree
+    return tree.tokens[bisect_left(tree.starts, token.pos) + 1].type
+
+
 def _unit_around(found: _Found) -> Block | None:
     tree = found.place.tree
     best = None
@@ -395,6 +453,7 @@ def _end_of_header(found: _Found, unit: Block) -> int:
 
 _LITERALS = {"TRUE": "BOOL", "FALSE": "BOOL", "STRING": "STRING", "NOT": "BOOL"}
 _OF_CONDITIONS = frozenset(("IF", "_ELSIF", "WHILE", "_UNTIL", "NOT"))
+_AFTER_CONDITIONS = frozenset(("THEN", "DO", "END_REPEAT", ";"))
 
 
 def _type_of_use(found: _Found, token: Token) -> str:
@@ -404,6 +463,8 @@ def _type_of_use(found: _Found, token: Token) -> str:
     before, after = tree.tokens[at - 1], tree.tokens[at + 1]
     if after.type == "_ASSIGN":
         return _type_of_token(found, tree.tokens[at + 2]) or "INT"
+    if before.type == "_LPAR" and at > 1 and tree.tokens[at - 2].text.upper() == "__CATCH":
+        return "__SYSTEM.ExceptionCode"
     if before.type in _OF_CONDITIONS or before.text.upper() in ("AND", "OR", "XOR"):
         return "BOOL"
     if before.type in ("_ASSIGN", "OP", "SIGN", "EQ", "_ARROW"):
