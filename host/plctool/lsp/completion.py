@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 from lsprotocol import types as lsp
 
 from plctool.compiler.sources.stand_ins import library_of_stand_in
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.lexer import Token
 from plctool.lsp import describe
+from plctool.lsp.grammar import Grammar
 from plctool.lsp.items import BODIES, CLASSES, TYPES, VALUES, Item, Kind
 from plctool.lsp.names import ELEMENTARY_NAMES, STANDARD, Names, Shape
 from plctool.lsp.outline import SECTIONS, top_block
@@ -100,13 +103,17 @@ def completion(session: Session, place: Place) -> lsp.CompletionList:
     match = _WORD.search(text, max(0, offset - 100), offset)
     typed = match.group() if match else ""
     begin = offset - len(typed)
-    walk = _walk_to(place, begin)
+    tokens = _tokens_to(place, begin)
+    walk = Walk(tree, place.project.names)
+    walk.run(tokens)
+    grammar = Grammar(tokens)
     found = []
     seen: set[str] = set()
     wanted = typed.casefold()
-    for each in _Choices(walk, place, begin).all():
+    keywords = (_Found(word, "9", _C.Keyword) for word in grammar.keywords())
+    for each in chain(_Choices(walk, place, begin).all(), keywords):
         rank = rank_of(wanted, each.label) if wanted else 0
-        if rank >= 0 and each.label.casefold() not in seen:
+        if rank >= 0 and each.label.casefold() not in seen and grammar.takes(plain(each.insert or each.label)):
             seen.add(each.label.casefold())
             each.rank = f"{rank}{each.rank}"
             found.append(each)
@@ -115,17 +122,15 @@ def completion(session: Session, place: Place) -> lsp.CompletionList:
     return lsp.CompletionList(len(found) > MAX_ITEMS, items)
 
 
-def _walk_to(place: Place, begin: int) -> Walk:
-    """Goes over the tokens from the outermost block around the cursor to it."""
+def _tokens_to(place: Place, begin: int) -> Sequence[Token]:
+    """The tokens from the outermost block around the cursor to it."""
     tree = place.tree
     block = top_block(tree.blocks, tree.tokens, begin)
     first = 0 if block is None else block.first
     last = bisect_left(tree.starts, begin)
     if last < len(tree.tokens) and tree.tokens[last].type == "$END":
         last = min(last, len(tree.tokens) - 1)
-    walk = Walk(tree, place.project.names)
-    walk.run(tree.tokens[first:last])
-    return walk
+    return tree.tokens[first:last]
 
 
 def _item(session: Session, place: Place, each: _Found, begin: int, end: int) -> lsp.CompletionItem:
@@ -228,11 +233,13 @@ class _Choices:
 
     def _in_section(self) -> Iterator[_Found]:
         frame = self.walk.frames[-1] if self.walk.frames else None
-        if frame is not None and frame.kind == "_LPAR" and frame.shape is not None:
+        at_argument = frame is not None and frame.kind == "_LPAR" and self.previous in ("_LPAR", "_COMMA")
+        if at_argument and frame is not None and frame.shape is not None:
             yield from self._parameters(self.names.parts(frame.shape).values())
         if self.previous in ("_ASSIGN", "_LPAR", "_LSQB", "_COMMA", "_DOTDOT", "OP", "SIGN"):
             if self.previous != "_COMMA" or frame is not None:
                 yield from self._values(constants=True)
+                yield from self._words(_VALUE_WORDS, "5")
         elif self.previous in ("_SEMI", "VAR", "GLOBAL", "QUALIFIER"):
             yield from self._words(("END_VAR",), "5")
 
