@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 
 from plctool.compiler.syntax.lexer import KEYWORDS, Lexer, Token
 from plctool.compiler.syntax.tables import END, load_tables
@@ -42,6 +43,7 @@ class Grammar:
             yield from (word for word in KEYWORDS if self.takes(word))
 
 
+@lru_cache(4096)
 def _kinds(text: str) -> tuple[str, ...]:
     """The types of the tokens of a text."""
     if _NAME.match(text) and text.upper() not in KEYWORDS:
