@@ -286,6 +286,18 @@ def test_a_block_that_was_not_called_is_reported(tool: Tool) -> None:
         ("ADVANCE_TIME('5');", "a duration such as T#10ms"),
         ("ADVANCE_TIME(-T#5s);", "time does not go back"),
         ("ASSERT_EQ(x, 1);", "unknown name x"),
+        ("FORCE(i);", "FORCE takes 2 arguments, not 1"),
+        ("FORCE(variable := i, value := 1);", "the arguments of FORCE have no names"),
+        ("FORCE(5, 1);", "FORCE needs a variable"),
+        ("FORCE(i, 'a');", "STRING"),
+        ("FORCE(t, 1);", "FORCE takes a number, BOOL, TIME or enumeration, not TON"),
+        ("FORCE(b, b);", "FORCE takes a number, BOOL, TIME or enumeration, not B"),
+        ("FORCE(text, 'a');", "FORCE takes a number, BOOL, TIME or enumeration, not STRING"),
+        ("FORCE(list[i], 1);", "FORCE needs a variable with constant indices"),
+        ("FORCE(LIMIT, 1);", "LIMIT is a constant and cannot be forced"),
+        ("UNFORCE(i);", "this is not forced; write FORCE before UNFORCE"),
+        ("FORCE(list[1], 1); UNFORCE(list[2]);", "this is not forced"),
+        ("UNFORCE(i, i);", "UNFORCE takes 1 argument, not 2"),
         ("MOCK i;", "MOCK needs an instance of a function block"),
         ("MOCK_FUNCTION t.Q RETURNS 1;", "a method of an instance"),
         ("MOCK b.m;", "for a method write MOCK_FUNCTION"),
@@ -298,7 +310,9 @@ def test_a_block_that_was_not_called_is_reported(tool: Tool) -> None:
 )
 def test_mistakes_in_tests_are_compile_errors(tool: Tool, body: str, words: str) -> None:
     before = "FUNCTION F : INT END_FUNCTION\nFUNCTION_BLOCK B METHOD m : INT m := 1; END_METHOD END_FUNCTION_BLOCK\n"
-    done = diagnoses(tool, f"{before}TEST 't'\nVAR i : INT; t : TON; b : B; END_VAR\n{body}\nEND_TEST")
+    variables = "VAR i : INT; t : TON; b : B; text : STRING; list : ARRAY[1..3] OF INT; END_VAR "
+    constant = "VAR CONSTANT LIMIT : INT := 3; END_VAR"
+    done = diagnoses(tool, f"{before}TEST 't'\n{variables}{constant}\n{body}\nEND_TEST")
     assert words in done.err
     assert "program.st:5:" in done.err or "program.st:6:" in done.err
 
@@ -326,10 +340,11 @@ def test_tests_of_a_file_have_different_names(tool: Tool) -> None:
     assert "1:37: error: there is a TEST 'a' in this file already" in done.err
 
 
-def test_asserts_are_for_tests_only(tool: Tool) -> None:
-    done = tool("check", str(write("PROGRAM Main ASSERT_EQ(1, 1); END_PROGRAM")))
+@pytest.mark.parametrize("statement", ["ASSERT_EQ(1, 1)", "FORCE(n, 1)"])
+def test_statements_of_tests_are_for_tests_only(tool: Tool, statement: str) -> None:
+    done = tool("check", str(write(f"PROGRAM Main VAR n : INT; END_VAR {statement}; END_PROGRAM")))
     assert done.status == 2
-    assert "ASSERT_EQ" in done.out + done.err
+    assert statement.partition("(")[0] in done.out + done.err
 
 
 def test_an_unclosed_test_is_reported(tool: Tool) -> None:

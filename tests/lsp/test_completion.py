@@ -101,6 +101,13 @@ def test_libraries_of_other_systems_are_named(editor: Editor) -> None:
     assert item["labelDetails"]["description"] == "Util of CODESYS"
 
 
+def test_statements_of_tests_are_offered_in_a_test_only(editor: Editor) -> None:
+    editor.type("src/main.st", editor.texts["src/main.st"] + "\nTEST 't'\nFO\nEND_TEST\n")
+    labels = editor.labels("src/main.st", "TEST 't'\nFO")
+    assert labels[:2] == ["FORCE", "FOR"]
+    assert "FORCE" not in editor.labels("src/main.st", "END_IF;\n", "END_PROGRAM")
+
+
 PLACES = [
     ("src/main.st", "n := ", "Scaled(n, 3);", "{};"),
     ("src/main.st", "gCount := gCount ", "+ 1;", "{} 1;"),

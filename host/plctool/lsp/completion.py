@@ -42,6 +42,18 @@ _STATEMENTS = {
     "REPEAT": "REPEAT\n    $0\nUNTIL ${1:condition}\nEND_REPEAT;",
     "RETURN": "RETURN;",
 }
+_IN_TESTS = {
+    "ASSERT_EQ": "ASSERT_EQ(${1:actual}, ${2:expected});",
+    "ASSERT_NEQ": "ASSERT_NEQ(${1:actual}, ${2:expected});",
+    "ASSERT_NEAR": "ASSERT_NEAR(${1:actual}, ${2:expected}, ${3:tolerance});",
+    "ASSERT_TRUE": "ASSERT_TRUE(${1:condition});",
+    "ASSERT_FALSE": "ASSERT_FALSE(${1:condition});",
+    "ADVANCE_TIME": "ADVANCE_TIME(${1:T#1s});",
+    "FORCE": "FORCE(${1:variable}, ${2:value});",
+    "UNFORCE": "UNFORCE(${1:variable});",
+    "MOCK": "MOCK ${1:instance};",
+    "MOCK_FUNCTION": "MOCK_FUNCTION ${1:Name} RETURNS ${2:0};",
+}
 _IN_LOOPS = {"EXIT": "EXIT;", "CONTINUE": "CONTINUE;"}
 _UNITS = {
     "PROGRAM": "PROGRAM ${1:Main}\nVAR\n    $0\nEND_VAR\nEND_PROGRAM\n",
@@ -276,6 +288,8 @@ class _Choices:
         yield from self._values(statement=True)
         blocks = self._blocks()
         yield from self._snippets(_STATEMENTS, "4")
+        if self.unit is not None and self.unit.kind is Kind.TEST:
+            yield from self._snippets(_IN_TESTS, "2")
         if any(b in ("FOR", "WHILE", "REPEAT") for b in blocks):
             yield from self._snippets(_IN_LOOPS, "4")
         if blocks:

@@ -50,6 +50,7 @@ class Bench:
         self.asserts = asserts
         self._world = world
         self._operands: dict[tuple[str, Type], Variable] = {}
+        self._count = 0
         hidden = ((NUMBER, DINT), (FAILED, DINT), (TIME_NOW, TIME), (LTIME_NOW, LTIME), (LIVE, BOOL))
         self._hidden = {name: self._variable(name, t) for name, t in hidden}
         world.clock.update({"TIME": self._hidden[TIME_NOW], "LTIME": self._hidden[LTIME_NOW]})
@@ -63,9 +64,13 @@ class Bench:
         """The hidden variable for one side of an assert."""
         found = self._operands.get((role, t))
         if found is None:
-            found = self._variable(f"__{role}{len(self._operands)}", t)
-            self._operands[role, t] = found
+            found = self._operands[role, t] = self.hidden(role, t)
         return found
+
+    def hidden(self, role: str, t: Type) -> Variable:
+        """A new hidden variable."""
+        self._count += 1
+        return self._variable(f"__{role}{self._count}", t)
 
     def place(self, name: str, pos: Pos) -> VarPlace:
         """One of the hidden variables that every program of tests has."""

@@ -1,4 +1,4 @@
-"""The statements of unit tests: asserts, the passing of time, mocks.
+"""The statements of unit tests: asserts, the passing of time, mocks, forces.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -28,6 +28,7 @@ from plctool.compiler.semantics.rules.parts import member_of
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol
 from plctool.compiler.semantics.unit_test_devices import TestDevices
+from plctool.compiler.semantics.unit_test_forces import Forces
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed.nodes import (
@@ -57,16 +58,25 @@ _OPERATORS = {
 
 
 class TestBody:
-    """The body of a TEST, SETUP or TEARDOWN. It may write every variable of what it tests. `cleaning`: in TEARDOWN
-    only the first failure counts."""
+    """The body of a TEST, SETUP or TEARDOWN. It may write every variable of what it tests. `forces`: what is forced
+    there, to which those of its own are added. `cleaning`: in TEARDOWN only the first failure counts."""
 
     def __init__(
-        self, world: World, scope: Scope, bench: Bench, devices: TestDevices, *, cleaning: bool = False
+        self,
+        world: World,
+        scope: Scope,
+        bench: Bench,
+        devices: TestDevices,
+        forces: Forces,
+        *,
+        cleaning: bool = False,
     ) -> None:
         scope.sees_inside = scope.writes_inside = True
-        self._c = Checker(world, scope, self._special_calls())
+        own = {name: call for name, call in self._own_names().items() if scope.lookup(name) is None}
+        self._c = Checker(world, scope, {**self._special_calls(), **own})
         self._bench = bench
         self._devices = devices
+        self._forces = forces
         self._cleaning = cleaning
         self._kept: dict[tuple[str, Type], Variable] = {}
 
@@ -83,12 +93,18 @@ class TestBody:
             "MOCK_VERIFY_CALL_COUNT": self._verify_call_count,
         }
 
+    def _own_names(self) -> SpecialCalls:
+        """Those that are not of STruC++: a program may have a function or an instance of that name."""
+        return {"FORCE": self._force, "UNFORCE": self._unforce}
+
     def write(self, decl: ast.TestDecl) -> None:
         """Checks the statements into the unit of the scope."""
         if decl.faults:
             self._c.scope.prologue += self._devices.begin_faults(self._c, decl.pos)
         found, before = self._c.world.diagnostics, self._c.world.diagnostics.errors
         write_body(self._c, decl.body)
+        if self._c.scope.pou is not None:
+            self._forces.hold(self._c.scope.pou.body)
         if decl.keyword is not ast.TestUnit.SETUP and found.errors == before:
             report_unused(self._c.scope)
 
@@ -239,6 +255,19 @@ class TestBody:
         assert milliseconds is not None
         moved = [Assign(long, total, pos), Assign(short, milliseconds, pos)]
         return [*moved, *self._devices.let_pass(self._c, call.pos)]
+
+    # ---- forces ----
+
+    def _force(self, call: ast.Call) -> list[Statement]:
+        nodes = self._nodes(call, 2, message=False)
+        return [] if nodes is None else self._forces.force(self._c, nodes[0], nodes[1], call.pos)
+
+    def _unforce(self, call: ast.Call) -> list[Statement]:
+        """UNFORCE(variable), or UNFORCE() for all."""
+        if not call.args:
+            return self._forces.unforce_all(self._c, call.pos)
+        nodes = self._nodes(call, 1, message=False)
+        return [] if nodes is None else self._forces.unforce(self._c, nodes[0], call.pos)
 
     # ---- mocks ----
 

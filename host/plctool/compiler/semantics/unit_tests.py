@@ -33,6 +33,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.statement_marks import StatementMarks
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
 from plctool.compiler.semantics.unit_test_devices import TestDevices, faults_of, host_function
+from plctool.compiler.semantics.unit_test_forces import Forces
 from plctool.compiler.semantics.unit_test_statements import TestBody
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed.nodes import (
@@ -69,8 +70,9 @@ class TestCase:
 
 @dataclass
 class _File:
-    """What the tests of one file share."""
+    """What the tests of one file share. `forces`: those of its SETUP."""
 
+    forces: Forces
     setup: Pou | None = None
     teardown: Pou | None = None
     names: dict[str, VarSymbol] = field(default_factory=dict)
@@ -151,15 +153,18 @@ class TestProgram(Participant):
             self._world.declared.block(symbol)
         files: dict[str, _File] = {}
         for decl in (t for t in self._world.names.tests if t.keyword is ast.TestUnit.SETUP):
-            self._setup(decl, files.setdefault(decl.source.path, _File()))
+            self._setup(decl, self._file(files, decl))
         for decl in (t for t in self._world.names.tests if t.keyword is ast.TestUnit.TEARDOWN):
-            self._teardown(decl, files.setdefault(decl.source.path, _File()))
+            self._teardown(decl, self._file(files, decl))
         for decl in (t for t in self._world.names.tests if t.keyword is ast.TestUnit.TEST):
-            self._test(decl, files.get(decl.source.path, _File()))
+            self._test(decl, self._file(files, decl))
         for path, file in files.items():
             if file.teardown is not None:
                 number = self._suite.teardowns[path] = len(self._suite.cases) + len(self._suite.teardowns)
                 self._branches.append(([(number, number)], [_call(file.teardown)]))
+
+    def _file(self, files: dict[str, _File], decl: ast.TestDecl) -> _File:
+        return files.setdefault(decl.source.path, _File(Forces(self._bench)))
 
     # ---- blocks ----
 
@@ -173,7 +178,7 @@ class TestProgram(Participant):
         file.names = {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol)}
         for symbol in file.names.values():
             symbol.used = True
-        self._write(decl, scope)
+        self._write(decl, scope, file.forces)
 
     def _teardown(self, decl: ast.TestDecl, file: _File) -> None:
         scope = self._begin(decl, file, "TEARDOWN")
@@ -182,7 +187,7 @@ class TestProgram(Participant):
             return
         file.teardown = scope.pou
         self._declare(decl, scope, None)
-        self._write(decl, scope, cleaning=True)
+        self._write(decl, scope, Forces(self._bench), cleaning=True)
 
     def _test(self, decl: ast.TestDecl, file: _File) -> None:
         number, pos = len(self._suite.cases), decl.source.pos(decl.pos)
@@ -196,7 +201,7 @@ class TestProgram(Participant):
         self._suite.cases.append(TestCase(decl.name, pos, faults))
         scope = self._begin(decl, file, f"TEST_{number}")
         self._declare(decl, scope, None)
-        self._write(decl, scope)
+        self._write(decl, scope, Forces(self._bench, file.forces))
         assert scope.pou is not None
         body = [_call(scope.pou)]
         if file.setup is not None:
@@ -215,8 +220,8 @@ class TestProgram(Participant):
         scope.names.update(file.names)
         return scope
 
-    def _write(self, decl: ast.TestDecl, scope: Scope, *, cleaning: bool = False) -> None:
-        TestBody(self._world, scope, self._bench, self._devices, cleaning=cleaning).write(decl)
+    def _write(self, decl: ast.TestDecl, scope: Scope, forces: Forces, *, cleaning: bool = False) -> None:
+        TestBody(self._world, scope, self._bench, self._devices, forces, cleaning=cleaning).write(decl)
 
     def _declare(self, decl: ast.TestDecl, scope: Scope, shared: _File | None) -> None:
         """The variables: of SETUP (`shared`) in the data area, others on the stack."""

@@ -117,6 +117,7 @@ NAMES = {
 FUNCTIONS = {
     **dict.fromkeys(("STRCMP", "EQUALS"), "strings are compared with ="),
     "ASSERT": "in a TEST write ASSERT_TRUE",
+    **dict.fromkeys(("FORCE", "UNFORCE"), "only a TEST forces variables"),
     "STRLEN": "write LEN", "STRCAT": "write CONCAT", "STRCPY": "strings are assigned with :=", "STRSTR": "write FIND",
     "SQR": "a square is written a * a; SQRT is the root",
     **dict.fromkeys(("RESET", "CLEAR"), "a BOOL is reset by name := FALSE;"), "SET": "a BOOL is set by name := TRUE;",
