@@ -53,7 +53,7 @@ class Page:
         address = self.url.replace("http:", "ws:") + "live"
         return connect(
             options.pop("address", address), origin=options.pop("origin", self.origin), max_size=None,
-            open_timeout=PATIENCE, compression=None, **options,
+            open_timeout=PATIENCE, compression=options.pop("compression", None), **options,
         )  # fmt: skip
 
     def end(self) -> int:

@@ -36,6 +36,7 @@ from plctool.link.monitoring import (
     APP_CHANGED,
     AreaRange,
     Contents,
+    Reader,
     Write,
     force_memory,
     read_forced,
@@ -154,6 +155,7 @@ class Plc(Controller):
             else Session(connection, ask_password)
         )
         self._symbol_file = symbols
+        self._reader: tuple[list[Symbol], Reader] = ([], Reader([]))  # of what was read last
         self._prepared: services.Prepared | None = None  # of the download that follows
 
     def close(self) -> None:
@@ -334,8 +336,10 @@ class Plc(Controller):
 
     def _read(self, table: SymbolTable, symbols: Sequence[Symbol]) -> Contents:
         """Pointers are followed by the controller."""
-        ranges = [_range(symbol) for symbol in symbols if symbol.fixed is None]
-        contents = read_memory(self._session, table.image_crc, ranges)
+        if symbols != self._reader[0]:
+            ranges = [_range(symbol) for symbol in symbols if symbol.fixed is None]
+            self._reader = (list(symbols), Reader(ranges))
+        contents = self._reader[1].read(self._session, table.image_crc)
         read = iter(contents.values)
         values = [next(read) if s.fixed is None else s.fixed for s in symbols]
         return Contents(values, contents.consistent, contents.forced)

@@ -376,6 +376,28 @@ def test_values_longer_than_a_message_are_read_in_pieces() -> None:
     assert first and second and first + second == bytes(bench.plc.memory[0][:3000])
 
 
+def test_a_reader_encodes_its_ranges_once_for_a_size_of_messages(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(buffer_size=512)
+    encoded: list[AreaRange] = []
+    encode = monitoring._read_variable
+
+    def counted(piece: AreaRange) -> bytes:
+        encoded.append(piece)
+        return encode(piece)
+
+    monkeypatch.setattr(monitoring, "_read_variable", counted)
+    bench.plc.memory[0][:600] = bytes(n % 251 for n in range(600))
+    reader = monitoring.Reader([AreaRange(0, 0, 0), AreaRange(0, 0, 600), AreaRange(0, 600, 0)])
+    for byte in (1, 2):
+        bench.plc.memory[0][0] = byte
+        values = reader.read(bench.session, bench.crc).values
+        assert values == [b"", bytes(bench.plc.memory[0][:600]), b""]
+    assert len(encoded) == 2
+    other = Bench(buffer_size=2048)
+    assert reader.read(other.session, other.crc).values[1] == bytes(600)
+    assert len(encoded) == 3
+
+
 @given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 69000), st.integers(1, 1000)), max_size=30))
 @settings(max_examples=30)
 def test_any_ranges_read_what_is_in_memory(ranges: list[tuple[int, int, int]]) -> None:

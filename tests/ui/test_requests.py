@@ -23,6 +23,11 @@ def as_before(browser: Browser) -> Iterator[None]:
     browser.ask("write", name="Main.still", text="5")
 
 
+def test_messages_on_loopback_are_not_compressed(page: Page) -> None:
+    with page.open(compression="deflate") as socket:
+        assert socket.protocol.extensions == []
+
+
 def test_the_tree_has_programs_variables_members_and_elements(browser: Browser) -> None:
     assert labels(browser.ask("children", path="", start=0)) == ["LIMIT", "Main"]
     rows = {row["label"]: row for row in browser.ask("children", path="Main", start=0)["result"]["rows"]}

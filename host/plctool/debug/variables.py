@@ -9,6 +9,7 @@ import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from plctool.errors import DeviceError, UsageError, with_article
@@ -308,12 +309,12 @@ class Reading:
     consistent: bool = True
     forced: list[str] = field(default_factory=list)
 
-    @property
+    @cached_property
     def values(self) -> dict[str, Any]:
         """None if a pointer on the way leads to no variable."""
         return {name: None if data is None else self.symbols[name].decode(data) for name, data in self.contents.items()}
 
-    @property
+    @cached_property
     def texts(self) -> dict[str, str]:
         """The values as ST writes them."""
         return {name: self.symbols[name].literal(value) for name, value in self.values.items()}

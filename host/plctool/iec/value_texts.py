@@ -90,6 +90,8 @@ def _units(text: object, t: Type, nanoseconds: Fraction) -> int:
 
 def literal(t: Type, value: Any) -> str:
     """A value, as `values.decode` gives it, the way ST writes it."""
+    if isinstance(t, Elementary):
+        return _elementary(t, value)
     if isinstance(t, ArrayType):
         return _list(t, value)
     if isinstance(t, StructType):
@@ -103,13 +105,20 @@ def literal(t: Type, value: Any) -> str:
         return value
     base = base_of(t)
     assert isinstance(base, Elementary)
-    if base.kind is Kind.BOOL:
+    return _elementary(base, value)
+
+
+def _elementary(t: Elementary, value: Any) -> str:
+    kind = t.kind
+    if kind is Kind.INT:
+        return str(value)
+    if kind is Kind.BOOL:
         return "TRUE" if value else "FALSE"
-    if base.kind is Kind.CHAR:
-        return quoted(value or "\0", base.size == 2)
-    if base.kind is Kind.REAL:
+    if kind is Kind.CHAR:
+        return quoted(value or "\0", t.size == 2)
+    if kind is Kind.REAL:
         return real_text(value)
-    return f"16#{value:0{2 * base.size}X}" if base.kind is Kind.BIT else str(value)
+    return f"16#{value:0{2 * t.size}X}" if kind is Kind.BIT else str(value)
 
 
 def real_text(value: float) -> str:

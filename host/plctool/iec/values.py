@@ -32,6 +32,8 @@ from plctool.iec.value_texts import bad_value, decoded, limits, limits_text, par
 
 def decode(t: Type, data: bytes) -> Any:
     """The value of `t` in memory as bool, int, float, str, list or dict."""
+    if isinstance(t, Elementary):
+        return _decode_elementary(t, data)
     if isinstance(t, ArrayType):
         size = t.element.size
         items = [decode(t.element, data[i * size : (i + 1) * size]) for i in range(t.count)]
@@ -44,16 +46,24 @@ def decode(t: Type, data: bytes) -> Any:
         return int.from_bytes(data[: t.size], "little") or None
     base = base_of(t)
     assert isinstance(base, Elementary)
-    if base.kind is Kind.REAL:
-        return _decode_real(base, data)
-    number = int.from_bytes(data[: base.size], "little", signed=base.signed)
+    number = _decode_elementary(base, data)
     if isinstance(t, EnumType):
         return next((name for name, value in t.values.items() if value == number), number)
-    if base.kind is Kind.BOOL:
+    return number
+
+
+def _decode_elementary(t: Elementary, data: bytes) -> Any:
+    kind = t.kind
+    if kind is Kind.REAL:
+        return _decode_real(t, data)
+    number = int.from_bytes(data[: t.size], "little", signed=t.signed)
+    if kind is Kind.INT or kind is Kind.BIT:
+        return number
+    if kind is Kind.BOOL:
         return number != 0
-    if base.kind is Kind.CHAR:
+    if kind is Kind.CHAR:
         return chr(number) if number else ""
-    return decoded(base, number)
+    return decoded(t, number)
 
 
 def _decode_member(f: Field, data: bytes) -> Any:

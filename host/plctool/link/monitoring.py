@@ -55,55 +55,117 @@ class Contents:
 
 
 def read_memory(session: Session, image_crc: int, ranges: Sequence[AreaRange]) -> Contents:
-    """The bytes of every range of the application with this CRC, as many in one request as fit. What fits one request
-    is asked for again, a few times, until it is consistent.
-
-    Raises DeviceError when one cannot be read, or when the device has another application.
-    """
-    session.recover(session.application)
-    room = session.connection.buffer_size - _MESSAGE_OVERHEAD
-    longest = room - _VALUE_HEAD.size
-    cut = [[r.part(at, min(longest, r.size - at)) for at in range(0, r.size, longest)] for r in ranges]
-    pieces = [piece for parts in cut for piece in parts]
-    in_one_access = len(pieces) == 1 and pieces[0].size in (1, 2, 4)
-    forced = None
-    for _ in range(_TRIES):
-        values, consistent, forced = _read_pieces(session, image_crc, pieces, room)
-        consistent = consistent or in_one_access
-        if consistent or len(_fitting(pieces, room)) < len(pieces):
-            break
-    rest = iter(values)
-    return Contents([_joined([next(rest) for _ in parts]) for parts in cut], consistent, forced)
+    """The bytes of every range of the application with this CRC, as `Reader` reads them."""
+    return Reader(ranges).read(session, image_crc)
 
 
-def _joined(parts: Sequence[bytes | None]) -> bytes | None:
+class Reader:
+    """Reads the same ranges again and again; what it asks for is encoded once."""
+
+    def __init__(self, ranges: Sequence[AreaRange]) -> None:
+        self._ranges = ranges
+        self._room = 0  # bytes of a message, for which the rest was made
+        self._parts: list[int] = []  # of each range, if one has more than one
+        self._batches: list[_Batch] = []
+
+    def read(self, session: Session, image_crc: int) -> Contents:
+        """As many in one request as fit. What fits one request is asked for again, a few times, until it is consistent.
+
+        Raises DeviceError when one cannot be read, or when the device has another application.
+        """
+        session.recover(session.application)
+        self._prepare(session.connection.buffer_size - _MESSAGE_OVERHEAD)
+        batches = self._batches
+        in_one_access = len(batches) == 1 and batches[0].is_one_access
+        contents = Contents([], True)
+        for _ in range(_TRIES):
+            found = [session.recover(partial(_read_batch, session, image_crc, batch)) for batch in batches]
+            values = [value for part in found for value in part.values]
+            consistent = len(found) < 2 and all(part.consistent for part in found)
+            forced = found[-1].forced if found else None
+            contents = Contents(self._joined(values), consistent or in_one_access, forced)
+            if contents.consistent or len(batches) > 1:
+                break
+        return contents
+
+    def _prepare(self, room: int) -> None:
+        if room == self._room:
+            return
+        longest = room - _VALUE_HEAD.size
+        cut = [[r.part(at, min(longest, r.size - at)) for at in range(0, r.size, longest)] for r in self._ranges]
+        self._parts = [] if all(len(parts) == 1 for parts in cut) else [len(parts) for parts in cut]
+        self._batches = list(_batches([piece for parts in cut for piece in parts], room))
+        self._room = room
+
+    def _joined(self, values: list[bytes | None]) -> list[bytes | None]:
+        """The values of the ranges, of those of their parts."""
+        if not self._parts:
+            return values
+        rest = iter(values)
+        return [_whole([next(rest) for _ in range(count)]) for count in self._parts]
+
+
+def _whole(parts: Sequence[bytes | None]) -> bytes | None:
     found = [part for part in parts if part is not None]
     return b"".join(found) if len(found) == len(parts) else None
 
 
-def _read_pieces(
-    session: Session, image_crc: int, pieces: Sequence[AreaRange], room: int
-) -> tuple[list[bytes | None], bool, int | None]:
-    values: list[bytes | None] = []
-    consistent, forced = True, None
-    while len(values) < len(pieces):
-        batch = _fitting(pieces[len(values) :], room)
-        found, undisturbed, forced = session.recover(partial(_read_batch, session, image_crc, batch))
-        consistent = undisturbed and len(batch) == len(pieces)
-        values += found
-    return values, consistent, forced
+class _Batch:
+    """Pieces that are read by one request, and their list in it."""
+
+    def __init__(self, pieces: Sequence[AreaRange], variables: bytes) -> None:
+        self.pieces = pieces
+        self.variables = variables
+        self._layout = struct.Struct("<" + "".join(f"{_VALUE_HEAD.codes}{piece.size}s" for piece in pieces))
+        self._heads = (tuple(range(len(pieces))), tuple(piece.size for piece in pieces))
+
+    @property
+    def is_one_access(self) -> bool:
+        return len(self.pieces) == 1 and self.pieces[0].size in (1, 2, 4)
+
+    def values(self, content: bytes) -> list[bytes | None]:
+        """What a reply has of them."""
+        if len(content) >= self._layout.size:
+            found = self._layout.unpack_from(content)
+            if (found[0::3], found[1::3]) == self._heads:
+                return list(found[2::3])
+        return self._partly(content)
+
+    def _partly(self, content: bytes) -> list[bytes | None]:
+        """The same if some of them could not be read."""
+        values: list[bytes | None] = []
+        for index, piece in enumerate(self.pieces):
+            if len(content) < _VALUE_HEAD.size:
+                break
+            head = _VALUE_HEAD.unpack(content)
+            content = content[_VALUE_HEAD.size :]
+            if head.id == index | lib.MON2_ID_FAILED:
+                if not _leads_nowhere(piece, head.size):  # in its place is the error
+                    raise _monitoring_error("read", head.size)
+                values.append(None)
+            elif head.id != index or head.size != piece.size or len(content) < piece.size:
+                break
+            else:
+                values.append(content[: piece.size])
+                content = content[piece.size :]
+        if len(values) != len(self.pieces):
+            raise bintag.malformed("values are missing")
+        return values
 
 
-def _fitting(pieces: Sequence[AreaRange], room: int) -> Sequence[AreaRange]:
-    """As many pieces as fit a request and its reply; at least one."""
-    request = reply = count = 0
+def _batches(pieces: Sequence[AreaRange], room: int) -> Iterator[_Batch]:
+    """The pieces, as many together as fit a request and its reply; at least one."""
+    batch: list[AreaRange] = []
+    request, reply = b"", 0
     for piece in pieces:
-        request += len(_read_variable(piece))
-        reply += _VALUE_HEAD.size + piece.size
-        if count and max(request, reply) > room:
-            break
-        count += 1
-    return pieces[:count]
+        variable, size = _read_variable(piece), _VALUE_HEAD.size + piece.size
+        if batch and max(len(request) + len(variable), reply + size) > room:
+            yield _Batch(batch, request)
+            batch, request, reply = [], b"", 0
+        batch.append(piece)
+        request, reply = request + variable, reply + size
+    if batch:
+        yield _Batch(batch, request)
 
 
 def _read_variable(piece: AreaRange) -> bytes:
@@ -133,37 +195,16 @@ def _load(value: int) -> bytes:
     return struct.pack("<BI", lib.MON2_OP_LD32, value)
 
 
-def _read_batch(
-    session: Session, image_crc: int, batch: Sequence[AreaRange]
-) -> tuple[list[bytes | None], bool, int | None]:
-    """The values, whether they are consistent, and the serial number of the list of forced variables, if any are."""
-    variables = b"".join(map(_read_variable, batch))
+def _read_batch(session: Session, image_crc: int, batch: _Batch) -> Contents:
     tags = session.call(
         lib.SG_MONITORING2,
         lib.SRV_MON2_READ,
-        [_application_tag(session, image_crc), bintag.Tag(lib.TAG_MON2_READ_LIST, variables)],
+        [_application_tag(session, image_crc), bintag.Tag(lib.TAG_MON2_READ_LIST, batch.variables)],
     )
     _check_monitoring(session, tags, "read")
-    content = tags.bytes(lib.TAG_MON2_VALUES)
-    values: list[bytes | None] = []
-    for index, piece in enumerate(batch):
-        if len(content) < _VALUE_HEAD.size:
-            break
-        head = _VALUE_HEAD.unpack(content)
-        content = content[_VALUE_HEAD.size :]
-        if head.id == index | lib.MON2_ID_FAILED:
-            if not _leads_nowhere(piece, head.size):  # in its place is the error
-                raise _monitoring_error("read", head.size)
-            values.append(None)
-        elif head.id != index or head.size != piece.size or len(content) < piece.size:
-            break
-        else:
-            values.append(content[: piece.size])
-            content = content[piece.size :]
-    if len(values) != len(batch):
-        raise bintag.malformed("values are missing")
+    values = batch.values(tags.bytes(lib.TAG_MON2_VALUES))
     forced = None if tags.find(lib.TAG_MON2_FORCE_SERIAL) is None else tags.u32(lib.TAG_MON2_FORCE_SERIAL)
-    return values, tags.find(lib.TAG_MON2_CONSISTENT) is not None, forced
+    return Contents(values, tags.find(lib.TAG_MON2_CONSISTENT) is not None, forced)
 
 
 def _leads_nowhere(piece: AreaRange, error: int) -> bool:

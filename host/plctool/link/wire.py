@@ -23,7 +23,8 @@ class Layout:
         members = list(_members(ffi.typeof(name)))
         names = [member for member, _ in members]
         members = members[: names.index(before)] if before else members
-        self._struct = struct.Struct("<" + "".join(code for _, code in members))
+        self.codes = "".join(code for _, code in members)  # of module struct
+        self._struct = struct.Struct("<" + self.codes)
         self._record: Any = namedtuple(name, [member for member, _ in members])  # type: ignore[misc]
         self._zeros = {member: b"" if code.endswith("s") else 0 for member, code in members}
 

@@ -19,7 +19,7 @@ from typing import Any
 from plctool.controller import Controller
 from plctool.controller_documents import Document, alarms, log, program_document, status_document, tasks
 from plctool.debug.symbols import SymbolTable
-from plctool.debug.variables import Symbol
+from plctool.debug.variables import Reading, Symbol
 from plctool.device import Plc
 from plctool.errors import DeviceError, InternalError, LinkError, PlcError, UsageError
 from plctool.gateway.frames import BUSY
@@ -81,6 +81,7 @@ class Live:
         self._ended = False
         self._due = _Due()
         self._table: SymbolTable | None = None
+        self._read: dict[str, tuple[bytes | None, list[Any]]] = {}  # what was read last, and what browsers get of it
         self._known: dict[str, Symbol | str] = {}  # what was resolved in this table, or why not
         self._since: dict[str, datetime] = {}  # of alarms
         self._program: tuple[str | None, Document | None] = (None, None)  # by CRC
@@ -197,10 +198,21 @@ class Live:
                     return
                 problem = error.message
             else:
-                texts, whole, forced = reading.texts, reading.consistent, set(reading.forced)
-                values |= {n: [texts[n], n in forced, _number(value), ""] for n, value in reading.values.items()}
+                whole = reading.consistent
+                values |= self._shown(reading)
         self._publish("reading", {"whole": whole, "problem": problem})
         self._publish("values", values)
+
+    def _shown(self, reading: Reading) -> dict[str, list[Any]]:
+        """The values that were read; those that are as before are the same objects."""
+        before, forced = self._read, set(reading.forced)
+        self._read = {
+            name: known
+            if (known := before.get(name)) is not None and known[0] == data and known[1][1] is (name in forced)
+            else (data, _shown(reading.symbols[name], data, name in forced))
+            for name, data in reading.contents.items()
+        }
+        return {name: shown for name, (_, shown) in self._read.items()}
 
     def _symbols(self, plc: Controller) -> SymbolTable | None:
         """The symbols of the program that runs; None if there are none, which is published."""
@@ -214,7 +226,7 @@ class Live:
             self._publish("symbols", {"crc": None, "message": error.message, "table": None})
             return None
         if table is not self._table:
-            self._table, self._known = table, {}
+            self._table, self._known, self._read = table, {}, {}
             crc = f"{table.image_crc:08X}"
             self._publish("symbols", {"crc": crc, "message": "", "table": table})
         return table
@@ -322,6 +334,12 @@ def shown_symbol(table: SymbolTable, name: str) -> Symbol | str:
     if isinstance(symbol.type, StructType | ArrayType | OpenArrayType):
         return f"{name} has no value of its own; show its parts."
     return symbol
+
+
+def _shown(symbol: Symbol, data: bytes | None, forced: bool) -> list[Any]:
+    """What browsers get of a value: text, mark of a force, number for a plot, and no reason why there is none."""
+    value = None if data is None else symbol.decode(data)
+    return [symbol.literal(value), forced, _number(value), ""]
 
 
 def _number(value: Any) -> float | int | None:

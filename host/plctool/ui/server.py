@@ -104,6 +104,7 @@ class _Page:
             http=_Connection,
             ws="websockets-sansio",
             ws_max_size=MAX_MESSAGE,
+            ws_per_message_deflate=False,  # loopback carries more than a core compresses
             lifespan="off",
             log_config=None,  # the address with its token would be in the log
             access_log=False,
