@@ -98,6 +98,11 @@ def _is_at(table: SymbolTable, name: str, place: object) -> bool:
     return False
 
 
+def _removed_variables(had: SymbolTable, has: SymbolTable) -> list[Symbol]:
+    """The variables that the new program does not have, or has at another place."""
+    return [s for name, s in had.variables.items() if not _is_at(has, name, s.place)]
+
+
 @dataclass(frozen=True)
 class ExceptionInfo:
     """What stopped the program. `task` is None for initialisation code; the location is None without symbols. `calls`
@@ -285,7 +290,10 @@ class Controller(ABC):
                 _check_base(data, status.image_crc)
             self._wait_for_conditions(status)
             self.end_debugging()  # its breakpoints are in the old code
-            forced, ended = self._release_removed(status.image_crc, image_crc(data))
+            tables = self._both_tables(status.image_crc, image_crc(data))
+            forced = {} if tables is None else self._release(*tables)
+            removed = [] if tables is None else _removed_variables(*tables)
+            ended = self._end_traces_of(removed)
             begin = self._now()
             try:
                 self._change(data, lambda done: progress(done, len(data)))
@@ -297,6 +305,8 @@ class Controller(ABC):
             if now.image_crc != image_crc(data):
                 raise went_down()
             released = self._force_again(forced)
+            if tables is not None:
+                self._renew_traces(status.image_crc, now.image_crc, removed)
         return ChangeResult(len(data), seconds, now.state, released, ended)
 
     def _with_names(self, error: DeviceError, crc: int) -> DeviceError:
@@ -326,14 +336,15 @@ class Controller(ABC):
             time.sleep(_CONDITION_POLL_S)
             status = self.raw_status()
 
-    def _release_removed(self, before: int, after: int) -> tuple[dict[str, Any], list[str]]:
-        """Ends the force and the traces of variables that the new program does not have, or has at another place.
-        Returns the forced values, and the names of the traces."""
-        try:
-            had, has = (self._tables.get(crc) or find_symbols(crc) for crc in (before, after))
-        except UsageError:
-            return {}, []
-        removed = [s for name, s in had.variables.items() if not _is_at(has, name, s.place)]
+    def _both_tables(self, before: int, after: int) -> tuple[SymbolTable, SymbolTable] | None:
+        """The symbols of two programs; None if those of one are not known."""
+        with suppress(UsageError):
+            return (self._tables.get(before) or find_symbols(before), self._tables.get(after) or find_symbols(after))
+        return None
+
+    def _release(self, had: SymbolTable, has: SymbolTable) -> dict[str, Any]:
+        """Ends the force of variables that the new program does not have, or has at another place. Returns the
+        values."""
         released: dict[str, tuple[Symbol, bytes]] = {}
         with suppress(DeviceError):
             variables = list(had.variables.values())
@@ -346,9 +357,7 @@ class Controller(ABC):
                     released |= named
             if places:
                 self._unforce(had, places)
-        return {name: symbol.decode(content) for name, (symbol, content) in released.items()}, self._end_traces_of(
-            removed
-        )
+        return {name: symbol.decode(content) for name, (symbol, content) in released.items()}
 
     def _force_again(self, values: Mapping[str, Any]) -> list[str]:
         """Forces variables that have moved; returns those that cannot be, such as removed ones."""
@@ -364,10 +373,14 @@ class Controller(ABC):
         ended = []
         with suppress(DeviceError):
             for packet, config in list(self._packets()):
-                if any(place.overlaps(symbol) for place in config.places for symbol in removed):
+                if config.is_about(removed):
                     self.delete_trace(packet)
                     ended.append(config.name)
         return ended
+
+    def _renew_traces(self, before: int, after: int, removed: Sequence[Symbol]) -> None:
+        """Makes the persistent traces of the program `before` those of `after`, but for those of removed variables."""
+        return  # a controller that keeps files has some
 
     @abstractmethod
     def _change(self, data: bytes, progress: Callable[[int], None]) -> None:

@@ -47,7 +47,7 @@ from plctool.link.names import Node
 from plctool.link.passwords import AskPassword, no_password
 from plctool.link.services import Identity, Lateness, LogEntry, Stack, Status, TaskInfo
 from plctool.link.session import Session
-from plctool.link.traces import TraceState
+from plctool.link.traces import TRACE_FILE, TraceState, decode_config
 from plctool.link.transports import Link, can_transport, open_transport, parse_link, share_bus
 
 PASSWORD_VARIABLE = "PLC_PASSWORD"
@@ -393,6 +393,13 @@ class Plc(Controller):
         return services.read_registers(self._session, self.pointer_size())
 
     # ---- traces ----
+
+    def _renew_traces(self, before: int, after: int, removed: Sequence[Symbol]) -> None:
+        with suppress(DeviceError):
+            for name in [file.name for file in self.files().files if file.name.startswith(TRACE_FILE)]:
+                config = decode_config(self.read_file(name))
+                if config.image_crc == before and not config.is_about(removed):
+                    self.write_file(name, config.for_image(after))
 
     def create_trace(self, config: bytes) -> int:
         self._session.recover(self._session.application)

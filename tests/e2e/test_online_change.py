@@ -144,6 +144,25 @@ def test_trace_of_a_removed_variable_ends_and_others_stay(project: Path, plcrt: 
     assert [t["name"] for t in tool.ok("trace", "--tcp", plcrt.tcp, "--list")["traces"]] == ["stays"]
 
 
+def test_persistent_trace_goes_on_after_a_change_and_a_power_cut_unless_what_it_records_moves(
+    project: Path, plcrt: Plcrt, tool: Tool
+) -> None:
+    for name, *options in (
+        ("stays", "Main.n"),
+        ("moves", "Main.list[2]"),
+        ("compares", "Main.n", "--trigger", "Main.list[2] > 100"),
+    ):
+        options += ["--name", name, "--persistent", "--samples", "100"]
+        tool.ok("trace", "--tcp", plcrt.tcp, *options)
+    (project / "main.st").write_text(program(BODY).replace("ARRAY[1..4] OF INT := [4", "ARRAY[0..4] OF INT := [0, 4"))
+    assert tool.ok("flash", "--online-change", "--tcp", plcrt.tcp)["ended"] == ["moves", "compares"]
+    plcrt.stop(signal.SIGKILL)
+    plcrt.start()
+    traces = tool.ok("trace", "--tcp", plcrt.tcp, "--list")["traces"]
+    assert [(t["name"], t["columns"]) for t in traces] == [("stays", ["Main.n"])]
+    eventually(lambda: tool.ok("trace", "--tcp", plcrt.tcp, "--open", "stays")["time_ms"])
+
+
 def test_a_program_may_forbid_online_changes_alone(project: Path, plcrt: Plcrt, tool: Tool) -> None:
     body = "PlcOperationControlInstance.xDisableApplicationOnlineChange := fixed = 8;"
     flash = ("flash", "--online-change", "--tcp", plcrt.tcp)

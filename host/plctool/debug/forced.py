@@ -12,6 +12,7 @@ from plctool.iec.types import ELEMENTARY, ArrayType, Elementary, Kind, PointerTy
 _LETTERS = {Area.INPUT.value: "I", Area.OUTPUT.value: "Q", Area.MEMORY.value: "M"}
 _WIDTHS = {1: "B", 2: "W", 4: "D", 8: "L"}
 _ALL_BITS = 0xFF
+_POINTER_SIZE = PointerType(ELEMENTARY["BYTE"]).size
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,12 @@ class ForcedPlace:
         other = place_of(symbol)
         apart = self.begin >= other.begin + other.size or other.begin >= self.begin + self.size
         return self.way == other.way and not apart and bool(self.mask & other.mask or self.size + other.size > 2)
+
+    def needs(self, symbol: Symbol) -> bool:
+        """True if it is a part of the variable, or if the way to it begins there."""
+        if self.hops:
+            return replace(self, hops=(), size=_POINTER_SIZE, mask=_ALL_BITS).overlaps(symbol) or self.overlaps(symbol)
+        return self.overlaps(symbol)
 
     def same_place(self, other: ForcedPlace) -> bool:
         return replace(self, value=b"") == replace(other, value=b"")

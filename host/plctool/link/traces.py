@@ -38,6 +38,8 @@ _COMPARISONS = {
 }
 _CONDITION = re.compile(r"\s*(.*?)\s*(<=|>=|<>|<|>|=)\s*(.+?)\s*")
 _NOT = re.compile(r"\s*NOT\b\s*(.+?)\s*", re.IGNORECASE)
+_RECORD_SIZES = (1, 2, 4)  # bytes
+TRACE_FILE = "trace."  # persistent traces are files of the controller; TRACE_FILE of CmpTraceMgr.h
 _Number = Callable[[bytes], int | float]
 _SYSTEM_TYPE = ELEMENTARY["LREAL"]
 
@@ -78,7 +80,7 @@ class TraceState:
 
 @dataclass(frozen=True)
 class TraceConfig:
-    """A packet on a controller, as its records are there: the larger ones first."""
+    """A packet on a controller, as its records are there: the larger ones first. `trigger`: what it compares."""
 
     image_crc: int
     name: str
@@ -88,7 +90,18 @@ class TraceConfig:
     samples: int
     before: int
     places: list[ForcedPlace]
+    trigger: ForcedPlace | None
     data: bytes
+
+    def is_about(self, symbols: Sequence[Symbol]) -> bool:
+        """True if it records or compares one of these variables, or by way of one."""
+        places = [*self.places, *([] if self.trigger is None else [self.trigger])]
+        return any(place.needs(symbol) for place in places for symbol in symbols)
+
+    def for_image(self, image_crc: int) -> bytes:
+        """The same for another application, in which what it is about is at the same places."""
+        head = _CONFIG.unpack(self.data)._asdict()
+        return _CONFIG.pack(**head | {"image_crc": image_crc}) + self.data[_CONFIG.size :]
 
     @property
     def is_kept(self) -> bool:
@@ -286,12 +299,15 @@ def decode_config(data: bytes) -> TraceConfig:
     if len(places) != head.records:
         raise bintag.malformed("records of a trace are missing")
     name = head.name.split(b"\0", 1)[0].decode("ascii", "replace")
-    return TraceConfig(head.image_crc, name, head.flags, head.task, head.every, head.samples, head.before, places, data)
+    trigger = _place(head, (*_RECORD_SIZES, 8)) if head.flags & lib.TRACE_TRIGGER else None
+    return TraceConfig(
+        head.image_crc, name, head.flags, head.task, head.every, head.samples, head.before, places, trigger, data
+    )
 
 
-def _place(entry: Any) -> ForcedPlace:
+def _place(entry: Any, sizes: Sequence[int] = _RECORD_SIZES) -> ForcedPlace:
     offset, *hops = _OFFSETS.unpack(entry.offset)
-    if entry.pointers > lib.PLACE_POINTERS or entry.size not in (1, 2, 4):
+    if entry.pointers > lib.PLACE_POINTERS or entry.size not in sizes:
         raise bintag.malformed("a trace has an invalid place")
     return ForcedPlace(entry.area, offset, tuple(hops[: entry.pointers]), entry.size, entry.mask)
 

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 _SAMPLES = 500
 _REDRAW = 0.2  # shortest time between two drawings [s]
 _SHOWN = 2000  # samples of a plot that goes on
-_FILE = "trace."  # persistent traces are files of the controller; TRACE_FILE of CmpTraceMgr.h
 
 Say = Callable[[str], None]
 
@@ -249,6 +248,7 @@ def _shown(args: argparse.Namespace, recording: Recording) -> Iterator[Callable[
 
 def _keep(args: argparse.Namespace, plc: Plc, options: TraceOptions, say: Say) -> int:
     from plctool.core import lib
+    from plctool.link.traces import TRACE_FILE
 
     running = plc.start_trace(args.names, options, args.task)
     if args.persistent:
@@ -256,7 +256,7 @@ def _keep(args: argparse.Namespace, plc: Plc, options: TraceOptions, say: Say) -
             running.end()
             raise UsageError(f"A persistent trace takes {lib.TRACE_KEPT_RECORDS} values; name fewer.", "too-many")
         try:
-            plc.write_file(_FILE + options.name, running.config.data)
+            plc.write_file(TRACE_FILE + options.name, running.config.data)
         except DeviceError:
             running.end()
             raise
@@ -266,9 +266,11 @@ def _keep(args: argparse.Namespace, plc: Plc, options: TraceOptions, say: Say) -
 
 def _end(args: argparse.Namespace, plc: Plc, say: Say) -> int:
     """The file first: a tool that is killed then leaves what another call ends."""
+    from plctool.link.traces import TRACE_FILE
+
     had_file = False
     with suppress(DeviceError):
-        plc.delete_file(_FILE + args.end)
+        plc.delete_file(TRACE_FILE + args.end)
         had_file = True
     try:
         plc.end_trace(args.end)
