@@ -87,7 +87,7 @@ def test_a_tool_that_is_killed_at_any_moment_leaves_all_of_a_command_or_nothing(
     ]
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
     with connect(f"tcp:{plcrt.tcp}", symbols=image.with_suffix(".sym")) as plc:
-        for milliseconds in range(0, 600, 60):
+        for milliseconds in range(0, 600, 150):
             plc.unforce()
             with subprocess.Popen(
                 [*command], cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
