@@ -28,6 +28,13 @@ typedef struct {
     /* Sets the bits of those outputs that stay as they are in the safe state, in a mask of `size` bytes from byte `first` on:
      * those that a channel takes to a device, which gets what is safe by itself. Also from a task that failed. */
     void (*get_kept)(RTS_UI32 first, RTS_UI8 *mask, RTS_UI32 size);
+#if ONLINE_CHANGE
+    /* Checks that the drivers can go on with a checked configuration in place of the loaded one. A refusal comes with its
+     * sentence, and nothing has changed. */
+    RTS_RESULT (*check_change)(const IO_CONFIG *config, APP_REFUSAL *refusal);
+    /* The drivers go on with such a configuration, while no task runs. `tasks`, `context`: as for load. */
+    void (*follow)(const IO_CONFIG *config, const CDL_TASK *tasks, RTS_UI32 task_count, const IEC_CONTEXT *context);
+#endif
 } APP_IO;
 
 #if IO_MAX_CONNECTORS > 0

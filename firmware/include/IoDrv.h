@@ -23,6 +23,7 @@
 #include "CmpErrors.h"
 #include "CmpStd.h"
 #include "IoConfig.h"
+#include "rts_config.h"
 
 /* Who a driver is (8.2.2). */
 typedef struct {
@@ -123,6 +124,17 @@ typedef struct {
     /* From main, for the log, when a connector has CF_CONNECTOR_BUS_ERROR: why, such as "it closes the connection". Without
      * it: "it does not answer". Below 100 us. */
     void (*IoDrvExplainLoss)(const IoConfigConnector *connector, char *text, RTS_SIZE size);
+
+#if ONLINE_CHANGE
+    /*
+     * From main, while no task runs and with interrupts locked on one core: an online change. Connectors, parameters and
+     * channels are the same, at another place in memory; tasks may use other ones of them. The driver replaces each
+     * pointer into the configuration that it keeps by IoMgrConfigFollow of it. Connections and outputs stay as they are.
+     * A driver without such pointers has an empty function; a program with a driver that has none cannot be changed.
+     * Below 20 us.
+     */
+    void (*IoDrvFollowConfiguration)(const IoConfigTaskMap *task_maps, int count);
+#endif
 } ICmpIoDrv;
 
 /* A registered driver. It sets `functions`, all else is the manager's. */

@@ -23,6 +23,8 @@ static struct {
     const char *refuses;  /* connector that it refuses */
     void (*within)(void); /* called once, within the next function of a cycle: what interrupts it */
     RTS_UI32 bus_cycles[IO_SPEC_CONNECTORS];
+    const IoConfigConnector *connector; /* that a test notes, and what it has become in an online change */
+    const IoConfigConnector *followed;
 } plant;
 
 static const ICmpIoDrv test_functions;
@@ -122,6 +124,16 @@ static RTS_RESULT test_bus_cycle(const IoConfigConnector *connector)
     return ERR_OK;
 }
 
+#if ONLINE_CHANGE
+static void test_follow(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_UNUSED(task_maps);
+    RTS_UNUSED(count);
+    called('f');
+    plant.followed = IoMgrConfigFollow(plant.connector);
+}
+#endif
+
 static const ICmpIoDrv test_functions = {
     .IoDrvGetInfo = test_info,
     .IoDrvUpdateConfiguration = test_configure,
@@ -129,6 +141,9 @@ static const ICmpIoDrv test_functions = {
     .IoDrvReadInputs = test_read,
     .IoDrvWriteOutputs = test_write,
     .IoDrvStartBusCycle = test_bus_cycle,
+#if ONLINE_CHANGE
+    .IoDrvFollowConfiguration = test_follow,
+#endif
 };
 
 /* ---- the application ---- */

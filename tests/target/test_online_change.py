@@ -11,6 +11,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 from changing import BODY, Changing, program
 from conftest import TARGET
+from environment import MACHINE
 from online_programs import built
 
 from plctool.core import lib
@@ -59,6 +60,44 @@ def test_power_off_right_after_a_change_keeps_retain_values(make_board, tmp_path
         assert plc.status().image_crc == second.crc
         eventually(lambda: plc.read("Main.n") < 0)
         assert plc.read("Main.kept") == 123
+
+
+LINES = """
+[gpio]
+name = "Board"
+[gpio.in]
+BUTTON0 = "Main.pressed"
+[gpio.out]
+LED0 = "Main.on"
+LED1 = { var = "Main.blinks", on_stop = 0 }
+"""
+LEDS = 0x40028000  # a register of the FPGA
+
+
+@pytest.mark.skipif(not MACHINE.startswith("mps2"), reason="the lines are those of MPS2 boards")
+def test_lines_of_the_board_stay_as_they_are(make_board, tmp_path):
+    (tmp_path / "board.io.toml").write_text(LINES)
+    variables = "VAR pressed, on, blinks : BOOL; n : DINT; END_VAR"
+    text = program("on := TRUE; n := n + 1;", variables, "")
+    first = built(tmp_path, text, None, TARGET)
+    with make_board("full") as board, Plc(Connection(board.line())) as plc:
+
+        def leds():
+            return int.from_bytes(board.read_memory(LEDS, 4), "little")
+
+        plc.add_symbols(first.symbols)
+        plc.flash(first.image)
+        eventually(lambda: leds() == 1)
+        for n in range(3):
+            result = built(tmp_path, text.replace("n + 1;", f"n + {n + 2}; blinks := {n} > 0;"), plc.symbols(), TARGET)
+            assert result.change.problems == []
+            plc.add_symbols(result.symbols)
+            plc.change(result.image)
+            assert leds() & 1
+            eventually(lambda n=n: leds() == (3 if n else 1))
+            assert plc.read("Board.ok") and plc.io_devices()[0].state == "ok"
+        plc.stop()
+        assert leds() == 0
 
 
 TWO_TASKS = """PROGRAM Main VAR n : DINT; END_VAR

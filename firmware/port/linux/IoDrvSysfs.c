@@ -526,6 +526,15 @@ static RTS_RESULT start_bus_cycle(const IoConfigConnector *connector)
     return ERR_OK;
 }
 
+#if ONLINE_CHANGE
+/* Devices know their connectors by number, and have copies of what these say. */
+static void follow_configuration(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_UNUSED(task_maps);
+    RTS_UNUSED(count);
+}
+#endif
+
 static const ICmpIoDrv functions = {
     .IoDrvGetInfo = get_info,
     .IoDrvUpdateConfiguration = update_configuration,
@@ -533,6 +542,9 @@ static const ICmpIoDrv functions = {
     .IoDrvReadInputs = read_inputs,
     .IoDrvWriteOutputs = write_outputs,
     .IoDrvStartBusCycle = start_bus_cycle,
+#if ONLINE_CHANGE
+    .IoDrvFollowConfiguration = follow_configuration,
+#endif
 };
 
 RTS_RESULT IoDrvSysfs_Hook(CMP_HOOK hook)

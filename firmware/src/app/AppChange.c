@@ -14,6 +14,7 @@
 #include "AppAddress.h"
 #include "AppCommit.h"
 #include "AppEvents.h"
+#include "AppIo.h"
 #include "AppLife.h"
 #include "AppReason.h"
 #include "AppState.h"
@@ -354,12 +355,27 @@ static RTS_RESULT check_tasks(const CHANGE *change, APP_REFUSAL *refusal)
     return ERR_OK;
 }
 
+#if IO_MAX_CONNECTORS > 0
+static RTS_RESULT check_io(const CHANGE *change, APP_REFUSAL *refusal)
+{
+    const CDL_SEGMENT *io = &change->image->io;
+
+    if (io->size == 0 && change->old.io.size == 0)
+        return ERR_OK;
+    if (io->size == 0 || change->old.io.size == 0)
+        return APP_REFUSE(refusal, ERR_NOT_SUPPORTED, "The I/O configuration has changed; download the program.");
+    return AppIoGet()->check_change((const IO_CONFIG *)(const void *)(change->code + io->offset), refusal);
+}
+#else
+#define check_io(change, refusal) ((RTS_RESULT)ERR_OK)
+#endif
+
 static RTS_RESULT check_all(CHANGE *change, APP_REFUSAL *refusal)
 {
-#if IO_MAX_CONNECTORS > 0
-    if (change->image->io.size != 0 || change->old.io.size != 0)
-        return APP_REFUSE(refusal, ERR_NOT_SUPPORTED, "The program has an I/O configuration; download it.");
-#endif
+    RTS_RESULT result = check_io(change, refusal);
+
+    if (result != ERR_OK)
+        return result;
     if (!are_steps(change))
         return APP_REFUSE(refusal, ERR_OUT_OF_LIMITS, "The steps of the change are damaged; build it again.");
     return check_tasks(change, refusal);

@@ -183,7 +183,25 @@ static bool run_function(RTS_UI32 function, bool init_retains)
     return false;
 }
 
+/* Where the I/O configuration of a loaded application is. */
+#if IO_MAX_CONNECTORS > 0
+static const IO_CONFIG *io_config(void)
+{
+    return (const IO_CONFIG *)(const void *)(app.code + app.image.io.offset);
+}
+#endif
+
 #if ONLINE_CHANGE
+#if IO_MAX_CONNECTORS > 0
+static void follow_io(void)
+{
+    if (app.image.io.size != 0)
+        AppIoGet()->follow(io_config(), app.tables.tasks, app.image.task_count, &app.context);
+}
+#else
+#define follow_io() ((void)0)
+#endif
+
 static void call_entry(void *arg)
 {
     APP_CALL_ENTRY((IEC_ENTRY)(((uintptr_t)app.code + *(const RTS_UI32 *)arg) | APP_ENTRY_MODE_BIT), &app.context);
@@ -212,6 +230,7 @@ void AppExchange(const APP_IMAGE *image, const RTS_UI8 *code, const APP_TABLES *
     SysExceptCodeRange(code, image->code.size);
     IecCycleSetCode(&app.context);
     RetainExchange(&app.image.kept, image->crc);
+    follow_io();
 }
 
 void AppBeginProof(void)
@@ -317,13 +336,12 @@ const RTS_UI8 *AppMapCode(const APP_IMAGE *image)
 #if IO_MAX_CONNECTORS > 0
 static RTS_RESULT load_io(APP_REFUSAL *refusal)
 {
-    const IO_CONFIG *config = (const IO_CONFIG *)(const void *)(app.code + app.image.io.offset);
     RTS_RESULT result = ERR_OK;
     RTS_UI32 i;
 
     if (app.image.io.size == 0)
         return ERR_OK;
-    result = AppIoGet()->load(config, app.tables.tasks, app.image.task_count, &app.context, refusal);
+    result = AppIoGet()->load(io_config(), app.tables.tasks, app.image.task_count, &app.context, refusal);
     for (i = 0; i < app.image.task_count && result == ERR_OK; i++)
         result = AppTasksCheckEvent(&app.tables.tasks[i], refusal);
     return result;

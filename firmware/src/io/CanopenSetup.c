@@ -154,6 +154,26 @@ RTS_RESULT CanopenSetUp(CANOPEN_SETUP *setup, const IO_DRIVER *driver)
     return result;
 }
 
+#if ONLINE_CHANGE
+/* The transfer of a concise DCF may be under way. */
+static void follow_device(CANOPEN_DEVICE *device)
+{
+    device->connector = IoMgrConfigFollow(device->connector);
+    device->node.config = IoMgrConfigFollow(device->node.config);
+    device->node.sdo.out = IoMgrConfigFollow(device->node.sdo.out);
+}
+
+void CanopenSetupFollow(CANOPEN_SETUP *setup)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < CAN_CONTROLLERS; i++)
+        setup->lines[i].connector = IoMgrConfigFollow(setup->lines[i].connector);
+    for (i = 0; i < setup->device_count; i++)
+        follow_device(&setup->devices[i]);
+}
+#endif
+
 CANOPEN_DEVICE *CanopenFindDevice(CANOPEN_SETUP *setup, const IoConfigConnector *connector)
 {
     for (RTS_UI32 i = 0; i < setup->device_count; i++)

@@ -71,6 +71,11 @@ typedef struct {
 CANOPEN_PDO_STATE *CanopenFindPdo(CANOPEN_SETUP *setup, const IoConfigConnector *connector, RTS_UI32 parameter);
 CANOPEN_DEVICE *CanopenFindDevice(CANOPEN_SETUP *setup, const IoConfigConnector *connector);
 
+#if ONLINE_CHANGE
+/* Leads all pointers into the configuration on (IoDrvFollowConfiguration). */
+void CanopenSetupFollow(CANOPEN_SETUP *setup);
+#endif
+
 /* Makes what the connectors of `driver` ask for. ERR_* of IoMgrConfigRefuse. */
 RTS_RESULT CanopenSetUp(CANOPEN_SETUP *setup, const IO_DRIVER *driver);
 

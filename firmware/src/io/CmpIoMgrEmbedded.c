@@ -226,7 +226,41 @@ static void reset(void)
     }
 }
 
-static const APP_IO app_io = {has_driver, load, reset, unload, IoCycleGetKept};
+#if ONLINE_CHANGE
+static RTS_RESULT check_change(const IO_CONFIG *config, APP_REFUSAL *refusal)
+{
+    const IO_DRIVER *driver;
+
+    if (!IoTablesCanFollow(config))
+        return APP_REFUSE(refusal, ERR_NOT_SUPPORTED, "The I/O configuration has changed; download the program.");
+    for (driver = manager.drivers; driver != NULL; driver = driver->next) {
+        if (has_connector(driver) && driver->functions->IoDrvFollowConfiguration == NULL)
+            return APP_REFUSE(refusal, ERR_NOT_SUPPORTED, "The driver %s knows no online change; download the program.",
+                              driver->functions->IoDrvGetInfo()->szDriverName);
+    }
+    return ERR_OK;
+}
+
+static void follow(const IO_CONFIG *config, const CDL_TASK *tasks, RTS_UI32 task_count, const IEC_CONTEXT *context)
+{
+    const IO_DRIVER *driver;
+
+    IoTablesFollow(config, context);
+    for (driver = manager.drivers; driver != NULL; driver = driver->next) {
+        if (driver->functions->IoDrvFollowConfiguration != NULL)
+            driver->functions->IoDrvFollowConfiguration(IoTablesGetTaskMaps(), (int)IoTablesCountTaskMaps());
+    }
+    IoDevicesFollow(tasks, task_count);
+    IoCycleFollow();
+}
+#endif
+
+static const APP_IO app_io = {
+    has_driver,   load,   reset, unload, IoCycleGetKept,
+#if ONLINE_CHANGE
+    check_change, follow,
+#endif
+};
 
 /* ---- main ---- */
 

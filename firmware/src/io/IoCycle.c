@@ -451,6 +451,13 @@ RTS_RESULT IoCycleLoad(IO_DRIVER *drivers)
     return ERR_OK;
 }
 
+#if ONLINE_CHANGE
+void IoCycleFollow(void)
+{
+    find_work();
+}
+#endif
+
 void IoCycleUnload(void)
 {
     IO_DRIVER *driver;

@@ -17,6 +17,11 @@ RTS_RESULT IoCycleLoad(IO_DRIVER *drivers);
 void IoCycleUnload(void);
 void IoCycleForget(void);
 
+#if ONLINE_CHANGE
+/* Tasks go on with the tables that are loaded now. While no task runs. */
+void IoCycleFollow(void);
+#endif
+
 /* What tasks do otherwise, while the application is stopped: inputs, bus cycles, variables of the program. */
 void IoCycleKeepUp(void);
 /* Has drivers look after their connectors. */

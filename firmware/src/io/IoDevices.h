@@ -14,6 +14,11 @@
  * task runs. */
 void IoDevicesReset(const CDL_TASK *tasks, RTS_UI32 task_count);
 
+#if ONLINE_CHANGE
+/* Finds the bus cycle tasks again; all else stays. While no task runs. */
+void IoDevicesFollow(const CDL_TASK *tasks, RTS_UI32 task_count);
+#endif
+
 /* The driver of a connector, NULL: none. */
 IO_DRIVER *IoDeviceGetDriver(RTS_UI32 index);
 void IoDeviceSetDriver(RTS_UI32 index, IO_DRIVER *driver);

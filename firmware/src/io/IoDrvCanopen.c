@@ -551,6 +551,15 @@ static RTS_RESULT write_parameter(const IoConfigConnector *connector, RTS_UI32 i
 
 /* ---- life ---- */
 
+#if ONLINE_CHANGE
+static void follow_configuration(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_UNUSED(task_maps);
+    RTS_UNUSED(count);
+    CanopenSetupFollow(&setup);
+}
+#endif
+
 static const ICmpIoDrv functions = {
     .IoDrvGetInfo = get_info,
     .IoDrvUpdateConfiguration = update_configuration,
@@ -561,6 +570,9 @@ static const ICmpIoDrv functions = {
     .IoDrvReadParameter = read_parameter,
     .IoDrvWriteParameter = write_parameter,
     .IoDrvExplainLoss = explain_loss,
+#if ONLINE_CHANGE
+    .IoDrvFollowConfiguration = follow_configuration,
+#endif
 };
 
 RTS_RESULT IoDrvCanopen_Hook(CMP_HOOK hook)

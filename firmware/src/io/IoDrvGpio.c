@@ -379,6 +379,15 @@ static void poll_groups(void)
     }
 }
 
+#if ONLINE_CHANGE
+/* Groups know their connectors by number. */
+static void follow_configuration(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_UNUSED(task_maps);
+    RTS_UNUSED(count);
+}
+#endif
+
 static const ICmpIoDrv functions = {
     .IoDrvGetInfo = get_info,
     .IoDrvUpdateConfiguration = update_configuration,
@@ -386,6 +395,9 @@ static const ICmpIoDrv functions = {
     .IoDrvReadInputs = read_inputs,
     .IoDrvWriteOutputs = write_outputs,
     .IoDrvGetModuleDiagnosis = diagnose,
+#if ONLINE_CHANGE
+    .IoDrvFollowConfiguration = follow_configuration,
+#endif
 };
 
 RTS_RESULT IoDrvGpio_Hook(CMP_HOOK hook)

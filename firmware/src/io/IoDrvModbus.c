@@ -530,6 +530,15 @@ static void explain_loss(const IoConfigConnector *connector, char *text, RTS_SIZ
 
 /* ---- life ---- */
 
+#if ONLINE_CHANGE
+static void follow_configuration(const IoConfigTaskMap *task_maps, int count)
+{
+    ModbusSetupFollow(&setup);
+    maps = task_maps;
+    map_count = count;
+}
+#endif
+
 static const ICmpIoDrv functions = {
     .IoDrvGetInfo = get_info,
     .IoDrvUpdateConfiguration = update_configuration,
@@ -540,6 +549,9 @@ static const ICmpIoDrv functions = {
     .IoDrvReadParameter = read_parameter,
     .IoDrvReset = reset,
     .IoDrvExplainLoss = explain_loss,
+#if ONLINE_CHANGE
+    .IoDrvFollowConfiguration = follow_configuration,
+#endif
 };
 
 static void begin_tools(void)

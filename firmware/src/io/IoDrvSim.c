@@ -346,6 +346,15 @@ static RTS_RESULT write_parameter(const IoConfigConnector *connector, RTS_UI32 i
     return result;
 }
 
+#if ONLINE_CHANGE
+/* Devices and their channels are known by number. */
+static void follow_configuration(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_UNUSED(task_maps);
+    RTS_UNUSED(count);
+}
+#endif
+
 static const ICmpIoDrv functions = {
     .IoDrvGetInfo = get_info,
     .IoDrvUpdateConfiguration = update_configuration,
@@ -357,6 +366,9 @@ static const ICmpIoDrv functions = {
     .IoDrvScanModules = scan,
     .IoDrvReadParameter = read_parameter,
     .IoDrvWriteParameter = write_parameter,
+#if ONLINE_CHANGE
+    .IoDrvFollowConfiguration = follow_configuration,
+#endif
 };
 
 RTS_RESULT IoDrvSim_Hook(CMP_HOOK hook)

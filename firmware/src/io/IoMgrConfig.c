@@ -13,20 +13,14 @@
 
 static const IO_CONFIG no_config;
 
-static struct {
-    const IO_CONFIG *head;
-    const IoConfigConnector *connectors;
-    const IoConfigConnectorMap *connector_maps;
-    const IoConfigChannelMap *channel_maps;
-    const RTS_UI8 *data;
-    RTS_UI8 *const *areas; /* by APP_AREA_* */
-} tables;
+static IO_TABLES tables;
 
 /* ---- for the manager ---- */
 
-static const IoConfigParameter *get_parameters(void)
+/* Not inlined: it is called from many places. */
+static RTS_NOINLINE const IoConfigParameter *get_parameters(void)
 {
-    return (const IoConfigParameter *)(tables.connectors + tables.head->connectors);
+    return IoTablesParametersOf(&tables);
 }
 
 const IoConfigTaskMap *IoTablesGetTaskMaps(void)
@@ -34,13 +28,14 @@ const IoConfigTaskMap *IoTablesGetTaskMaps(void)
     return (const IoConfigTaskMap *)(get_parameters() + tables.head->parameters);
 }
 
+const IO_TABLES *IoTablesGet(void)
+{
+    return &tables;
+}
+
 void IoTablesSet(const IO_CONFIG *config, const IEC_CONTEXT *context)
 {
-    tables.head = config != NULL ? config : &no_config;
-    tables.connectors = (const IoConfigConnector *)(tables.head + 1);
-    tables.connector_maps = (const IoConfigConnectorMap *)(IoTablesGetTaskMaps() + tables.head->task_maps);
-    tables.channel_maps = (const IoConfigChannelMap *)(tables.connector_maps + tables.head->connector_maps);
-    tables.data = (const RTS_UI8 *)(tables.channel_maps + tables.head->channel_maps);
+    IoTablesFind(&tables, config != NULL ? config : &no_config);
     tables.areas = context != NULL ? context->area : NULL;
 }
 

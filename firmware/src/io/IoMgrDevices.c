@@ -173,6 +173,19 @@ static RTS_UI32 find_fastest(const CDL_TASK *tasks, RTS_UI32 count)
     return fastest;
 }
 
+/* Sets the task in which a connector has its bus cycle. While no task runs. */
+static RTS_INLINE void set_bus_cycle(DEVICE *device, const IoConfigConnector *connector, RTS_UI32 fastest)
+{
+    bool is_root = connector->parent == IO_CONFIG_NONE;
+    RTS_UI32 task = is_root ? fastest : IoDeviceGetBusTask(connector->parent);
+
+    if (connector->bus_task != IO_CONFIG_NONE)
+        task = connector->bus_task;
+    device->flags |= task << BUS_TASK_SHIFT;
+    if (is_root || connector->bus_task != IO_CONFIG_NONE)
+        device->flags |= BUS_CYCLE;
+}
+
 void IoDevicesReset(const CDL_TASK *tasks, RTS_UI32 task_count)
 {
     RTS_UI32 fastest = find_fastest(tasks, task_count);
@@ -181,15 +194,23 @@ void IoDevicesReset(const CDL_TASK *tasks, RTS_UI32 task_count)
     memset(devices, 0, sizeof devices);
     for (i = 0; i < IoTablesCountConnectors(); i++) {
         const IoConfigConnector *connector = IoMgrConfigGetConnector(i);
-        bool is_root = connector->parent == IO_CONFIG_NONE;
-        RTS_UI32 task = is_root ? fastest : IoDeviceGetBusTask(connector->parent);
-        if (connector->bus_task != IO_CONFIG_NONE)
-            task = connector->bus_task;
-        devices[i].flags = connector->flags | task << BUS_TASK_SHIFT;
-        if (is_root || connector->bus_task != IO_CONFIG_NONE)
-            devices[i].flags |= BUS_CYCLE;
+        devices[i].flags = connector->flags;
+        set_bus_cycle(&devices[i], connector, fastest);
     }
 }
+
+#if ONLINE_CHANGE
+void IoDevicesFollow(const CDL_TASK *tasks, RTS_UI32 task_count)
+{
+    RTS_UI32 fastest = find_fastest(tasks, task_count);
+    RTS_UI32 i;
+
+    for (i = 0; i < IoTablesCountConnectors(); i++) {
+        devices[i].flags &= ~(0xFFu << BUS_TASK_SHIFT | BUS_CYCLE | BUS_WAITS);
+        set_bus_cycle(&devices[i], IoMgrConfigGetConnector(i), fastest);
+    }
+}
+#endif
 
 void IoDeviceSetDriver(RTS_UI32 index, IO_DRIVER *driver)
 {

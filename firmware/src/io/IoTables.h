@@ -9,13 +9,59 @@
 #include "CmpIecAbi.h"
 #include "IoConfig.h"
 
+/* Where the tables of a configuration are. */
+typedef struct {
+    const IO_CONFIG *head;
+    const IoConfigConnector *connectors;
+    const IoConfigConnectorMap *connector_maps;
+    const IoConfigChannelMap *channel_maps;
+    const RTS_UI8 *data;
+    RTS_UI8 *const *areas; /* by APP_AREA_* */
+} IO_TABLES;
+
+static inline const IoConfigParameter *IoTablesParametersOf(const IO_TABLES *tables)
+{
+    return (const IoConfigParameter *)(tables->connectors + tables->head->connectors);
+}
+
+static inline const IoConfigTaskMap *IoTablesTaskMapsOf(const IO_TABLES *tables)
+{
+    return (const IoConfigTaskMap *)(IoTablesParametersOf(tables) + tables->head->parameters);
+}
+
+/* Finds the tables of a checked configuration; `areas` stay. */
+static inline void IoTablesFind(IO_TABLES *tables, const IO_CONFIG *config)
+{
+    const IoConfigConnector *connectors = (const IoConfigConnector *)(config + 1);
+    const IoConfigParameter *parameters = (const IoConfigParameter *)(connectors + config->connectors);
+    const IoConfigTaskMap *task_maps = (const IoConfigTaskMap *)(parameters + config->parameters);
+
+    tables->head = config;
+    tables->connectors = connectors;
+    tables->connector_maps = (const IoConfigConnectorMap *)(task_maps + config->task_maps);
+    tables->channel_maps = (const IoConfigChannelMap *)(tables->connector_maps + config->connector_maps);
+    tables->data = (const RTS_UI8 *)(tables->channel_maps + config->channel_maps);
+}
+
 /* `config` as checked, and the areas; NULL: there is none. From main, while no task runs. */
 void IoTablesSet(const IO_CONFIG *config, const IEC_CONTEXT *context);
+
+/* Returns the tables of the loaded configuration. */
+const IO_TABLES *IoTablesGet(void);
 
 /* All counts are 0 without a configuration. */
 RTS_UI32 IoTablesCountConnectors(void);
 RTS_UI32 IoTablesCountTaskMaps(void);
 const IoConfigTaskMap *IoTablesGetTaskMaps(void);
+
+#if ONLINE_CHANGE
+/* True if drivers can go on with a checked configuration in place of the loaded one: connectors and parameters are the
+ * same, and channels are at the same places. */
+bool IoTablesCanFollow(const IO_CONFIG *config);
+
+/* As IoTablesSet, for such a configuration; IoMgrConfigFollow leads to it from now on. */
+void IoTablesFollow(const IO_CONFIG *config, const IEC_CONTEXT *context);
+#endif
 
 /* Where an IO_DEVICE_STATE of the program is. */
 IO_DEVICE_STATE *IoTablesGetState(RTS_UI32 offset);

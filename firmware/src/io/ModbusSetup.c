@@ -488,6 +488,43 @@ RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver)
     return result;
 }
 
+/* ---- an online change ---- */
+
+#if ONLINE_CHANGE
+static void follow_server(MODBUS_SERVER_LINE *line)
+{
+    RTS_UI32 i;
+
+    line->noted.connector = IoMgrConfigFollow(line->noted.connector);
+    for (i = 0; i < MODBUS_OBJECTS; i++)
+        line->server.object[i] = IoMgrConfigFollow(line->server.object[i]);
+}
+
+static void follow_client(MODBUS_CLIENT_LINE *line)
+{
+    line->noted.connector = IoMgrConfigFollow(line->noted.connector);
+#if SYSSOCK_NAMES
+    line->client.link.host = IoMgrConfigFollow(line->client.link.host);
+#endif
+}
+
+void ModbusSetupFollow(MODBUS_SETUP *setup)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < setup->client_count; i++)
+        follow_client(&setup->clients[i]);
+    for (i = 0; i < setup->device_count; i++)
+        setup->noted[i].connector = IoMgrConfigFollow(setup->noted[i].connector);
+    for (i = 0; i < setup->job_count; i++)
+        setup->jobs[i].job = IoMgrConfigFollow(setup->jobs[i].job);
+    for (i = 0; i < setup->server_count; i++)
+        follow_server(&setup->servers[i]);
+    for (i = 0; i < setup->range_count; i++)
+        setup->ranges[i].range = IoMgrConfigFollow(setup->ranges[i].range);
+}
+#endif
+
 /* ---- finding ---- */
 
 MODBUS_PLACE ModbusFindPlace(MODBUS_SETUP *setup, const IoConfigConnector *connector)

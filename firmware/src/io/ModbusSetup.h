@@ -62,6 +62,11 @@ RTS_RESULT ModbusRefused(RTS_RESULT result);
  * is to be called again. */
 RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver);
 
+#if ONLINE_CHANGE
+/* Leads all pointers into the configuration on (IoDrvFollowConfiguration). */
+void ModbusSetupFollow(MODBUS_SETUP *setup);
+#endif
+
 /* Closes what is open; the line of tools is the firmware's again. */
 void ModbusGiveBack(MODBUS_SETUP *setup);
 

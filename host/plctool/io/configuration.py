@@ -56,6 +56,15 @@ class ChannelEntry:
     flags: int
     value: int = 0
 
+    def single_bits(self) -> Iterator[ChannelEntry]:
+        """The channels that it is made of if it is neither whole bytes nor a single bit, else the channel."""
+        if self.bits >= 8:
+            yield self
+        else:
+            for n in range(self.bits):
+                at, area = self.parameter_bit + n, self.area_bit + n
+                yield ChannelEntry(self.parameter, at, area, 1, self.flags, self.value >> n & 1)
+
 
 @dataclass(frozen=True)
 class ConnectorMap:

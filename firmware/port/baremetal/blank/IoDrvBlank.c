@@ -108,6 +108,16 @@ static RTS_RESULT start_bus_cycle(const IoConfigConnector *connector)
     return ERR_OK;
 }
 
+#if ONLINE_CHANGE
+/* Write here: IoMgrConfigFollow for each pointer into the configuration that you keep. */
+static void follow_configuration(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_UNUSED(task_maps);
+    RTS_UNUSED(count);
+    blank.connector = IoMgrConfigFollow(blank.connector);
+}
+#endif
+
 static const ICmpIoDrv functions = {
     .IoDrvGetInfo = get_info,
     .IoDrvUpdateConfiguration = update_configuration,
@@ -115,6 +125,9 @@ static const ICmpIoDrv functions = {
     .IoDrvReadInputs = read_inputs,
     .IoDrvWriteOutputs = write_outputs,
     .IoDrvStartBusCycle = start_bus_cycle,
+#if ONLINE_CHANGE
+    .IoDrvFollowConfiguration = follow_configuration,
+#endif
 };
 
 /* Write here: what the hardware needs before any application, in CH_INIT2; what takes long, step by step, in

@@ -6,7 +6,6 @@ from bisect import bisect_right
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from zlib import crc32
 
 from plctool.compiler.base.garbage import no_collection
 from plctool.compiler.base.nesting import room_for_nesting
@@ -16,7 +15,7 @@ from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.objects import emit_objects
 from plctool.compiler.codegen.stack import CallGraph, Frames
 from plctool.compiler.image.io_configuration import assign_tasks, configuration_of, io_document
-from plctool.compiler.image.online_change import Steps, check_facts, constants_of, facts_of
+from plctool.compiler.image.online_change import Steps, check_facts, constants_of, device_facts, facts_of
 from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.compiler.syntax.library import is_standard
 from plctool.compiler.typed.kept import kept_parts, kept_variables
@@ -101,17 +100,18 @@ def _build(
     linked = link(objects, target, lowered.entries, lowered.imports, options.cache)
     symbols = _symbols(program, lowered, linked, target, info.project, steps=options.steps)
     kept = kept_parts(v for v in program.globals if keeps and v.area is Area.RETAIN)
-    code, io = linked.code, None
+    code, io, devices = linked.code, None, []
     if program.io is not None and program.io.connectors:
         assign_tasks(program, program.io)
-        configuration = pack_configuration(configuration_of(program, program.io))
+        tables = configuration_of(program, program.io)
+        configuration, devices = pack_configuration(tables), device_facts(tables)
         code += bytes(-len(code) % _CODE_ALIGN)
         io = (len(code), len(configuration))
         code += configuration
         symbols.io = io_document(program, program.io)
     tasks = [_task(task, _entry(linked, name, target)) for task, name in zip(program.tasks, lowered.tasks, strict=True)]
     device_id = int(getattr(lib, target.device_id))
-    symbols.online = facts_of(tasks, device_id, 0 if io is None else crc32(code[io[0] :]))
+    symbols.online = facts_of(tasks, device_id, devices)
     symbols.online["constants"] = constants_of(program.globals, program.defaults)
     areas = {area.value: size for area, size in program.area_sizes.items() if area is not Area.CODE}
     changes = None

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import product
 from typing import Any
 from zlib import crc32
@@ -23,6 +23,7 @@ from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import StructType
 from plctool.image.file import ChangeStep, ImageTask
+from plctool.io.configuration import Configuration
 
 _ZEROS = re.compile(rb"\0{24,}")  # cost more as data than another step
 _AT_ONCE = 16  # bytes that are no more as data than as steps for what is zero and what is not
@@ -32,9 +33,27 @@ _EXIT = ".fb_exit"
 # ---- what a program says of itself ----
 
 
-def facts_of(tasks: Sequence[ImageTask], device_id: int, io_crc: int) -> dict[str, Any]:
-    """What has to be alike in both programs. `io_crc`: of the I/O configuration; 0: there is none."""
-    return {"device": device_id, "io": io_crc, "tasks": [_task_facts(task) for task in tasks]}
+def facts_of(tasks: Sequence[ImageTask], device_id: int, devices: list[list[Any]]) -> dict[str, Any]:
+    """What has to be alike in both programs. `devices`: of the I/O configuration (`device_facts`)."""
+    return {"device": device_id, "io": devices, "tasks": [_task_facts(task) for task in tasks]}
+
+
+def device_facts(configuration: Configuration) -> list[list[Any]]:
+    """The devices and buses of an I/O configuration, each with a CRC of its parameters and channels. Which task uses
+    which channels does not count, nor where the variable is that follows the device."""
+    channels = {
+        (tasks.type, part.connector, channel)
+        for tasks in configuration.task_maps
+        for part in tasks.connectors
+        for channel in part.channels
+        for channel in channel.single_bits()
+    }
+    facts = []
+    for index, connector in enumerate(configuration.connectors):
+        own = sorted((kind, astuple(channel)) for kind, of, channel in channels if of == index)
+        alike = astuple(replace(connector, state=None, bus_task=None))
+        facts.append([connector.name, crc32(repr((configuration.board, alike, own)).encode())])
+    return facts
 
 
 def _task_facts(task: ImageTask) -> dict[str, Any]:
@@ -72,9 +91,7 @@ def check_facts(change: OnlineChange, facts: Mapping[str, Any], device: str) -> 
     if before["device"] != facts["device"]:
         change.problems.append(f"the program that runs was built for another target than {device}")
     if before["io"] != facts["io"]:
-        change.problems.append("the I/O configuration is another one")
-    elif before["io"]:
-        change.problems.append("the program has an I/O configuration")
+        change.problems.append(f"the I/O configuration has changed{_changed_devices(before['io'], facts['io'])}")
     had = {task["name"]: task for task in before["tasks"]}
     has = {task["name"]: task for task in facts["tasks"]}
     change.problems += [f"task {name} is new" for name in has if name not in had]
@@ -85,6 +102,14 @@ def check_facts(change: OnlineChange, facts: Mapping[str, Any], device: str) -> 
                 change.problems.append(f"task {name} has another {key}: {_text(had[name][key])}, now {_text(value)}")
     if list(had) != list(has) and set(had) == set(has):
         change.problems.append("the tasks are declared in another order")
+
+
+def _changed_devices(before: object, now: list[list[Any]]) -> str:
+    """The devices that differ, in brackets. Before: a number, of a program that an older plctool built."""
+    if not isinstance(before, list):
+        return ""
+    names = [name for name, _ in (d for d in (*before, *now) if d not in before or d not in now)]
+    return f" ({', '.join(dict.fromkeys(names))})" if names else " (the order of devices)"
 
 
 def _text(value: object) -> str:
