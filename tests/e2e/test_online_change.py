@@ -103,6 +103,36 @@ def test_sources_of_a_changed_program_can_be_kept_on_the_device(project: Path, p
     assert got["crc"] == crc == built["crc"]
 
 
+def test_back_is_the_program_before_with_the_values_of_now(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    flash = ("flash", "--online-change", "--tcp", plcrt.tcp)
+
+    def values() -> dict[str, int]:
+        return dict(tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed", "Main.text")["values"])
+
+    first = tool("status", "--tcp", plcrt.tcp).out
+    done = tool(*flash, "--back")
+    assert (done.status, "there is no way back" in done.err) == (2, True)
+    newer = program(BODY + " more := 5;", before="VAR_GLOBAL more : INT := 3; END_VAR" + BLOCKS)
+    (project / "main.st").write_text(newer.replace("STRING[20]", "STRING[60]"))
+    tool.ok(*flash)
+    tool.ok("write", "--tcp", plcrt.tcp, "Main.fixed=70", f"Main.text='{'x' * 40}'")
+    plan = tool.ok(*flash, "--back", "--dry-run")
+    assert (plan["removed"], len(plan["retyped"]), plan["problems"]) == (["more"], 1, [])
+    done = tool(*flash, "--back")
+    assert done.status == 0 and done.out.startswith("back to the program with CRC "), done.err
+    assert values() == {"Main.fixed": 70, "Main.text": "before"}  # which is shorter again
+    assert tool("read", "--tcp", plcrt.tcp, "more").status == 2
+    assert (project / "main.st").read_text() == newer.replace("STRING[20]", "STRING[60]")
+    assert tool("status", "--tcp", plcrt.tcp).out.splitlines()[0] == first.splitlines()[0]
+    tool.ok("write", "--tcp", plcrt.tcp, "Main.fixed=71")
+    tool.ok(*flash, "--back")  # the newer one again
+    assert tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed", "more")["values"] == {"Main.fixed": 71, "more": 5}
+    for path in (project / "cache").rglob("*.src"):
+        path.unlink()
+    done = tool(*flash, "--back")
+    assert (done.status, "does not have the sources of the previous program" in done.err) == (2, True)
+
+
 def test_impossible_edit_is_refused_before_anything_is_sent(project: Path, plcrt: Plcrt, tool: Tool) -> None:
     (project / "main.st").write_text(program(BODY).replace("T#5ms", "T#6ms"))
     done = tool("flash", "--online-change", "--tcp", plcrt.tcp)

@@ -18,6 +18,7 @@ from plctool.cli.builds import build, compiled, project_of
 from plctool.cli.connections import Progress
 from plctool.cli.documents import Document
 from plctool.cli.online_changes import change_document, change_text
+from plctool.cli.previous_program import keep, keep_sources, settings_for_previous
 from plctool.errors import PlcError, UsageError
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ _POLL = 0.1  # how often the files of a project are looked at [s]
 def change(plc: Controller, args: argparse.Namespace, trees: Trees | None = None) -> Document:
     """Replaces the program that runs by the image or the project that the arguments name. With --dry-run it only says
     what that would do. `trees`: keeps the syntax trees of the project for the next change."""
+    if args.back:
+        return _change_back(plc, args)
     settings = project_of(args)
     if settings is None:
         if args.dry_run:
@@ -73,7 +76,23 @@ def _change_project(plc: Controller, settings: Settings, args: argparse.Namespac
     document, warnings = build(settings, trees)
     output.print_warnings(args, warnings)
     plan: Document = document["change"]
-    return plan | _sent(plc, settings.output, not args.json)
+    sent = _sent(plc, settings.output, not args.json)
+    keep_sources(settings, settings.output)
+    return plan | sent
+
+
+def _change_back(plc: Controller, args: argparse.Namespace) -> Document:
+    """Replaces the program that runs by the previous one."""
+    if args.image is not None:
+        raise UsageError("--back is for the program that the device had before; name no other one.", "usage")
+    with settings_for_previous(plc.symbols()) as (settings, archive):
+        if args.dry_run:
+            return change_document(compiled(settings)) | {"back": f"{archive.crc:08X}"}
+        document, _ = build(settings)
+        plan: Document = document["change"]
+        sent = _sent(plc, settings.output, not args.json)
+        keep(replace(archive, crc=int(document["crc"], 16)))
+    return plan | sent | {"back": f"{archive.crc:08X}"}
 
 
 def _sent(plc: Controller, image: Path, shown: bool) -> Document:
@@ -92,7 +111,8 @@ def live_change_text(document: dict[str, Any]) -> str:
     """What an online change did, or would do."""
     if "unchanged" in document:
         return f"the device runs this program already (CRC {document['unchanged']})"
-    lines = [change_text(document)] if "kept" in document else []
+    lines = [f"back to the program with CRC {document['back']}"] if "back" in document else []
+    lines += [change_text(document)] if "kept" in document else []
     lines += [f"no longer forced, since it is removed: {name}" for name in document.get("released", ())]
     lines += [
         f"trace {name or '(a tool)'} has ended, since a variable of it is removed or moves"

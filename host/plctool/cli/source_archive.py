@@ -8,6 +8,7 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -100,9 +101,7 @@ def archive_of(settings: Settings, crc: int, target: str, base: SymbolTable | No
     """The sources of an image with that CRC, made for a target. They are compiled again from the archive: raises
     UsageError unless that gives the same image. `base`: the symbols of the image that this one has replaced in an
     online change, which say where its variables are."""
-    settings = replace(settings, target=settings.target or target)
-    root = Path(os.path.commonpath(list(_folders(settings))))
-    archive = Archive(crc, _words(settings, root), {_below(root, path): path.read_bytes() for path in _files(settings)})
+    archive = collected(settings, crc, target)
     if base is not None:
         archive.files[_BASE] = base.to_json().encode()
         archive.build.extend(["--base", _BASE])
@@ -116,6 +115,33 @@ def archive_of(settings: Settings, crc: int, target: str, base: SymbolTable | No
             "other-source",
         )
     return archive
+
+
+def collected(settings: Settings, crc: int, target: str) -> Archive:
+    """The sources as they are now, not compiled."""
+    settings = replace(settings, target=settings.target or target)
+    root = Path(os.path.commonpath(list(_folders(settings))))
+    return Archive(crc, _words(settings, root), {_below(root, path): path.read_bytes() for path in _files(settings)})
+
+
+@contextmanager
+def unpacked_settings(archive: Archive, folder: Path) -> Iterator[Settings]:
+    """The settings that build the program of an archive, unpacked into a folder, which is the current one meanwhile."""
+    from plctool.cli.arguments import add_build_arguments
+    from plctool.cli.online_changes import with_base
+    from plctool.cli.parser import Parser
+    from plctool.cli.projects import settings_of
+
+    archive.unpack(folder)
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        parser = Parser(prog="plctool build")
+        add_build_arguments(parser)
+        args = parser.parse_args([*archive.build, "--no-limits", "-o", "app.cdl"])
+        yield with_base(settings_of(args), args)
+    finally:
+        os.chdir(before)
 
 
 def _files(settings: Settings) -> Iterator[Path]:
@@ -167,19 +193,7 @@ def _words(settings: Settings, root: Path) -> list[str]:
 
 
 def _built_crc(archive: Archive, folder: Path) -> int:
-    from plctool.cli.arguments import add_build_arguments
     from plctool.cli.builds import compiled
-    from plctool.cli.online_changes import with_base
-    from plctool.cli.parser import Parser
-    from plctool.cli.projects import settings_of
 
-    archive.unpack(folder)
-    before = Path.cwd()
-    os.chdir(folder)
-    try:
-        parser = Parser(prog="plctool build")
-        add_build_arguments(parser)
-        args = parser.parse_args([*archive.build, "--no-limits", "-o", "app.cdl"])
-        return compiled(with_base(settings_of(args), args)).crc
-    finally:
-        os.chdir(before)
+    with unpacked_settings(archive, folder) as settings:
+        return compiled(settings).crc

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from plctool.cli import output
 from plctool.cli.arguments import add_image, add_link
-from plctool.cli.builds import image_of
+from plctool.cli.builds import fresh_image, project_of
 from plctool.cli.connections import Progress, connect, connect_to, on_device, password_source
 from plctool.cli.documents import Document
 from plctool.cli.links import link_of
 from plctool.cli.output import EXIT_OK, EXIT_USAGE
 from plctool.cli.parser import Parser
+from plctool.cli.previous_program import keep_sources
 from plctool.errors import EXIT_INTERRUPTED, PlcError, UsageError
 from plctool.files import usable_path
 from plctool.link.transports import Link
@@ -45,6 +46,10 @@ def flash_arguments(command: Parser) -> None:
     command.add_argument(
         "--watch", action="store_true", help="with --online-change: again whenever a file of the project is saved"
     )
+    command.add_argument(
+        "--back", action="store_true",
+        help="with --online-change: the program before the last change, with the values of today",
+    )  # fmt: skip
     add_link(command)
     command.set_defaults(action=_flash)
 
@@ -53,9 +58,11 @@ def _flash(args: argparse.Namespace) -> int:
     link = link_of(args)
     if args.online_change:
         return _change(args, link)
-    if args.dry_run or args.watch:
-        raise UsageError("--dry-run and --watch are for --online-change.", "usage")
-    args.image = image_of(args)
+    if args.dry_run or args.watch or args.back:
+        raise UsageError("--dry-run, --watch and --back are for --online-change.", "usage")
+    settings = project_of(args)
+    args.image = fresh_image(args, settings)
+    keep_sources(settings, args.image)
     if len(link.nodes or ()) > 1:
         if args.with_source is not None:
             raise UsageError("--with-source is for one device; name one with --node.", "usage")
@@ -92,6 +99,8 @@ def _change(args: argparse.Namespace, link: Link) -> int:
         raise UsageError("--online-change is for one device; name one with --node.", "usage")
     if args.no_start or args.force or args.with_source is not None:
         raise UsageError("--online-change goes without --no-start, --force and --with-source.", "usage")
+    if args.back and args.watch:
+        raise UsageError("--back goes without --watch.", "usage")
     with connect(args) as plc:
         if not args.watch:
             document = change(plc, args)
