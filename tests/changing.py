@@ -108,6 +108,22 @@ class Changing:
         plc.write({"Main.fixed": 8})
         self.wait(plc, lambda: plc.read("Main.seen") == 3)
 
+    def test_tasks_may_be_new_changed_and_removed(self, plc: Controller, tmp_path: Path) -> None:
+        plc.write({"Main.fixed": 70})
+        second = "PROGRAM Second VAR k : DINT; END_VAR k := k + 1; END_PROGRAM\n"
+        task = "TASK New(INTERVAL := T#10ms, PRIORITY := 3); PROGRAM Second WITH New : Second;\n"
+        text = program(before=BLOCKS + second).replace("T#5ms", "T#8ms").replace("END_RESOURCE", task + "END_RESOURCE")
+        for _ in range(2):
+            self.change(plc, tmp_path, text)
+            assert [(task.name, task.interval_us) for task in plc.tasks()] == [("T", 8000), ("New", 10000)]
+            n = plc.read("Main.n")
+            self.wait(plc, lambda n=n: plc.read("Second.k") > 5 and plc.read("Main.n") > n)  # type: ignore[misc]
+            self.change(plc, tmp_path, program())
+            assert [(task.name, task.interval_us) for task in plc.tasks()] == [("T", 5000)]
+            n = plc.read("Main.n")
+            self.wait(plc, lambda n=n: plc.read("Main.n") > n + 5)  # type: ignore[misc]
+            assert plc.read("Main.fixed") == 70 and str(plc.status().state) == "run"
+
     def test_change_of_another_program_is_refused(self, plc: Controller, tmp_path: Path) -> None:
         result = self.built(plc, tmp_path, program(BODY + " n := n + 1;"))
         other = built(tmp_path, program(BODY + " n := n + 2;"), None, self.target)

@@ -34,8 +34,13 @@ RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
 
 #ifndef RTS_CFFI
 #if ONLINE_CHANGE
-/* As IecCycleExchange; traps of a debugger are taken out before, and put in again as those of the image that is there then. */
-RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange);
+/* As IecCycleExchange; traps of a debugger are taken out before, and put in again as those of the image that is there then.
+ * Tasks that are not in `kept`, a bit each, are stopped before it; then those that `begin` has set (IecTaskSetCode) begin.
+ * ERR_NOMEMORY: it was done, but there is no timer for each of them. */
+RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange, RTS_UI32 kept);
+
+/* IecCycleSetCode, and what makes the tasks run. The records stay valid until the next call. */
+void IecTaskSetCode(const CDL_TASK *records, RTS_UI32 count, RTS_UI32 kept, const IEC_CONTEXT *prototype);
 #endif
 
 /* With BP_MAX: called before tasks are started, and when they are to be stopped, before their cycles are waited for. */

@@ -20,6 +20,7 @@
 #include "CmpStd.h"
 #include "CompactDownload.h"
 #include "SchedEvents.h"
+#include "rts_config.h"
 
 /* Creates what the tasks need, stopped; deletes that of the previous tasks. `areas` are the base addresses by APP_AREA_*.
  * Called by CmpIecTask from main. ERR_NOMEMORY when the port has no timer left. */
@@ -29,6 +30,14 @@ RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *cons
  * SCHED_STOP_US is aborted, with RTSEXCPT_STOP_TIMEOUT. */
 RTS_RESULT SchedStart(void);
 void SchedStop(void);
+
+#if ONLINE_CHANGE
+/* For the tasks that an online change replaces, all but those in `kept`, a bit each. Stop: they begin no cycle any more, and
+ * none is in it when it returns. Start: they go on. Change: `tasks` are what runs in place of all. From main. */
+void SchedStopOthers(RTS_UI32 kept);
+void SchedStartOthers(RTS_UI32 kept);
+RTS_RESULT SchedChangeOthers(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI32 kept);
+#endif
 
 /* The runtime is about to end: application code that still runs SCHED_STOP_US later, tasks and initialisation, is aborted
  * like that. For good; from any context, signal handlers too. */

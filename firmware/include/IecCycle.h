@@ -104,19 +104,20 @@ void IecTaskGetTimes(RTS_UI32 task, RTS_UI32 *cycle_ns, RTS_UI32 *late_ns);
 #if ONLINE_CHANGE
 /* ---- for CmpIecTask ---- */
 
-/* What an online change does. `begin` runs in a moment in which no task is in its cycle; then `init`, if there is one, before
- * any begins: false when it failed, and has undone `begin`. */
+/* What an online change does. `begin` runs in a moment in which no task is in its cycle: false when it has changed nothing.
+ * Then `init`, if there is one, before any begins: false when it failed, and has undone `begin`. */
 typedef struct {
-    void (*begin)(void *arg);
+    bool (*begin)(void *arg);
     bool (*init)(void *arg);
     void *arg;
 } CYCLE_EXCHANGE;
 
-/* ERR_OK, ERR_FAILED: init did, ERR_TIMEOUT: a cycle takes too long, and nothing was done. From main. */
+/* ERR_OK, ERR_FAILED: begin or init did, ERR_TIMEOUT: a cycle takes too long, and nothing was done. From main. */
 RTS_RESULT IecCycleExchange(const CYCLE_EXCHANGE *exchange);
 
-/* Other code for the same tasks, within `begin`. `prototype`: where it is, and its imports. */
-void IecCycleSetCode(const IEC_CONTEXT *prototype);
+/* Other code and other tasks, within `begin` and `init`. `kept`: a bit for each task that has the same record as before but
+ * for its entry; the others begin as after IecCycleCreate. `prototype`: where the code is, and its imports. */
+void IecCycleSetCode(const CDL_TASK *records, RTS_UI32 count, RTS_UI32 kept, const IEC_CONTEXT *prototype);
 #endif
 
 #if BP_MAX > 0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -96,6 +96,11 @@ def _is_at(table: SymbolTable, name: str, place: object) -> bool:
     with suppress(UsageError):
         return table.resolve(name).place == place
     return False
+
+
+def _other_tasks(had: SymbolTable, has: SymbolTable) -> set[int]:
+    """The numbers of tasks that the new program does not have, or by which it has another one."""
+    return {number for number, name in enumerate(had.tasks) if has.tasks[number : number + 1] != [name]}
 
 
 def _removed_variables(had: SymbolTable, has: SymbolTable) -> list[Symbol]:
@@ -292,8 +297,8 @@ class Controller(ABC):
             self.end_debugging()  # its breakpoints are in the old code
             tables = self._both_tables(status.image_crc, image_crc(data))
             forced = {} if tables is None else self._release(*tables)
-            removed = [] if tables is None else _removed_variables(*tables)
-            ended = self._end_traces_of(removed)
+            removed = ([], set[int]()) if tables is None else (_removed_variables(*tables), _other_tasks(*tables))
+            ended = self._end_traces_of(*removed)
             begin = self._now()
             try:
                 self._change(data, lambda done: progress(done, len(data)))
@@ -306,7 +311,7 @@ class Controller(ABC):
                 raise went_down()
             released = self._force_again(forced)
             if tables is not None:
-                self._renew_traces(status.image_crc, now.image_crc, removed)
+                self._renew_traces(status.image_crc, now.image_crc, *removed)
         return ChangeResult(len(data), seconds, now.state, released, ended)
 
     def _with_names(self, error: DeviceError, crc: int) -> DeviceError:
@@ -369,17 +374,18 @@ class Controller(ABC):
                 failed.append(name)
         return failed
 
-    def _end_traces_of(self, removed: Sequence[Symbol]) -> list[str]:
+    def _end_traces_of(self, removed: Sequence[Symbol], tasks: Collection[int]) -> list[str]:
         ended = []
         with suppress(DeviceError):
             for packet, config in list(self._packets()):
-                if config.is_about(removed):
+                if config.is_about(removed, tasks):
                     self.delete_trace(packet)
                     ended.append(config.name)
         return ended
 
-    def _renew_traces(self, before: int, after: int, removed: Sequence[Symbol]) -> None:
-        """Makes the persistent traces of the program `before` those of `after`, but for those of removed variables."""
+    def _renew_traces(self, before: int, after: int, removed: Sequence[Symbol], tasks: Collection[int]) -> None:
+        """Makes the persistent traces of the program `before` those of `after`, but for those of removed variables and
+        of tasks that are other ones."""
         return  # a controller that keeps files has some
 
     @abstractmethod

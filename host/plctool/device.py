@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
@@ -394,11 +394,11 @@ class Plc(Controller):
 
     # ---- traces ----
 
-    def _renew_traces(self, before: int, after: int, removed: Sequence[Symbol]) -> None:
+    def _renew_traces(self, before: int, after: int, removed: Sequence[Symbol], tasks: Collection[int]) -> None:
         with suppress(DeviceError):
             for name in [file.name for file in self.files().files if file.name.startswith(TRACE_FILE)]:
                 config = decode_config(self.read_file(name))
-                if config.image_crc == before and not config.is_about(removed):
+                if config.image_crc == before and not config.is_about(removed, tasks):
                     self.write_file(name, config.for_image(after))
 
     def create_trace(self, config: bytes) -> int:

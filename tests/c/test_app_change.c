@@ -10,6 +10,7 @@
 #include "AppException.h"
 #include "AppState.h"
 #include "CmpEventMgr.h"
+#include "IecCycle.h"
 #include "app_image.h"
 #include "test.h"
 
@@ -224,6 +225,12 @@ static RTS_RESULT try_spec(const APP_SPEC *spec)
     return change_to(&image);
 }
 
+static void fail_after_the_look(EVENT_PARAM *event)
+{
+    RTS_UNUSED(event);
+    IecCycleStop(); /* as a task does that fails, before it tells main */
+}
+
 static void what_does_not_fit_what_runs_is_refused(void)
 {
     APP_SPEC good;
@@ -236,13 +243,47 @@ static void what_does_not_fit_what_runs_is_refused(void)
     spec.change.base++;
     CHECK_EQUAL(try_spec(&spec), ERR_ID_MISMATCH);
     spec = good;
-    spec.tasks[0].interval_us++;
-    CHECK_EQUAL(try_spec(&spec), ERR_NOT_SUPPORTED);
-    spec = good;
-    add_task(&spec, "Other", KIND_CYCLIC, 10000, 0);
-    CHECK_EQUAL(try_spec(&spec), ERR_NOT_SUPPORTED);
+    add_task(&spec, "Other", KIND_EXTERNAL, 0, 0)->event_offset = 0x1234;
+    CHECK_EQUAL(try_spec(&spec), ERR_NO_OBJECT);
     CHECK_EQUAL(app_state(), AS_RUN);
     CHECK_EQUAL(check_whole(), 1);
+}
+
+/* A program that fails after the last look of main is not changed, and the failure is its own. */
+static void failure_just_before_the_exchange_is_that_of_the_previous_program(void)
+{
+    APP_STATUS status;
+
+    prepare(8, 0xFF, 512);
+    start_again();
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpAppEmbedded, EVT_PrepareOnlineChange, fail_after_the_look, NULL),
+                ERR_OK);
+    CHECK_EQUAL(change_to(&images[2]), ERR_INVALID_STATE);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, NEW_OFFSET), 0);
+    AppHandleException(0, RTSEXCPT_DIVIDEBYZERO, 0);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    AppGetStatus(&status);
+    CHECK_EQUAL(status.state, AS_STOP);
+    CHECK_EQUAL(status.image_crc, image_crc(&images[1]));
+}
+
+static void tasks_may_change_and_their_number_too(void)
+{
+    RTS_UI32 counter;
+    APP_BYTES changed;
+    APP_SPEC spec;
+
+    prepare(8, 0xFF, 512);
+    start_again();
+    spec_change(&spec, 2, &images[1]);
+    spec.tasks[0].interval_us = 2 * spec.tasks[0].interval_us;
+    add_task(&spec, "Other", KIND_CYCLIC, spec.tasks[0].interval_us / 4, spec.tasks[0].entry_offset);
+    build_image(&changed, &spec);
+    counter = read_u32(APP_AREA_DATA, COUNTER_OFFSET);
+    CHECK_EQUAL(change_to(&changed), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(200)), ERR_OK);
+    counter = read_u32(APP_AREA_DATA, COUNTER_OFFSET) - counter;
+    CHECK(counter >= 2 * (10 + 40) - 4 && counter <= 2 * (10 + 40) + 4);
 }
 
 static void each_number_of_the_list_is_checked(void)
@@ -350,6 +391,8 @@ int main(void)
     RUN(every_cut_leaves_the_old_or_the_new_application);
     RUN(a_fault_at_any_operation_leaves_one_of_both_running);
     RUN(what_does_not_fit_what_runs_is_refused);
+    RUN(failure_just_before_the_exchange_is_that_of_the_previous_program);
+    RUN(tasks_may_change_and_their_number_too);
     RUN(each_number_of_the_list_is_checked);
     RUN(without_a_program_that_runs_there_is_no_change);
     RUN(a_program_that_fails_when_it_is_asked_stays_and_is_not_changed);

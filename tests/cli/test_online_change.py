@@ -40,12 +40,20 @@ def test_image_of_a_change_names_the_image_that_it_replaces(tool: Any, scratch: 
 
 
 def test_impossible_change_is_refused_in_words(tool: Any, scratch: Path) -> None:
+    build = ("build", "main.st", "--target", "cortex-m3", "--base", "old.cdl")
+    done = tool(*build, "-o", "new.cdl")
+    assert done.status == 2
+    why = "the program that runs was built for another target than cortex-m3"
+    assert f"No online change: {why}. Undo that, or download the program" in done.err
+    assert not (scratch / "new.cdl").exists()
+    assert tool(*build, "--dry-run", "--json").json["problems"] == [why]
+
+
+def test_plan_says_which_tasks_change(tool: Any, scratch: Path) -> None:
     (scratch / "main.st").write_text(PROGRAM + TASK)
     done = tool("build", "main.st", "-o", "new.cdl", "--base", "old.cdl")
-    assert done.status == 2
-    assert "No online change: task T is new; task Main is removed. Undo that, or download the program" in done.err
-    assert not (scratch / "new.cdl").exists()
-    assert tool("build", "main.st", "--base", "old.cdl", "--dry-run", "--json").json["problems"]
+    assert done.status == 0
+    assert done.out.splitlines()[-2:] == ["  task: T is new", "  task: Main is removed"]
 
 
 def test_plan_says_what_moves_and_what_begins_anew(tool: Any, scratch: Path) -> None:

@@ -134,10 +134,11 @@ def test_back_is_the_program_before_with_the_values_of_now(project: Path, plcrt:
 
 
 def test_impossible_edit_is_refused_before_anything_is_sent(project: Path, plcrt: Plcrt, tool: Tool) -> None:
-    (project / "main.st").write_text(program(BODY).replace("T#5ms", "T#6ms"))
+    made = "VAR own : DINT := 40; made : Made(by := 3);"
+    (project / "main.st").write_text(program(BODY).replace("VAR own : DINT := 40;", made))
     done = tool("flash", "--online-change", "--tcp", plcrt.tcp)
     assert done.status == 2
-    assert "task T has another interval: 5000, now 6000" in done.err
+    assert "Main.d: what is new in Derived has a calculated initial value or FB_Init" in done.err
     assert tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed")["values"] == {"Main.fixed": 7}
 
 

@@ -103,3 +103,60 @@ def test_ten_changes_in_a_row_lose_no_cycle(tmp_path: Path) -> None:
         plc.run_for(20)
         assert plc.read("Main.n") == plc.tasks()[0].cycles == 11 * 4
         assert plc.tasks()[0].overruns == 0
+
+
+TASKS = """PROGRAM Main VAR n : DINT; go : BOOL; END_VAR n := n + 1; END_PROGRAM
+PROGRAM Other VAR n : DINT; END_VAR n := n + 1; END_PROGRAM
+PROGRAM Waits VAR n : DINT; END_VAR n := n + 1; END_PROGRAM
+CONFIGURATION C RESOURCE R ON PLC
+{tasks}
+END_RESOURCE END_CONFIGURATION
+"""
+FAST = "TASK Fast(INTERVAL := T#10ms, PRIORITY := 1); PROGRAM Main WITH Fast : Main;"
+SLOW = "TASK Slow(INTERVAL := T#20ms, PRIORITY := 5); PROGRAM Other WITH Slow : Other;"
+EVENT = "TASK Event(SINGLE := Main.go, PRIORITY := 2); PROGRAM Waits WITH Event : Waits;"
+
+
+def test_tasks_come_go_and_change_while_the_others_go_on(tmp_path: Path) -> None:
+    result = built(tmp_path, TASKS.format(tasks=FAST + SLOW))
+    with Simulator(result.image, result.symbols) as plc:
+
+        def change(tasks: str) -> list[str]:
+            result = built(tmp_path, TASKS.format(tasks=tasks), plc.symbols())
+            assert result.change is not None and result.change.problems == []
+            plc.add_symbols(result.symbols)
+            plc.change(result.image)
+            return result.change.tasks
+
+        plc.run_for(100)
+        cycles = plc.tasks()[0].cycles
+        assert change(FAST + SLOW.replace("20ms", "50ms") + EVENT) == [
+            "Slow: interval 20000, now 50000",
+            "Event is new",
+        ]
+        other = plc.read("Other.n")
+        plc.run_for(200)
+        fast, slow, event = plc.tasks()
+        assert (fast.cycles, fast.overruns) == (cycles + 20, 0)
+        assert (slow.cycles, slow.interval_us, event.cycles) == (4, 50000, 0)
+        assert plc.read("Other.n") == other + 4
+        plc.write({"Main.go": True})
+        plc.run_for(30)
+        assert plc.read("Waits.n") == 1
+        plc.write({"Main.go": False})
+        plc.run_for(30)
+        plc.write({"Main.go": True})
+        changed = change(FAST + EVENT)  # an event that waits is lost with the task at that place
+        assert changed == ["Event begins again, since its place among the tasks changes", "Slow is removed"]
+        n = plc.read("Main.n")
+        plc.run_for(100)
+        assert [task.name for task in plc.tasks()] == ["Fast", "Event"]
+        assert plc.read("Main.n") == n + 10
+        assert change(SLOW.replace("PRIORITY := 5", "PRIORITY := 0"))[-2:] == ["Fast is removed", "Event is removed"]
+        plc.run_for(100)
+        assert [(task.name, task.priority, task.cycles) for task in plc.tasks()] == [("Slow", 0, 5)]
+        assert plc.read("Other.n") == 5
+        change(FAST + SLOW + EVENT)
+        plc.run_for(100)
+        assert (plc.read("Main.n"), plc.read("Other.n")) == (10, 10)
+        assert not any(task.overruns for task in plc.tasks())

@@ -11,6 +11,7 @@
 
 #include "../cycle/AppAreas.h"
 #include "../load/AppFunctions.h"
+#include "../load/AppTasks.h"
 #include "AppAddress.h"
 #include "AppCommit.h"
 #include "AppEvents.h"
@@ -40,6 +41,7 @@ typedef struct {
     AREA_ADDRESS dangling; /* the first pointer to something that is gone */
     AREA_ADDRESS gone;     /* that */
     bool dangles;
+    bool fails;         /* the program that ran, before the exchange */
     RTS_UI32 exception; /* of what initialises */
     RTS_UI32 pause_ns;  /* how long no task could begin a cycle */
 } CHANGE;
@@ -332,27 +334,15 @@ static RTS_RESULT check_state(const APP_IMAGE *image, APP_REFUSAL *refusal)
     return ERR_OK;
 }
 
-/* True if both records say the same but for where the code is. */
-static bool is_same_task(const CDL_TASK *a, const CDL_TASK *b)
-{
-    CDL_TASK moved = *a;
-
-    moved.entry_offset = b->entry_offset;
-    return memcmp(&moved, b, sizeof moved) == 0;
-}
-
+/* An event that nothing posts. That of a driver is known, since its connectors stay the same. */
 static RTS_RESULT check_tasks(const CHANGE *change, APP_REFUSAL *refusal)
 {
-    const CDL_TASK *old = AppGetTables()->tasks;
+    RTS_RESULT result = ERR_OK;
     RTS_UI32 i;
 
-    if (change->image->task_count != change->old.task_count)
-        return APP_REFUSE(refusal, ERR_NOT_SUPPORTED, "The change has other tasks; download it.");
-    for (i = 0; i < change->old.task_count; i++) {
-        if (!is_same_task(&change->tables.tasks[i], &old[i]))
-            return APP_REFUSE(refusal, ERR_NOT_SUPPORTED, "Task %s is another one; download the program.", old[i].name);
-    }
-    return ERR_OK;
+    for (i = 0; i < change->image->task_count && result == ERR_OK; i++)
+        result = AppTasksCheckEvent(&change->tables.tasks[i], refusal);
+    return result;
 }
 
 #if IO_MAX_CONNECTORS > 0
@@ -383,38 +373,68 @@ static RTS_RESULT check_all(CHANGE *change, APP_REFUSAL *refusal)
 
 /* ---- the exchange ---- */
 
+/* True if a task has failed and main does not know it yet: that is charged to the program that is loaded now. */
+static bool has_failed(void)
+{
+    return AppGetState() == AS_RUN && !IecCycleMayRun();
+}
+
 /* No task is in its cycle. Pointers lead on where they were, before what they are in is moved. */
-static void begin(void *arg)
+static bool begin(void *arg)
 {
     CHANGE *change = arg;
     RTS_I64 start_ns = SysTimeGetNs();
 
-    for_steps(change, check_step);
-    if (change->dangles)
-        return;
+    change->fails = has_failed();
+    if (!change->fails)
+        for_steps(change, check_step);
+    if (change->fails || change->dangles)
+        return false;
     for_steps(change, lead_on);
     for_steps(change, write_step);
     AppExchange(change->image, change->code, &change->tables);
     change->pause_ns = (RTS_UI32)(SysTimeGetNs() - start_ns);
+    return true;
 }
 
-static void go_back(void *arg)
+static bool go_back(void *arg)
 {
     CHANGE *change = arg;
 
     for_steps(change, copy_back);
     for_steps(change, follow_back);
     AppExchange(&change->old, change->old_code, &change->tables);
+    return true;
+}
+
+static bool go_back_in_moment(void *arg)
+{
+    return !has_failed() && go_back(arg);
+}
+
+/* The previous program goes on, with its tasks. */
+static void take_back(CHANGE *change)
+{
+    const CYCLE_EXCHANGE moment = {go_back_in_moment, NULL, change};
+    RTS_RESULT result = AppLoaderRead(&change->old, &change->tables);
+    RTS_UI32 kept = AppFindKeptTasks(&change->old, &change->tables);
+
+    if (result != ERR_OK)
+        return;
+    while ((result = IecTaskExchange(&moment, kept)) == ERR_TIMEOUT || result == ERR_FAILED)
+        AppHandlePendingException();
+    if (result != ERR_OK)
+        (void)AppStopTasks();
 }
 
 /* Calculated initial values, and FB_Init, of new variables. */
 static bool initialise(void *arg)
 {
     CHANGE *change = arg;
-    bool done = !change->dangles && AppRunInit(change->image->change.init, &change->exception);
+    bool done = AppRunInit(change->image->change.init, &change->exception);
 
-    if (!done && !change->dangles && AppLoaderRead(&change->old, &change->tables) == ERR_OK)
-        go_back(change);
+    if (!done && AppLoaderRead(&change->old, &change->tables) == ERR_OK)
+        (void)go_back(change);
     return done;
 }
 
@@ -422,10 +442,16 @@ static RTS_RESULT exchange(CHANGE *change, APP_REFUSAL *refusal)
 {
     bool has_init = change->image->change.init != CDL_CHANGE_NO_INIT;
     const CYCLE_EXCHANGE moment = {begin, has_init ? initialise : NULL, change};
-    RTS_RESULT result = IecTaskExchange(&moment);
+    RTS_RESULT result = IecTaskExchange(&moment, AppFindKeptTasks(change->image, &change->tables));
 
+    if (result == ERR_NOMEMORY) {
+        take_back(change);
+        return APP_REFUSE(refusal, result, "There are not enough timers for the tasks.");
+    }
     if (result == ERR_TIMEOUT)
         return APP_REFUSE(refusal, result, "A task takes too long for its cycle; try again.");
+    if (change->fails)
+        return APP_REFUSE(refusal, ERR_INVALID_STATE, "The program has failed; see its log, and download it.");
     if (change->dangles)
         return APP_REFUSE(refusal, ERR_INVALID_REFERENCE,
                           "A pointer (area %u, %u) leads to what is removed (area %u, %u).", U(change->dangling.area),
@@ -439,7 +465,6 @@ static RTS_RESULT exchange(CHANGE *change, APP_REFUSAL *refusal)
 /* The record of the retain variables is there before the image is what boots. */
 static RTS_RESULT commit(CHANGE *change, RTS_UI32 retain_after, APP_REFUSAL *refusal)
 {
-    const CYCLE_EXCHANGE moment = {go_back, NULL, change};
     RTS_RESULT result;
 
     RetainKeepNone(); /* of the application that was in this slot */
@@ -449,10 +474,7 @@ static RTS_RESULT commit(CHANGE *change, RTS_UI32 retain_after, APP_REFUSAL *ref
         result = AppCommitInstall(change->image->file, change->image->crc, retain_after);
     if (result == ERR_OK)
         return ERR_OK;
-    if (AppLoaderRead(&change->old, &change->tables) == ERR_OK) {
-        while (IecTaskExchange(&moment) == ERR_TIMEOUT)
-            AppHandlePendingException();
-    }
+    take_back(change);
     return APP_REFUSE(refusal, result, "The flash cannot be written.");
 }
 

@@ -221,14 +221,36 @@ const APP_TABLES *AppGetTables(void)
     return &app.tables;
 }
 
+static bool is_same_task(const CDL_TASK *a, const CDL_TASK *b)
+{
+    CDL_TASK moved = *a;
+
+    moved.entry_offset = b->entry_offset;
+    return memcmp(&moved, b, sizeof moved) == 0;
+}
+
+RTS_UI32 AppFindKeptTasks(const APP_IMAGE *image, const APP_TABLES *tables)
+{
+    RTS_UI32 kept = 0;
+    RTS_UI32 i;
+
+    for (i = 0; i < image->task_count && i < app.image.task_count; i++) {
+        if (is_same_task(&tables->tasks[i], &app.tables.tasks[i]))
+            kept |= 1u << i;
+    }
+    return kept;
+}
+
 void AppExchange(const APP_IMAGE *image, const RTS_UI8 *code, const APP_TABLES *tables)
 {
+    RTS_UI32 kept = AppFindKeptTasks(image, tables);
+
     app.image = *image;
     app.tables = *tables;
     app.code = code;
     app.context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)code;
     SysExceptCodeRange(code, image->code.size);
-    IecCycleSetCode(&app.context);
+    IecTaskSetCode(app.tables.tasks, app.image.task_count, kept, &app.context);
     RetainExchange(&app.image.kept, image->crc);
     follow_io();
 }

@@ -50,8 +50,11 @@ RTS_RESULT AppReinitialise(bool cold);
 /* The records of the tasks of the loaded application, and its imports. */
 const APP_TABLES *AppGetTables(void);
 
-/* A checked image with its code mapped at `code` takes the place of the loaded one, with the same tasks and areas. No task is
- * in its cycle. */
+/* The tasks that the loaded application has at the same index, alike but for where their code is: a bit each. */
+RTS_UI32 AppFindKeptTasks(const APP_IMAGE *image, const APP_TABLES *tables);
+
+/* A checked image with its code mapped at `code` takes the place of the loaded one, with the same areas. No task is in its
+ * cycle. */
 void AppExchange(const APP_IMAGE *image, const RTS_UI8 *code, const APP_TABLES *tables);
 
 /* Runs the code at an offset with the context of the application, like an initialisation; false when it failed, with the

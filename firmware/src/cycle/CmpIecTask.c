@@ -68,25 +68,40 @@ RTS_NOINLINE void IecTaskStopAll(void)
 }
 
 #if ONLINE_CHANGE
-#if BP_MAX > 0
-RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange)
+void IecTaskSetCode(const CDL_TASK *records, RTS_UI32 count, RTS_UI32 kept, const IEC_CONTEXT *prototype)
 {
+    IecCycleSetCode(records, count, kept, prototype);
+    TriggerChange(records, count, kept);
+}
+
+static RTS_RESULT exchange_tasks(const CYCLE_EXCHANGE *exchange, RTS_UI32 kept)
+{
+    RTS_RESULT result;
+
+    SchedStopOthers(kept);
+    result = IecCycleExchange(exchange);
+    if (result == ERR_OK)
+        return SchedChangeOthers(TriggerGetTask(0), IecTaskGetCount(), kept);
+    SchedStartOthers(kept);
+    return result;
+}
+
+RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange, RTS_UI32 kept)
+{
+#if BP_MAX > 0
     bool watched = watcher != NULL && IecCycleMayRun();
     RTS_RESULT result;
 
     if (watched)
         watcher->stop();
-    result = IecCycleExchange(exchange);
+    result = exchange_tasks(exchange, kept);
     if (watched)
         watcher->will_start();
     return result;
-}
 #else
-RTS_RESULT IecTaskExchange(const CYCLE_EXCHANGE *exchange)
-{
-    return IecCycleExchange(exchange);
-}
+    return exchange_tasks(exchange, kept);
 #endif
+}
 #endif
 
 static void run_each_once(RTS_UI32 priority, bool by_event)

@@ -111,6 +111,36 @@ void SchedStop(void)
     schedule.started = false;
 }
 
+#if ONLINE_CHANGE
+/* Main runs the tasks, so none is in its cycle. */
+void SchedStopOthers(RTS_UI32 kept)
+{
+    RTS_UNUSED(kept);
+}
+
+void SchedStartOthers(RTS_UI32 kept)
+{
+    RTS_UNUSED(kept);
+}
+
+RTS_RESULT SchedChangeOthers(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI32 kept)
+{
+    SCHEDULED before[APP_MAX_TASKS];
+    RTS_UI32 i;
+
+    memcpy(before, schedule.task, sizeof before);
+    schedule.count = 0;
+    for (i = 0; i < count; i++) {
+        add_task(tasks);
+        if ((kept >> i & 1) != 0)
+            schedule.task[i] = before[i];
+        else
+            schedule.task[i].due_ns = SysTimeGetNs();
+    }
+    return ERR_OK;
+}
+#endif
+
 /* Main runs the tasks, so none runs when it ends. */
 void SchedRequestEnd(void)
 {

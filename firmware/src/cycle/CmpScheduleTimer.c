@@ -171,6 +171,80 @@ RTS_RESULT SchedStart(void)
     return result;
 }
 
+/* ---- an online change ---- */
+
+#if ONLINE_CHANGE
+static bool is_other(RTS_UI32 task, RTS_UI32 kept)
+{
+    return (kept >> task & 1) == 0;
+}
+
+/* An event of a task to come has no timer yet. */
+void SchedStopOthers(RTS_UI32 kept)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < APP_MAX_TASKS; i++) {
+        if (i >= schedule.count)
+            schedule.timer[i] = RTS_INVALID_HANDLE;
+        else if (is_other(i, kept))
+            (void)SysTimerStop(schedule.timer[i]);
+    }
+}
+
+void SchedStartOthers(RTS_UI32 kept)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < schedule.count && schedule.started; i++) {
+        if (is_other(i, kept) && schedule.timer[i] != RTS_INVALID_HANDLE)
+            (void)SysTimerStart(schedule.timer[i]);
+    }
+}
+
+static void delete_others(RTS_UI32 kept)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < schedule.count; i++) {
+        if (is_other(i, kept))
+            (void)SysTimerDelete(schedule.timer[i]);
+    }
+    schedule.count = 0;
+    schedule.background_count = 0;
+}
+
+static RTS_RESULT add_and_start(const CDL_TASK *task)
+{
+    RTS_UI32 index = schedule.count;
+    RTS_RESULT result = add_task(task);
+
+    if (result == ERR_OK && schedule.started && schedule.timer[index] != RTS_INVALID_HANDLE)
+        result = SysTimerStart(schedule.timer[index]);
+    return result;
+}
+
+RTS_RESULT SchedChangeOthers(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI32 kept)
+{
+    RTS_RESULT result = ERR_OK;
+    RTS_UI32 i;
+
+    delete_others(kept);
+    for (i = 0; i < count; i++) {
+        RTS_RESULT added = ERR_OK;
+        if (is_other(i, kept)) {
+            added = add_and_start(&tasks[i]);
+        } else {
+            schedule.count++;
+            schedule.background_count += callback_of(tasks[i].kind) == NULL;
+        }
+        if (added != ERR_OK)
+            result = added;
+    }
+    return result;
+}
+#endif
+
 /* ---- stopping within a time ---- */
 
 /* Not on one core: there no task runs when main stops them. `asked` counts the beginnings and ends of stops, odd: one

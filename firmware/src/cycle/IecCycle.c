@@ -613,14 +613,13 @@ static bool exchange_all(const CYCLE_EXCHANGE *exchange)
 {
     RTS_UI32 lock = TASKS_RUN_BESIDE_MAIN ? 0 : SysLockEnter();
     RTS_UI32 running = tasks.running; /* with the lock: the exception of a task is not undone below */
-    bool done = true;
+    bool done = exchange->begin(exchange->arg);
 
-    exchange->begin(exchange->arg);
     if (!TASKS_RUN_BESIDE_MAIN && exchange->init != NULL)
         SysAtomicStore(&tasks.running, TASKS_STOP);
     if (!TASKS_RUN_BESIDE_MAIN)
         SysLockLeave(lock);
-    if (exchange->init != NULL)
+    if (done && exchange->init != NULL)
         done = exchange->init(exchange->arg);
     if (!TASKS_RUN_BESIDE_MAIN && exchange->init != NULL)
         SysAtomicStore(&tasks.running, running);
@@ -638,23 +637,6 @@ RTS_RESULT IecCycleExchange(const CYCLE_EXCHANGE *exchange)
     if (TASKS_RUN_BESIDE_MAIN)
         release_all();
     return done ? ERR_OK : ERR_FAILED;
-}
-
-void IecCycleSetCode(const IEC_CONTEXT *prototype)
-{
-    RTS_UI32 i;
-    RTS_UI32 area;
-
-    for (i = 0; i < tasks.count; i++) {
-        TASK *task = &tasks.list[i];
-        uintptr_t entry = (uintptr_t)prototype->area[APP_AREA_CODE] + task->record->entry_offset;
-        for (area = 0; area < APP_AREA_COUNT; area++)
-            task->context.area[area] = prototype->area[area];
-        task->context.imports = prototype->imports;
-        task->has_copies = AppImageSetContext(i, &task->context);
-        task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
-    }
-    IecCycleFindPhases();
 }
 
 #endif
@@ -720,6 +702,35 @@ void IecCycleFindPhases(void)
     for (i = 0; i < tasks.count; i++)
         tasks.list[i].has_phases = tasks.list[i].has_copies || CyclePhasesExist();
 }
+
+#if ONLINE_CHANGE
+static void set_code(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *prototype)
+{
+    uintptr_t entry = (uintptr_t)prototype->area[APP_AREA_CODE] + record->entry_offset;
+    RTS_UI32 area;
+
+    for (area = 0; area < APP_AREA_COUNT; area++)
+        task->context.area[area] = prototype->area[area];
+    task->context.imports = prototype->imports;
+    task->has_copies = AppImageSetContext(index_of(task), &task->context);
+    task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
+    task->record = record;
+}
+
+void IecCycleSetCode(const CDL_TASK *records, RTS_UI32 count, RTS_UI32 kept, const IEC_CONTEXT *prototype)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < count; i++) {
+        if ((kept >> i & 1) != 0)
+            set_code(&tasks.list[i], &records[i], prototype);
+        else
+            create(&tasks.list[i], &records[i], prototype);
+    }
+    tasks.count = count;
+    IecCycleFindPhases();
+}
+#endif
 
 void IecCycleStart(void)
 {

@@ -135,20 +135,44 @@ const CDL_TASK *TriggerGetTask(RTS_UI32 task)
     return &triggers.tasks[task];
 }
 
+static RTS_INLINE void forget(RTS_UI32 task)
+{
+    RTS_UI32 changes = 0;
+
+    if (triggers.tasks[task].kind == KIND_EVENT) {
+        triggers.watched = task + 1;
+        changes = is_true(&triggers.tasks[task]);
+    }
+    SysAtomicStore(&triggers.list[task].changes, changes);
+    triggers.list[task].answered = (RTS_UI16)changes; /* as many rises */
+}
+
 void TriggerForget(void)
 {
     RTS_UI32 i;
 
-    for (i = 0; i < triggers.count; i++) {
-        RTS_UI32 changes = 0;
-        if (triggers.tasks[i].kind == KIND_EVENT) {
-            triggers.watched = i + 1;
-            changes = is_true(&triggers.tasks[i]);
-        }
-        SysAtomicStore(&triggers.list[i].changes, changes);
-        triggers.list[i].answered = (RTS_UI16)changes; /* as many rises */
-    }
+    for (i = 0; i < triggers.count; i++)
+        forget(i);
 }
+
+#if ONLINE_CHANGE
+void TriggerChange(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI32 kept)
+{
+    RTS_UI32 i;
+
+    triggers.tasks = tasks;
+    triggers.watched = 0;
+    for (i = 0; i < count; i++) {
+        if ((kept >> i & 1) == 0) {
+            triggers.list[i].lost = 0;
+            forget(i);
+        } else if (tasks[i].kind == KIND_EVENT) {
+            triggers.watched = i + 1;
+        }
+    }
+    SysAtomicStore(&triggers.count, count);
+}
+#endif
 
 /* ---- external events ---- */
 

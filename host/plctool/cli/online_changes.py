@@ -27,6 +27,7 @@ _KINDS = {
     "new": "new",
     "removed": "removed",
     "extended": "extended",
+    "tasks": "task",
 }
 
 
@@ -68,6 +69,7 @@ def change_document(result: BuildResult) -> Document:
         "removed": [name for name in change.removed if _is_of_user(name)],
         "extended": list(dict.fromkeys(v.name for v, fresh in change.fresh if not fresh.was_in_register)),
         "written": 0 if image is None else sum(step.size for step in image.steps if step.writes),
+        "tasks": change.tasks,
         "problems": change.problems,
     }
 

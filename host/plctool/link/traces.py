@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -93,10 +93,10 @@ class TraceConfig:
     trigger: ForcedPlace | None
     data: bytes
 
-    def is_about(self, symbols: Sequence[Symbol]) -> bool:
-        """True if it records or compares one of these variables, or by way of one."""
+    def is_about(self, symbols: Sequence[Symbol], tasks: Collection[int] = ()) -> bool:
+        """True if it records or compares one of these variables, or by way of one, or is of one of these tasks."""
         places = [*self.places, *([] if self.trigger is None else [self.trigger])]
-        return any(place.needs(symbol) for place in places for symbol in symbols)
+        return self.task in tasks or any(place.needs(symbol) for place in places for symbol in symbols)
 
     def for_image(self, image_crc: int) -> bytes:
         """The same for another application, in which what it is about is at the same places."""

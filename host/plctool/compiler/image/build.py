@@ -15,7 +15,7 @@ from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.objects import emit_objects
 from plctool.compiler.codegen.stack import CallGraph, Frames
 from plctool.compiler.image.io_configuration import assign_tasks, configuration_of, io_document
-from plctool.compiler.image.online_change import Steps, check_facts, constants_of, device_facts, facts_of
+from plctool.compiler.image.online_change import Steps, check_facts, constants_of, device_facts, facts_of, tasks_of
 from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.compiler.syntax.library import is_standard
 from plctool.compiler.typed.kept import kept_parts, kept_variables
@@ -118,6 +118,7 @@ def _build(
     if change is not None:
         symbols.online["base"] = change.previous.crc
         check_facts(change, symbols.online, target.name)
+        change.tasks = tasks_of(change, symbols.online)
         code += bytes(-len(code) % _CODE_ALIGN)
         changes = _image_change(program, lowered, linked, target, change, len(code), areas)
         code += packed_steps(changes)

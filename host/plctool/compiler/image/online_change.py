@@ -92,16 +92,6 @@ def check_facts(change: OnlineChange, facts: Mapping[str, Any], device: str) -> 
         change.problems.append(f"the program that runs was built for another target than {device}")
     if before["io"] != facts["io"]:
         change.problems.append(f"the I/O configuration has changed{_changed_devices(before['io'], facts['io'])}")
-    had = {task["name"]: task for task in before["tasks"]}
-    has = {task["name"]: task for task in facts["tasks"]}
-    change.problems += [f"task {name} is new" for name in has if name not in had]
-    change.problems += [f"task {name} is removed" for name in had if name not in has]
-    for name, task in has.items():
-        for key, value in task.items():
-            if name in had and had[name][key] != value:
-                change.problems.append(f"task {name} has another {key}: {_text(had[name][key])}, now {_text(value)}")
-    if list(had) != list(has) and set(had) == set(has):
-        change.problems.append("the tasks are declared in another order")
 
 
 def _changed_devices(before: object, now: list[list[Any]]) -> str:
@@ -110,6 +100,27 @@ def _changed_devices(before: object, now: list[list[Any]]) -> str:
         return ""
     names = [name for name, _ in (d for d in (*before, *now) if d not in before or d not in now)]
     return f" ({', '.join(dict.fromkeys(names))})" if names else " (the order of devices)"
+
+
+def tasks_of(change: OnlineChange, facts: Mapping[str, Any]) -> list[str]:
+    """What becomes of tasks, in words."""
+    had: list[dict[str, Any]] = change.previous.facts["tasks"]  # type: ignore[assignment]
+    names = [task["name"] for task in had]
+    found = []
+    for number, task in enumerate(facts["tasks"]):
+        if task["name"] not in names:
+            found.append(f"{task['name']} is new")
+            continue
+        place = names.index(task["name"])
+        before = had[place]
+        changed = [
+            f"{key} {_text(before[key])}, now {_text(value)}" for key, value in task.items() if before[key] != value
+        ]
+        if changed:
+            found.append(f"{task['name']}: {'; '.join(changed)}")
+        elif place != number:
+            found.append(f"{task['name']} begins again, since its place among the tasks changes")
+    return found + [f"{name} is removed" for name in names if name not in {t["name"] for t in facts["tasks"]}]
 
 
 def _text(value: object) -> str:

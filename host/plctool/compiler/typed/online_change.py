@@ -112,7 +112,8 @@ class OnlineChange:
     `retyped`: parts of another type, which get initial values, in words; `new`: those that get initial values;
     `removed`: names; `gone`: what the new program does not have; `parts`: what it has; `fresh`: parts of kept variables
     that are new; `constants` get their values again; `startup`: calculated initial values, and FB_Init, of new
-    variables. `problems`: why there can be none, each with the name of its variable."""
+    variables. `tasks`: what becomes of tasks that change, in words. `problems`: why there can be none, each with the
+    name of its variable."""
 
     previous: Previous
     kept: int = 0
@@ -125,4 +126,5 @@ class OnlineChange:
     fresh: list[tuple[Variable, Fresh]] = field(default_factory=list)
     constants: list[Variable] = field(default_factory=list)
     startup: Pou | None = None
+    tasks: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
