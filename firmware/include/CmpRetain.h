@@ -77,6 +77,11 @@ RTS_UI8 *RetainGetRoom(void);
 
 /* The bytes in the room become the values, and are saved, as a whole; or the room is given up. No task runs. */
 RTS_RESULT RetainRestore(bool valid);
+#if ONLINE_CHANGE
+/* The same for values of the program that the loaded one has replaced, with the table of that: variables that both have get
+ * them, if they fit. */
+RTS_RESULT RetainRestoreFrom(const RETAIN_TABLE *table);
+#endif
 #endif
 
 RTS_RESULT CmpRetain_Hook(CMP_HOOK hook);

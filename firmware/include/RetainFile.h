@@ -3,7 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The file is a head and the retain area as it was saved last. It fits the program that saved it. From main, with
+ * The file is a head and the retain area as it was saved last. It fits the program that saved it, and the one that has
+ * replaced that in an online change, as long as no other one has. From main, with
  * FILE_STORE_FILES.
  */
 #ifndef RETAINFILE_H

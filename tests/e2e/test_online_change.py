@@ -133,6 +133,32 @@ def test_back_is_the_program_before_with_the_values_of_now(project: Path, plcrt:
     assert (done.status, "does not have the sources of the previous program" in done.err) == (2, True)
 
 
+def test_retain_values_saved_before_a_change_can_be_restored_after_it(project: Path, plcrt: Plcrt, tool: Tool) -> None:
+    link = ("--tcp", plcrt.tcp)
+    tool.ok("write", *link, "Main.kept=77")
+    tool.ok("stop", *link)
+    tool.ok("files", "get", "Retain.bin", *link)
+    tool.ok("start", *link)
+    more = "VAR RETAIN early, kept : LINT := 9; late : DINT := 4; END_VAR"
+    for step in (1, 2):
+        text = program(
+            BODY.replace("n + 1", f"n + {step}"), VARIABLES.replace("VAR RETAIN kept : DINT := 9; END_VAR", more)
+        )
+        (project / "main.st").write_text(text.replace("kept : LINT", "kept : DINT"))
+        tool.ok("flash", "--online-change", *link)
+        tool.ok("write", *link, "Main.kept=5", "Main.late=6")
+        tool.ok("stop", *link)
+        done = tool("files", "put", "Retain.bin", *link)
+        values = tool.ok("read", *link, "Main.kept", "Main.late", "Main.early")["values"]
+        tool.ok("start", *link)
+        if step == 1:
+            assert done.status == 0, done.err
+            assert values == {"Main.kept": 77, "Main.late": 6, "Main.early": 9}
+        else:
+            assert done.status == 1 and "another program saved it" in done.err
+            assert values == {"Main.kept": 5, "Main.late": 6, "Main.early": 9}
+
+
 def test_impossible_edit_is_refused_before_anything_is_sent(project: Path, plcrt: Plcrt, tool: Tool) -> None:
     made = "VAR own : DINT := 40; made : Made(by := 3);"
     (project / "main.st").write_text(program(BODY).replace("VAR own : DINT := 40;", made))

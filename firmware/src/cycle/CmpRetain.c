@@ -300,6 +300,17 @@ RTS_RESULT RetainRestore(bool valid)
     memcpy(retain.area, saved_area, kept.table->area_size);
     return save_copy();
 }
+
+#if ONLINE_CHANGE
+RTS_RESULT RetainRestoreFrom(const RETAIN_TABLE *table)
+{
+    kept.source = *table;
+    kept.persistent_only = false;
+    RetainPutBack();
+    take_copy();
+    return save_copy();
+}
+#endif
 #endif
 
 /* Whether a copy is wanted. */
