@@ -67,6 +67,21 @@ eds = "valves.eds"
 in = { "6000:01" = "Main.inputs3" }
 """
 
+GUARD = 'guard = { every = "T#100ms", life = 5 }'
+GUARD_OBJECTS = """
+[100C]
+ParameterName=Guard time
+DataType=0x0006
+AccessType=rw
+DefaultValue=0
+
+[100D]
+ParameterName=Life time factor
+DataType=0x0005
+AccessType=rw
+DefaultValue=0
+"""
+
 
 def write_program(folder: Path, *, others: str = "", line: str = "", device: str = "", source: str = SOURCE) -> Path:
     """The sources in a folder; `line` and `device`: more keys of the network and its first node."""
@@ -75,4 +90,14 @@ def write_program(folder: Path, *, others: str = "", line: str = "", device: str
     (folder / "app.io.toml").write_text(ONE.format(line=line, device=device) + others)
     path = folder / "app.st"
     path.write_text(source)
+    return path
+
+
+def write_guarded_program(folder: Path, *, guard: str = GUARD, others: str = OTHERS) -> Path:
+    """The sources of a program whose first node is guarded instead of having a heartbeat."""
+    path = write_program(folder, others=others)
+    description, eds = folder / "app.io.toml", folder / "valves.eds"
+    description.write_text(description.read_text().replace('heartbeat = "T#200ms"', guard, 1))
+    listed = "[OptionalObjects]\nSupportedObjects=13\n12=0x100C\n13=0x100D"
+    eds.write_text(eds.read_text().replace("[OptionalObjects]\nSupportedObjects=11", listed) + GUARD_OBJECTS)
     return path

@@ -21,6 +21,7 @@ enum {
     CANOPEN_FUNCTION_MASK = 0x780,
     CANOPEN_MAX_NODE = 127,
     CANOPEN_PDO_SIZE = 8,
+    CANOPEN_GUARD_TOGGLE = 0x80, /* of a guarding reply, beside the state */
 };
 
 /* Commands of the NMT master. */

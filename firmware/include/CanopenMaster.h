@@ -17,10 +17,11 @@ typedef enum {
     MASTER_BOOTS,     /* waits for its boot-up */
     MASTER_IDENTIFY,  /* reads 1000h and 1018h */
     MASTER_CONFIGURE, /* writes its concise DCF */
-    MASTER_START,     /* the command is to be sent */
+    MASTER_START,     /* the command is to be sent, once `must_wait` allows it */
     MASTER_STARTS,    /* waits for its heartbeat */
     MASTER_RUNS,
     MASTER_HELD,  /* in the state that a program has commanded */
+    MASTER_HALTS, /* the stop command is to be sent; then MASTER_START */
     MASTER_WAITS, /* until the next attempt */
 } MASTER_STATE;
 
@@ -40,6 +41,7 @@ enum {
     MASTER_WHY_LATE = 'p',      /* a PDO is late */
     MASTER_WHY_BUS = 'o',       /* bus off */
     MASTER_WHY_HELD = 'n',      /* a program has commanded another state */
+    MASTER_WHY_HALTED = 'q',    /* stopped for the loss of another node */
 };
 
 enum { CANOPEN_SDO_BUFFER = 64 }; /* bytes that can be read of an identity */
@@ -63,6 +65,8 @@ typedef struct {
     const RTS_UI8 *config;             /* entries of the concise DCF */
     RTS_UI32 config_size;
     RTS_UI32 heartbeat_ms; /* its period; 0: it has none */
+    RTS_UI32 guard_ms;     /* period of the guarding requests; 0, or with a heartbeat: none */
+    RTS_UI32 guard_life;   /* periods without a reply until it is lost */
     /* Of the master. */
     MASTER_STATE state;
     RTS_UI8 why;             /* MASTER_WHY_* of the last failure */
@@ -71,10 +75,13 @@ typedef struct {
     bool is_heard;           /* there was a heartbeat */
     RTS_UI32 heard_ms;       /* when the last one was */
     bool is_asked_elsewhere; /* of the owner: another client of SDO is at it, so the manager waits */
+    bool must_wait;          /* of the owner: it is not to be started yet */
+    RTS_UI8 guard_toggle;    /* that the next guarding reply has */
+    RTS_UI32 guarded_ms;     /* when the last guarding request was sent */
     bool repeated;           /* the transfer is the second one */
     RTS_UI32 failures;       /* of attempts and losses */
     RTS_UI32 step;           /* of MASTER_IDENTIFY; of MASTER_CONFIGURE: the place in `config` */
-    RTS_UI32 since_ms;       /* of the state; of MASTER_RUNS the last heartbeat */
+    RTS_UI32 since_ms;       /* of the state; in MASTER_START, _RUNS and _HELD the last heartbeat or guarding reply */
     RTS_UI32 wait_ms;        /* before the next attempt */
     RTS_UI32 found;          /* what it has instead of what is expected */
     RTS_UI16 index;          /* whose write was refused */
@@ -89,7 +96,7 @@ typedef bool (*PF_CANOPEN_SEND)(void *owner, const CAN_FRAME *frame);
 /* A node whose first fields are set begins with its reset. */
 void CanopenNodeBegin(CANOPEN_NODE *node, RTS_UI32 timeout_ms, RTS_UI32 now_ms);
 
-/* A frame of the node: heartbeat, SDO reply or EMCY. */
+/* A frame of the node: heartbeat, guarding reply, SDO reply or EMCY. */
 void CanopenNodeTake(CANOPEN_NODE *node, const CAN_FRAME *frame, RTS_UI32 now_ms);
 
 void CanopenNodePoll(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_UI32 now_ms);
@@ -100,10 +107,19 @@ void CanopenNodeLose(CANOPEN_NODE *node, RTS_UI8 why, RTS_UI32 now_ms);
 /* A program has sent it a command. The manager keeps it in that state, also after a loss, until it is to run again. */
 void CanopenNodeCommand(CANOPEN_NODE *node, RTS_UI8 command, RTS_UI32 now_ms);
 
+/* Stops a node that runs, for the loss of another one. It starts again without a boot, once `must_wait` allows it. */
+void CanopenNodeHalt(CANOPEN_NODE *node, RTS_UI32 now_ms);
+
+/* True if it is configured: it runs, or needs only the command to start. */
+bool CanopenNodeIsReady(const CANOPEN_NODE *node);
+
+/* True if it has a heartbeat or is guarded. */
+bool CanopenNodeIsWatched(const CANOPEN_NODE *node);
+
 /* True while the manager resets it, reads or writes its objects, so that no other client may. */
 bool CanopenNodeIsAsked(const CANOPEN_NODE *node);
 
-/* True if its heartbeat is not late. */
+/* True if its heartbeat or guarding reply is not late. */
 bool CanopenNodeIsHeard(const CANOPEN_NODE *node, RTS_UI32 now_ms);
 
 /* How long it is until it has something to do without a frame [ms]; UINT32_MAX: never. */

@@ -68,6 +68,8 @@ void IoMgrCopyInputLE(const IoConfigChannelMap *channel, const void *memory);
 void IoMgrCopyInputBE(const IoConfigChannelMap *channel, const void *memory);
 void IoMgrCopyOutputLE(const IoConfigChannelMap *channel, void *memory);
 void IoMgrCopyOutputBE(const IoConfigChannelMap *channel, void *memory);
+/* An output as in the safe state, at any time: for a device that has to be safe alone. */
+void IoMgrCopySafeOutputLE(const IoConfigChannelMap *channel, void *memory);
 /* What an input is now, perhaps its initial value, for a device that starts with it. */
 void IoMgrCopyInputBackLE(const IoConfigChannelMap *channel, void *memory);
 

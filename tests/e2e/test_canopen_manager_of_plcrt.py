@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import can
 import canopen
 import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from canopen_programs import BLOCKS, SOURCE, VALVES, write_program
+from canopen_programs import BLOCKS, SOURCE, VALVES, write_guarded_program, write_program
 
 from plctool import connect
 from plctool.device import Plc
@@ -87,6 +88,43 @@ def test_foreign_node_is_brought_into_operation_lost_and_regained(hub: CanHub, p
     texts = [entry.text for entry in plc.log()]
     assert "Valves is lost: its heartbeat is missing" in texts
     assert "Valves is back" in texts
+
+
+class GuardedNode(ForeignNode):
+    """A node that replies to guarding requests, which python canopen does not."""
+
+    def __init__(self, path: str, eds: Path) -> None:
+        super().__init__(path)
+        self.node = canopen.LocalNode(NODE, str(eds))
+        self._toggle = 0
+
+    def __enter__(self) -> GuardedNode:
+        super().__enter__()
+        assert self._network.notifier is not None
+        self._network.notifier.add_listener(self._take)
+        return self
+
+    def _take(self, frame: can.Message) -> None:
+        if frame.is_remote_frame and frame.arbitration_id == 0x700 + NODE:
+            states = {"OPERATIONAL": 5, "STOPPED": 4}
+            state = states.get(self.node.nmt.state, 0x7F)
+            self._network.send_message(0x700 + NODE, bytes([state | self._toggle]))
+            self._toggle ^= 0x80
+
+
+def test_foreign_node_is_guarded(hub: CanHub, tmp_path: Path, tool: Any) -> None:
+    image, program = tmp_path / "app.cdl", write_guarded_program(tmp_path)
+    built = tool("build", str(program), "-o", str(image))
+    assert built.status == 0, built.err
+    options = ("--can", f"slcan:{hub.paths[0]}", "--node", "5")
+    with Plcrt(tmp_path / "flash", *options), connect(f"can:slcan:{hub.paths[1]}?node=5") as plc:
+        plc.flash(image)
+        for _ in range(2):
+            with GuardedNode(hub.paths[2], program.with_name("valves.eds")) as foreign:
+                eventually(lambda: plc.read("Valves.ok"))
+                assert (foreign.node.sdo[0x100C].raw, foreign.node.sdo[0x1017].raw) == (100, 0)
+            eventually(lambda: not plc.read("Valves.ok"))
+        assert "Valves is lost: it does not reply to guarding" in [entry.text for entry in plc.log()]
 
 
 def do(plc: Plc, block: str, **inputs: Any) -> tuple[bool, int]:

@@ -28,6 +28,8 @@ static struct {
     RTS_UI32 boot_ms; /* 0: it is up */
     RTS_UI32 heartbeat_ms;
     RTS_UI8 state;
+    RTS_UI8 toggle;
+    bool is_guarded; /* a request waits */
 } server;
 
 size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
@@ -59,10 +61,14 @@ static void say(RTS_UI32 id, const RTS_UI8 *data, RTS_UI8 size)
 
 static void serve_command(RTS_UI8 command)
 {
-    if (command == NMT_RESET_COMMUNICATION)
+    if (command == NMT_RESET_COMMUNICATION) {
         server.boot_ms = now_ms + 50;
+        server.toggle = 0;
+    }
     if (command == NMT_START)
         server.state = NODE_OPERATIONAL;
+    if (command == NMT_STOP)
+        server.state = NODE_STOPPED;
 }
 
 static void serve_sdo(RTS_UI8 *data)
@@ -80,6 +86,15 @@ static void serve_sdo(RTS_UI8 *data)
     say(CANOPEN_SDO_REPLY, data, WHOLE);
 }
 
+static void serve_guarding(void)
+{
+    RTS_UI8 byte = server.state | server.toggle;
+
+    server.is_guarded = false;
+    server.toggle ^= CANOPEN_GUARD_TOGGLE;
+    say(CANOPEN_HEARTBEAT, &byte, 1);
+}
+
 static void serve(void)
 {
     if (server.boot_ms != 0 && now_ms >= server.boot_ms) {
@@ -93,7 +108,9 @@ static void serve(void)
     else if (has_sent && server.boot_ms == 0)
         serve_sdo(sent.data);
     has_sent = false;
-    if (server.boot_ms == 0 && now_ms - server.heartbeat_ms >= HEARTBEAT_MS) {
+    if (server.is_guarded)
+        serve_guarding();
+    if (node.heartbeat_ms != 0 && server.boot_ms == 0 && now_ms - server.heartbeat_ms >= HEARTBEAT_MS) {
         server.heartbeat_ms = now_ms;
         say(CANOPEN_HEARTBEAT, &server.state, 1);
     }
@@ -104,10 +121,16 @@ static void serve(void)
 static bool take_frame(void *owner, const CAN_FRAME *frame)
 {
     (void)owner;
-    FUZZ_CHECK(frame->size <= WHOLE && frame->flags == 0);
-    FUZZ_CHECK(frame->id == CANOPEN_NMT || frame->id == CANOPEN_SDO_REQUEST + NODE);
+    bool is_guarding = frame->flags == CAN_FLAG_REMOTE && frame->id == CANOPEN_HEARTBEAT + NODE;
+
+    FUZZ_CHECK(frame->size <= WHOLE);
+    FUZZ_CHECK(is_guarding ||
+               (frame->flags == 0 && (frame->id == CANOPEN_NMT || frame->id == CANOPEN_SDO_REQUEST + NODE)));
     if (is_full)
         return false;
+    server.is_guarded = server.is_guarded || is_guarding;
+    if (is_guarding)
+        return true;
     sent = *frame;
     has_sent = true;
     return true;
@@ -128,7 +151,12 @@ static void begin(const RTS_UI8 *config, RTS_UI32 size)
     is_full = has_sent = false;
     node.node = NODE;
     node.expected[EXPECTED_TYPE] = TYPE;
-    node.heartbeat_ms = HEARTBEAT_MS;
+    if (size % 2 != 0) {
+        node.guard_ms = HEARTBEAT_MS;
+        node.guard_life = 3;
+    } else {
+        node.heartbeat_ms = HEARTBEAT_MS;
+    }
     if (CanopenIsConfig(config, size)) {
         node.config = config;
         node.config_size = size;
@@ -151,6 +179,9 @@ static size_t step(const uint8_t *input, size_t size)
     }
     if (length > WHOLE)
         length = WHOLE;
+    node.must_wait = length == WHOLE && (head & 0x80) != 0;
+    if (node.must_wait)
+        CanopenNodeHalt(&node, now_ms);
     memcpy(data, input + 1, length < size - 1 ? length : size - 1);
     say(ids[head & 3], data, length);
     pass((head & 0x40) != 0);
@@ -159,7 +190,7 @@ static size_t step(const uint8_t *input, size_t size)
 
 static void check_recovery(void)
 {
-    is_full = has_sent = false;
+    is_full = has_sent = node.must_wait = false;
     server.state = NODE_PREOPERATIONAL;
     server.heartbeat_ms = now_ms;
     for (RTS_UI32 ms = 0; ms < RECOVERY_MS && node.state != MASTER_RUNS; ms += STEP_MS) {

@@ -11,7 +11,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from canopen_programs import OTHERS, write_program
+from canopen_programs import GUARD, OTHERS, write_guarded_program, write_program
 
 from plctool.compiler.syntax.diagnostics import CompileError
 from plctool.errors import UsageError
@@ -339,3 +339,131 @@ def test_node_may_have_more_than_four_pdos_in_a_direction(tmp_path: Path) -> Non
 def test_more_inputs_than_a_node_has_pdos_for_are_reported(tmp_path: Path) -> None:
     with pytest.raises(CompileError, match="Valves has 5 PDOs for inputs, which have no room for 6444:06"):
         Simulator.from_sources(of_many_pdos(tmp_path, 5, 6))
+
+
+# ---- guarding, and nodes that others depend on -----------------------------------------------------------------------
+
+
+def requests(plc: Simulator, node: int) -> int:
+    """How often the node was asked for its state since the last call."""
+    return sum(frame.remote and frame.id == HEARTBEAT + node for frame in plc.can_receive())
+
+
+def test_guarded_node_runs_is_lost_and_comes_back(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_guarded_program(tmp_path)) as plc:
+        plc.run_for(BOOT_MS)
+        assert in_operation(plc)
+        plc.can_receive()
+        plc.run_for(1000)
+        assert requests(plc, 9) == 10
+        plc.fault("Valves", "absent")
+        plc.run_for(380)
+        assert plc.read("Valves.ok")
+        plc.run_for(150)  # five requests without a reply
+        assert not plc.read("Valves.ok")
+        plc.fault("Valves", "absent", 0)
+        plc.run_for(2000)
+        assert in_operation(plc)
+        assert of_manager(plc) == ["Valves is lost: it does not reply to guarding", "Valves is back"]
+
+
+def test_guarding_is_written_into_the_node_and_its_heartbeat_switched_off(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_guarded_program(tmp_path)) as plc:
+        plc.run_for(BOOT_MS)
+        frames = [f.data for f in plc.can_receive() if f.id == SDO + 9 and f.data[0] & 0xE0 == 0x20]
+        values = {int.from_bytes(f[1:3], "little"): int.from_bytes(f[4:], "little") for f in frames}
+        assert [values[index] for index in (0x1017, 0x100C, 0x100D)] == [0, 100, 5]
+
+
+def test_reply_with_the_wrong_toggle_does_not_count(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_guarded_program(tmp_path)) as plc:
+        plc.run_for(BOOT_MS)
+        plc.fault("Valves", "absent")
+        for _ in range(60):  # another device that sends the same byte for ever
+            plc.can_send(HEARTBEAT + 9, b"\x05")
+            plc.run_for(10)
+        assert of_manager(plc) == ["Valves is lost: it does not reply to guarding"]
+
+
+@pytest.mark.parametrize(
+    ("guard", "message"),
+    [
+        (GUARD + '\nheartbeat = "T#100ms"', "write guard or heartbeat, not both"),
+        ("guard = {}", "every"),
+        ('guard = { every = "T#100ms", life = 0 }', "life is 0; it can be 1 to 255"),
+        ('on_lost = "panic"', "on_lost cannot be 'panic'"),
+        ("required = true\noptional = true", "write required or optional, not both"),
+    ],
+)
+def test_mistakes_of_guarding_are_reported(tmp_path: Path, guard: str, message: str) -> None:
+    with pytest.raises(CompileError, match=message):
+        Simulator.from_sources(write_guarded_program(tmp_path, guard=guard))
+
+
+def test_node_that_cannot_be_guarded_is_reported(tmp_path: Path) -> None:
+    path = write_program(tmp_path)
+    description = tmp_path / "app.io.toml"
+    description.write_text(description.read_text().replace('heartbeat = "T#200ms"', GUARD, 1))
+    with pytest.raises(CompileError, match=r"Valves cannot be guarded \(its EDS has no 100C and 100D\)"):
+        Simulator.from_sources(path)
+
+
+def test_no_node_is_started_before_a_required_one(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path, others=OTHERS, device="required = true")) as plc:
+        plc.fault("Valves", "absent")
+        plc.run_for(5000)
+        assert not any(plc.read(f"{name}.ok") for name in ("Valves", "Second", "Third"))
+        plc.fault("Valves", "absent", 0)
+        plc.run_for(10_000)
+        assert in_operation(plc)
+        plc.fault("Valves", "absent")  # now the others keep running
+        plc.run_for(5000)
+        assert in_operation(plc, "Second", "Third")
+        assert not plc.read("Valves.ok")
+
+
+def test_nodes_are_stopped_while_a_node_is_lost_and_started_without_a_boot(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path, others=OTHERS, device='on_lost = "stop"')) as plc:
+        plc.run_for(BOOT_MS)
+        assert in_operation(plc)
+        plc.fault("Valves", "absent")
+        plc.run_for(560)
+        assert {b"\x02\x0a", b"\x02\x0b"} < {f.data for f in plc.can_receive() if f.id == NMT}
+        assert not any(plc.read(f"{name}.ok") for name in ("Valves", "Second", "Third"))
+        assert "Second is lost: it waits for a node that is lost" in of_manager(plc)
+        plc.run_for(20_000)
+        plc.can_receive()
+        plc.fault("Valves", "absent", 0)
+        plc.run_for(10_000)
+        assert in_operation(plc)
+        assert written(plc, 10) == []  # the configuration was not written again
+
+
+def test_node_that_is_lost_while_it_is_stopped_is_regained(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path, others=OTHERS, device='on_lost = "stop"')) as plc:
+        plc.run_for(BOOT_MS)
+        plc.fault("Valves", "absent")
+        plc.run_for(2000)
+        plc.fault("Second", "absent")
+        plc.run_for(5000)
+        plc.fault("Valves", "absent", 0)
+        plc.run_for(10_000)
+        assert in_operation(plc, "Valves", "Third")
+        plc.fault("Second", "absent", 0)
+        plc.run_for(10_000)
+        assert in_operation(plc)
+
+
+def test_outputs_of_the_others_are_safe_while_a_node_is_lost(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path, others=OTHERS, device='on_lost = "safe"')) as plc:
+        plc.run_for(BOOT_MS)
+        plc.write({"Main.coils2": 0x55})
+        plc.run_for(50)
+        assert plc.output("Main.coils2") == 0x55
+        plc.fault("Valves", "absent")
+        plc.run_for(560)
+        assert plc.output("Main.coils2") == 0
+        assert in_operation(plc, "Second", "Third")
+        plc.fault("Valves", "absent", 0)
+        plc.run_for(10_000)
+        assert plc.output("Main.coils2") == 0x55

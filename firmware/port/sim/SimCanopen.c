@@ -30,7 +30,8 @@ typedef struct {
 } OBJECT;
 
 typedef struct {
-    RTS_UI8 state; /* NODE_*, OFF */
+    RTS_UI8 state;  /* NODE_*, OFF */
+    RTS_UI8 toggle; /* of the next guarding reply */
     RTS_I64 boot_ns;
     RTS_I64 heartbeat_ns;
     RTS_I64 reply_ns;
@@ -176,6 +177,7 @@ static void send_inputs(NODE *node, bool of_sync, bool all, RTS_I64 now_ns)
 static void power_on(NODE *node, RTS_I64 now_ns)
 {
     node->state = NODE_BOOTS;
+    node->toggle = 0;
     node->count = 0;
     node->boot_ns = now_ns + BOOT_NS;
     node->heartbeat_ns = node->reply_ns = NEVER;
@@ -319,6 +321,17 @@ static void serve(NODE *node, RTS_UI8 *data, RTS_I64 now_ns)
 
 /* ---- frames from the bus ---- */
 
+/* A guarding request. */
+static void reply_state(NODE *node)
+{
+    RTS_UI8 byte = node->state | node->toggle;
+
+    if (node->state == NODE_BOOTS)
+        return;
+    send(CANOPEN_HEARTBEAT + (RTS_UI32)device_of(node)->node.node, &byte, 1);
+    node->toggle ^= CANOPEN_GUARD_TOGGLE;
+}
+
 static void take_output(NODE *node, const CAN_FRAME *frame)
 {
     const CANOPEN_DEVICE *device = device_of(node);
@@ -371,8 +384,12 @@ void SimCanopenRun(RTS_I64 now_ns)
     while (SimCanReceive(SIM_CANOPEN_NODE, &frame) == ERR_OK)
         FOR_EACH_NODE (node) {
             CAN_FRAME own = frame;
-            if (node->state != OFF && (frame.flags & (CAN_FLAG_EXTENDED | CAN_FLAG_REMOTE)) == 0)
+            if (node->state == OFF || (frame.flags & CAN_FLAG_EXTENDED) != 0)
+                continue;
+            if ((frame.flags & CAN_FLAG_REMOTE) == 0)
                 take_of_node(node, &own, now_ns);
+            else if (frame.id == CANOPEN_HEARTBEAT + (RTS_UI32)device_of(node)->node.node)
+                reply_state(node);
         }
     FOR_EACH_NODE (node)
         run_node(node, now_ns);

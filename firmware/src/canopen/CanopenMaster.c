@@ -216,10 +216,22 @@ static void follow_transfer(CANOPEN_NODE *node, RTS_UI32 now_ms)
     }
 }
 
+static bool is_guarded(const CANOPEN_NODE *node)
+{
+    return node->heartbeat_ms == 0 && node->guard_ms != 0;
+}
+
+bool CanopenNodeIsWatched(const CANOPEN_NODE *node)
+{
+    return node->heartbeat_ms != 0 || node->guard_ms != 0;
+}
+
 static RTS_UI32 grace_ms(const CANOPEN_NODE *node)
 {
     RTS_UI32 grace = node->heartbeat_ms * 5 / 2;
 
+    if (is_guarded(node))
+        return node->guard_ms * node->guard_life;
     return grace >= node->heartbeat_ms + LEAST_GRACE_MS ? grace : node->heartbeat_ms + LEAST_GRACE_MS;
 }
 
@@ -254,6 +266,20 @@ void CanopenNodeCommand(CANOPEN_NODE *node, RTS_UI8 command, RTS_UI32 now_ms)
         enter(node, MASTER_STARTS, now_ms);
 }
 
+void CanopenNodeHalt(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    if (node->state != MASTER_RUNS && node->state != MASTER_STARTS)
+        return;
+    node->failures++;
+    node->why = MASTER_WHY_HALTED;
+    enter(node, MASTER_HALTS, now_ms);
+}
+
+bool CanopenNodeIsReady(const CANOPEN_NODE *node)
+{
+    return node->state >= MASTER_START && node->state != MASTER_WAITS;
+}
+
 bool CanopenNodeIsAsked(const CANOPEN_NODE *node)
 {
     return node->state <= MASTER_CONFIGURE;
@@ -266,20 +292,33 @@ bool CanopenNodeIsHeard(const CANOPEN_NODE *node, RTS_UI32 now_ms)
 
 /* ---- frames ---- */
 
+/* A guarding reply that comes twice, or from a node that has missed a request, has the wrong toggle: it does not count. */
+static bool is_expected_reply(CANOPEN_NODE *node, RTS_UI8 byte)
+{
+    if (byte == NODE_BOOTS) {
+        node->guard_toggle = 0;
+        return true;
+    }
+    if (is_guarded(node) && (byte & CANOPEN_GUARD_TOGGLE) != node->guard_toggle)
+        return false;
+    node->guard_toggle ^= CANOPEN_GUARD_TOGGLE;
+    return true;
+}
+
 static void take_heartbeat(CANOPEN_NODE *node, RTS_UI8 state, RTS_UI32 now_ms)
 {
     node->nmt_state = state;
     node->is_heard = true;
     node->heard_ms = now_ms;
     if (state == NODE_BOOTS) {
-        if (node->state == MASTER_RUNS || node->state == MASTER_HELD || node->state == MASTER_STARTS ||
-            node->state == MASTER_CONFIGURE)
+        if (CanopenNodeIsReady(node) || node->state == MASTER_CONFIGURE)
             fail(node, MASTER_WHY_RESTARTED, now_ms);
         if (node->state == MASTER_BOOTS || node->state == MASTER_WAITS)
             enter(node, MASTER_IDENTIFY, now_ms); /* it has just been reset: no need to do it again */
     } else if (node->state == MASTER_STARTS && state == NODE_OPERATIONAL) {
         run(node, now_ms);
-    } else if ((node->state == MASTER_RUNS && state == NODE_OPERATIONAL) || node->state == MASTER_HELD) {
+    } else if ((node->state == MASTER_RUNS && state == NODE_OPERATIONAL) || node->state == MASTER_HELD ||
+               node->state == MASTER_START) {
         node->since_ms = now_ms;
     } else if (node->state == MASTER_RUNS) {
         fail(node, MASTER_WHY_STATE, now_ms);
@@ -293,7 +332,8 @@ void CanopenNodeTake(CANOPEN_NODE *node, const CAN_FRAME *frame, RTS_UI32 now_ms
     if ((frame->flags & CAN_FLAG_REMOTE) != 0)
         return;
     if (function == CANOPEN_HEARTBEAT && frame->size == 1) {
-        take_heartbeat(node, frame->data[0] & 0x7F, now_ms);
+        if (is_expected_reply(node, frame->data[0]))
+            take_heartbeat(node, frame->data[0] & 0x7F, now_ms);
     } else if (function == CANOPEN_SDO_REPLY) {
         SdoClientTake(&node->sdo, frame, now_ms);
     } else if (function == CANOPEN_EMCY && frame->size >= EMCY_MIN) {
@@ -311,37 +351,58 @@ static bool flush(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner)
     return !node->sdo.has_request;
 }
 
+static bool is_silent(const CANOPEN_NODE *node, RTS_UI32 limit_ms, RTS_UI32 now_ms)
+{
+    return CanopenNodeIsWatched(node) && now_ms - node->since_ms >= limit_ms;
+}
+
+static void start(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_UI32 now_ms)
+{
+    if (node->must_wait) {
+        if (is_silent(node, start_ms(node), now_ms))
+            fail(node, MASTER_WHY_NO_HEARTBEAT, now_ms);
+        return;
+    }
+    if (!CanopenSendNmt(send, owner, node->command, node->node))
+        return;
+    if (node->command == NMT_START)
+        enter(node, MASTER_STARTS, now_ms);
+    else
+        hold(node, now_ms);
+}
+
 static void poll_state(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_UI32 now_ms)
 {
     RTS_UI32 since_ms = now_ms - node->since_ms;
 
     switch (node->state) {
     case MASTER_RESET:
-        if (CanopenSendNmt(send, owner, NMT_RESET_COMMUNICATION, node->node))
-            enter(node, MASTER_BOOTS, now_ms);
+        if (!CanopenSendNmt(send, owner, NMT_RESET_COMMUNICATION, node->node))
+            break;
+        node->guard_toggle = 0;
+        enter(node, MASTER_BOOTS, now_ms);
         break;
     case MASTER_BOOTS:
         if (since_ms >= BOOT_MS)
             enter(node, MASTER_IDENTIFY, now_ms);
         break;
     case MASTER_START:
-        if (!CanopenSendNmt(send, owner, node->command, node->node))
-            break;
-        if (node->command == NMT_START)
-            enter(node, MASTER_STARTS, now_ms);
-        else
-            hold(node, now_ms);
+        start(node, send, owner, now_ms);
         break;
     case MASTER_STARTS:
-        if (node->heartbeat_ms == 0)
+        if (!CanopenNodeIsWatched(node))
             run(node, now_ms);
-        else if (since_ms >= start_ms(node))
+        else if (is_silent(node, start_ms(node), now_ms))
             fail(node, MASTER_WHY_NO_HEARTBEAT, now_ms);
         break;
     case MASTER_RUNS:
     case MASTER_HELD:
-        if (node->heartbeat_ms != 0 && since_ms >= grace_ms(node))
+        if (is_silent(node, grace_ms(node), now_ms))
             fail(node, MASTER_WHY_LOST, now_ms);
+        break;
+    case MASTER_HALTS:
+        if (CanopenSendNmt(send, owner, NMT_STOP, node->node))
+            enter(node, MASTER_START, now_ms);
         break;
     case MASTER_WAITS:
         if (since_ms >= node->wait_ms)
@@ -350,6 +411,27 @@ static void poll_state(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RT
     default:
         break;
     }
+}
+
+static RTS_UI32 left_ms(RTS_UI32 since_ms, RTS_UI32 of_ms)
+{
+    return since_ms < of_ms ? of_ms - since_ms : 0;
+}
+
+/* How long it is until the next guarding request [ms]; UINT32_MAX: there is none. */
+static RTS_UI32 guard_left_ms(const CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    if (!is_guarded(node) || !CanopenNodeIsReady(node))
+        return UINT32_MAX;
+    return left_ms(now_ms - node->guarded_ms, node->guard_ms);
+}
+
+static void ask_state(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_UI32 now_ms)
+{
+    const CAN_FRAME frame = {.id = CANOPEN_HEARTBEAT + (RTS_UI32)node->node, .flags = CAN_FLAG_REMOTE, .size = 1};
+
+    if (guard_left_ms(node, now_ms) == 0 && send(owner, &frame))
+        node->guarded_ms = now_ms;
 }
 
 void CanopenNodePoll(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_UI32 now_ms)
@@ -367,14 +449,11 @@ void CanopenNodePoll(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_
             poll_state(node, send, owner, now_ms);
         (void)flush(node, send, owner);
     } while (node->state != before);
+    ask_state(node, send, owner, now_ms);
 }
 
-static RTS_UI32 left_ms(RTS_UI32 since_ms, RTS_UI32 of_ms)
-{
-    return since_ms < of_ms ? of_ms - since_ms : 0;
-}
-
-RTS_UI32 CanopenNodeGetWaitMs(const CANOPEN_NODE *node, RTS_UI32 now_ms)
+/* The same without guarding requests. */
+static RTS_UI32 get_wait_ms(const CANOPEN_NODE *node, RTS_UI32 now_ms)
 {
     RTS_UI32 since_ms = now_ms - node->since_ms;
 
@@ -383,11 +462,15 @@ RTS_UI32 CanopenNodeGetWaitMs(const CANOPEN_NODE *node, RTS_UI32 now_ms)
     switch (node->state) {
     case MASTER_BOOTS:
         return left_ms(since_ms, BOOT_MS);
+    case MASTER_START:
+        if (!node->must_wait)
+            return AGAIN_MS;
+        return CanopenNodeIsWatched(node) ? left_ms(since_ms, start_ms(node)) : UINT32_MAX;
     case MASTER_STARTS:
         return left_ms(since_ms, start_ms(node));
     case MASTER_RUNS:
     case MASTER_HELD:
-        return node->heartbeat_ms != 0 ? left_ms(since_ms, grace_ms(node)) : UINT32_MAX;
+        return CanopenNodeIsWatched(node) ? left_ms(since_ms, grace_ms(node)) : UINT32_MAX;
     case MASTER_WAITS:
         return left_ms(since_ms, node->wait_ms);
     case MASTER_IDENTIFY:
@@ -396,4 +479,14 @@ RTS_UI32 CanopenNodeGetWaitMs(const CANOPEN_NODE *node, RTS_UI32 now_ms)
     default:
         return AGAIN_MS;
     }
+}
+
+RTS_UI32 CanopenNodeGetWaitMs(const CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    RTS_UI32 of_state = get_wait_ms(node, now_ms);
+    RTS_UI32 of_guard = guard_left_ms(node, now_ms);
+
+    if (of_guard == 0)
+        of_guard = AGAIN_MS; /* there was no room */
+    return of_state < of_guard ? of_state : of_guard;
 }

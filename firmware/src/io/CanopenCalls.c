@@ -261,7 +261,7 @@ static RTS_UI8 state_of(const CANOPEN_LINE *line, RTS_UI8 node)
 
     if (node == 0 || node == line->own_node)
         return line->was_off ? STATE_NOT_AVAILABLE : STATE_OPERATIONAL;
-    if (device == NULL || device->node.heartbeat_ms == 0)
+    if (device == NULL || !CanopenNodeIsWatched(&device->node))
         return STATE_UNKNOWN;
     if (!CanopenNodeIsHeard(&device->node, SysTimeGetMs()))
         return STATE_NOT_AVAILABLE;

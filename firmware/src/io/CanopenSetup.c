@@ -13,7 +13,7 @@
 
 #if CANOPEN_MAX_DEVICES > 0
 
-enum { DEFAULT_TIMEOUT_MS = 1000, MAX_MS = 60000 };
+enum { DEFAULT_TIMEOUT_MS = 1000, MAX_MS = 60000, MAX_LIFE = 255 };
 
 static RTS_UI32 number(const IoConfigConnector *connector, RTS_UI32 id, RTS_UI32 otherwise)
 {
@@ -81,6 +81,8 @@ static RTS_RESULT describe(CANOPEN_NODE *node, const IoConfigConnector *connecto
     for (RTS_UI32 i = 0; i < EXPECTED_COUNT && expected != NULL && size == 4 * EXPECTED_COUNT; i++)
         node->expected[i] = BytesGet32(expected + 4 * i);
     node->heartbeat_ms = number(connector, CANOPEN_PARAM_HEARTBEAT, 0);
+    node->guard_ms = number(connector, CANOPEN_PARAM_GUARD, 0);
+    node->guard_life = number(connector, CANOPEN_PARAM_GUARD_LIFE, 1);
     node->config = bytes(connector, CANOPEN_PARAM_CONFIG, &node->config_size);
     if (node->config != NULL && !CanopenIsConfig(node->config, node->config_size))
         return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its concise DCF is damaged.");
@@ -98,9 +100,13 @@ static RTS_RESULT add_device(CANOPEN_SETUP *setup, CANOPEN_LINE *line, const IoC
     if (node < 1 || node > CANOPEN_MAX_NODE || node == line->own_node || line->by_node[node] != NULL)
         return IoMgrConfigRefuse(connector, ERR_PARAMETER, "it cannot have the node number %u.", (unsigned)node);
     if (number(connector, CANOPEN_PARAM_TIMEOUT, DEFAULT_TIMEOUT_MS) - 1 >= MAX_MS ||
-        number(connector, CANOPEN_PARAM_HEARTBEAT, 0) > MAX_MS)
-        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its time-out or heartbeat cannot be.");
+        number(connector, CANOPEN_PARAM_HEARTBEAT, 0) > MAX_MS || number(connector, CANOPEN_PARAM_GUARD, 0) > MAX_MS ||
+        number(connector, CANOPEN_PARAM_GUARD_LIFE, 1) - 1 >= MAX_LIFE)
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its time-out, heartbeat or guarding cannot be.");
     device->connector = connector;
+    device->line = line;
+    device->required = number(connector, CANOPEN_PARAM_REQUIRED, 0) != 0;
+    device->on_lost = (RTS_UI8)number(connector, CANOPEN_PARAM_ON_LOST, CANOPEN_LOST_CONTINUE);
     device->node.node = (RTS_UI8)node;
     line->by_node[node] = device;
     setup->device_count++;

@@ -28,10 +28,15 @@ typedef struct {
     RTS_UI32 sent_ms;
 } CANOPEN_PDO_STATE;
 
+typedef struct CANOPEN_LINE CANOPEN_LINE;
+
 typedef struct {
     const IoConfigConnector *connector;
+    CANOPEN_LINE *line;
     bool used; /* it was not refused */
     CANOPEN_NODE node;
+    bool required;   /* no node is started before it */
+    RTS_UI8 on_lost; /* CANOPEN_LOST_* */
     CANOPEN_PDO_STATE *pdos;
     RTS_UI32 pdo_count;
     RTS_UI32 runs; /* number of the run that it is in, 0: it is not operational; for tasks */
@@ -41,13 +46,14 @@ typedef struct {
     RTS_UI32 logged_emcy_ms;
 } CANOPEN_DEVICE;
 
-typedef struct {
+struct CANOPEN_LINE {
     const IoConfigConnector *connector;
     RTS_UI32 network;
     RTS_UI8 own_node;
     RTS_UI32 heartbeat_ms;
     RTS_UI32 heartbeat_sent_ms;
     bool sync;
+    RTS_UI32 is_safe; /* outputs are those of the safe state; for tasks */
     bool attached;
     bool was_off;
     bool is_passive;
@@ -56,7 +62,7 @@ typedef struct {
     CAN_USER user;
     CANOPEN_DEVICE *by_node[CANOPEN_MAX_NODE + 1];
     CANOPEN_PDO_STATE *by_cob[0x800]; /* inputs */
-} CANOPEN_LINE;
+};
 
 typedef struct {
     RTS_UI32 line_count;

@@ -120,7 +120,7 @@ static bool is_reserved(RTS_UI32 network, RTS_UI32 id)
 static void release(CANOPEN_LINE *line)
 {
     FOR_EACH_DEVICE (line, device)
-        if (device->node.state == MASTER_RUNS)
+        if (device->node.state == MASTER_RUNS || device->node.state == MASTER_START)
             (void)CanopenSendNmt(send, line, NMT_PREOPERATIONAL, device->node.node);
     if (line->attached)
         CanDetach(line->network, &line->user);
@@ -202,6 +202,14 @@ static void read_newest(const CANOPEN_PDO_STATE *state, RTS_UI8 *data)
     } while (SysAtomicLoad(&state->number) != number && ++tries < READ_TRIES);
 }
 
+static void copy_output(const IoConfigConnector *connector, const IoConfigChannelMap *channel, CANOPEN_PDO_STATE *state)
+{
+    if (SysAtomicLoad(&CanopenFindDevice(&setup, connector)->line->is_safe) != 0)
+        IoMgrCopySafeOutputLE(channel, state->out);
+    else
+        IoMgrCopyOutputLE(channel, state->out);
+}
+
 static void copy(const IoConfigConnectorMap *map, bool is_output)
 {
     const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
@@ -214,7 +222,7 @@ static void copy(const IoConfigConnectorMap *map, bool is_output)
         if (state == NULL)
             continue;
         if (is_output) {
-            IoMgrCopyOutputLE(channel, state->out);
+            copy_output(connector, channel, state);
             continue;
         }
         if (channel->parameter != last)
@@ -314,7 +322,7 @@ static const char *describe_step(const CANOPEN_NODE *node)
     case MASTER_WHY_NO_HEARTBEAT:
         return "it sends no heartbeat after its start";
     case MASTER_WHY_LOST:
-        return "its heartbeat is missing";
+        return node->heartbeat_ms != 0 ? "its heartbeat is missing" : "it does not reply to guarding";
     case MASTER_WHY_RESTARTED:
         return "it has restarted";
     case MASTER_WHY_STATE:
@@ -323,6 +331,8 @@ static const char *describe_step(const CANOPEN_NODE *node)
         return "one of its PDOs is late";
     case MASTER_WHY_BUS:
         return "the bus is off";
+    case MASTER_WHY_HALTED:
+        return "it waits for a node that is lost";
     case MASTER_WHY_HELD:
         return "the program has taken it out of operation";
     default:
@@ -460,8 +470,40 @@ static void note_bus(CANOPEN_LINE *line, RTS_UI32 now_ms)
     line->is_passive = state.bus == CAN_BUS_PASSIVE;
 }
 
+static bool is_lost(const CANOPEN_NODE *node)
+{
+    return node->state != MASTER_RUNS && node->state != MASTER_HELD;
+}
+
+/* True if the other nodes wait for it. */
+static bool holds_others(const CANOPEN_DEVICE *device)
+{
+    bool is_awaited = device->required && device->node.counters.boots == 0;
+
+    return !CanopenNodeIsReady(&device->node) && (is_awaited || device->on_lost == CANOPEN_LOST_STOP);
+}
+
+/* What the loss of a node does to the others. */
+static void follow_losses(CANOPEN_LINE *line, RTS_UI32 now_ms)
+{
+    bool must_wait = false;
+    bool is_safe = false;
+
+    FOR_EACH_DEVICE (line, device) {
+        must_wait = must_wait || holds_others(device);
+        is_safe = is_safe || (device->on_lost == CANOPEN_LOST_SAFE && is_lost(&device->node));
+    }
+    SysAtomicStore(&line->is_safe, is_safe);
+    FOR_EACH_DEVICE (line, device) {
+        device->node.must_wait = must_wait;
+        if (must_wait)
+            CanopenNodeHalt(&device->node, now_ms);
+    }
+}
+
 static void poll_line(CANOPEN_LINE *line, RTS_UI32 now_ms)
 {
+    follow_losses(line, now_ms);
     FOR_EACH_DEVICE (line, device)
         poll_device(line, device, now_ms);
     send_heartbeat(line, now_ms);

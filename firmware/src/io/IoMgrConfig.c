@@ -301,6 +301,11 @@ void IoMgrCopyOutputBE(const IoConfigChannelMap *channel, void *memory)
     copy_output(channel, memory, IO_CHANNEL_BIG_ENDIAN);
 }
 
+void IoMgrCopySafeOutputLE(const IoConfigChannelMap *channel, void *memory)
+{
+    copy_safe(channel, memory, 0);
+}
+
 void IoMgrCopyInputs(const IoConfigChannelMap *channel, RTS_UI32 count, const void *memory)
 {
     RTS_UI8 *area = tables.areas[APP_AREA_INPUT];

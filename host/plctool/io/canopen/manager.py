@@ -40,13 +40,19 @@ from plctool.io.tables import Entry, Table, each
 DRIVER = "IoDrvCanopen"
 MAX_NODE = 127
 _PLACE = re.compile(r"([0-9A-Fa-f]{4})(?::([0-9A-Fa-f]{1,2}))?(?:\.(\d{1,2}))?")
-_HEARTBEAT = 0x1017
+_GUARD_TIME, _LIFE_TIME_FACTOR, _HEARTBEAT = 0x100C, 0x100D, 0x1017
 _TYPE, _IDENTITY = 0x1000, 0x1018
 _DEFAULT_HEARTBEAT_US = 200_000
 _DURATION_US = (10_000, 30_000_000)
 _LATE = 5  # halves of its event timer until an input is late
 _ON_CHANGE, _ON_SYNC = 255, 1  # transmission types
 _CHANNEL_BITS = (1, 8, 16, 32, 64)
+_MAX_LIFE, _DEFAULT_LIFE = 255, 3
+_ON_LOST = {
+    "continue": int(lib.CANOPEN_LOST_CONTINUE),
+    "safe": int(lib.CANOPEN_LOST_SAFE),
+    "stop": int(lib.CANOPEN_LOST_STOP),
+}
 
 
 @dataclass(eq=False)
@@ -107,7 +113,10 @@ def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
     _read_number(made, table, line)
     eds = _read_eds(table)
     timeout = table.duration_us("timeout", *_DURATION_US, 1_000_000) or 1_000_000
+    table.only_one("guard", "heartbeat")
     heartbeat = table.duration_us("heartbeat", *_DURATION_US, _DEFAULT_HEARTBEAT_US) or _DEFAULT_HEARTBEAT_US
+    guard = _read_guard(table)
+    _add_losses(made, table)
     every = table.duration_us("every", 1000, _DURATION_US[1])
     synchronous = table.choice("transmission", {"change": False, "sync": True}, False)
     if synchronous and not line.sync:
@@ -116,10 +125,14 @@ def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
     if eds is None:
         return made
     made.add(int(lib.CANOPEN_PARAM_NODE), made.node, "node")
-    if eds.entry(_HEARTBEAT) is None:
-        table.mistakes.warning(
-            table.value_pos("eds"), f"{made.name} has no heartbeat (1017): its loss shows by PDOs only"
-        )
+    if guard is not None:
+        heartbeat = 0
+        _add_guard(made, guard, table, eds)
+    elif eds.entry(_HEARTBEAT) is None:
+        message = f"{made.name} has no heartbeat (1017): its loss shows by PDOs only"
+        if eds.entry(_GUARD_TIME) is not None:
+            message += '; it can be guarded: guard = { every = "T#200ms" }'
+        table.mistakes.warning(table.value_pos("eds"), message)
         heartbeat = 0
     made.add(int(lib.CANOPEN_PARAM_HEARTBEAT), heartbeat // 1000, "heartbeat")
     made.add(int(lib.CANOPEN_PARAM_TIMEOUT), timeout // 1000, "timeout")
@@ -140,6 +153,46 @@ def _read_number(made: CanopenDevice, table: Table, line: CanopenLine) -> None:
         table.error(f"{line.nodes[made.node]} has the node number {made.node}, too", "node")
     elif made.node:
         line.nodes[made.node] = made.name
+
+
+@dataclass
+class Guard:
+    """How a node is guarded: requests each `every_ms`; lost after `life` of them without a reply."""
+
+    every_ms: int
+    life: int
+
+
+def _read_guard(table: Table) -> Guard | None:
+    inner = table.table("guard")
+    if inner is None:
+        return None
+    every = inner.duration_us("every", *_DURATION_US, required="T#200ms")
+    life = inner.number("life", 1, _MAX_LIFE, _DEFAULT_LIFE) or _DEFAULT_LIFE
+    return Guard((every or _DEFAULT_HEARTBEAT_US) // 1000, life)
+
+
+def _add_guard(made: CanopenDevice, guard: Guard, table: Table, eds: Eds) -> None:
+    """The heartbeat is switched off: a node that has one replies to no guarding."""
+    if eds.entry(_GUARD_TIME) is None or eds.entry(_LIFE_TIME_FACTOR) is None:
+        table.error(f"{made.name} cannot be guarded (its EDS has no 100C and 100D); use heartbeat", "guard")
+        return
+    made.add(int(lib.CANOPEN_PARAM_GUARD), guard.every_ms, "guard")
+    made.add(int(lib.CANOPEN_PARAM_GUARD_LIFE), guard.life, "life")
+    if eds.entry(_HEARTBEAT) is not None:
+        made.writes.append((_HEARTBEAT, 0, bytes(2)))
+    made.writes.append((_GUARD_TIME, 0, guard.every_ms.to_bytes(2, "little")))
+    made.writes.append((_LIFE_TIME_FACTOR, 0, bytes([guard.life])))
+
+
+def _add_losses(made: CanopenDevice, table: Table) -> None:
+    """`required` and `on_lost`."""
+    required = table.flag("required")
+    if required:
+        table.only_one("required", "optional")
+    on_lost = table.choice("on_lost", _ON_LOST, int(lib.CANOPEN_LOST_CONTINUE))
+    made.add(int(lib.CANOPEN_PARAM_REQUIRED), int(required), "required")
+    made.add(int(lib.CANOPEN_PARAM_ON_LOST), on_lost or 0, "on_lost")
 
 
 def _read_eds(table: Table) -> Eds | None:
