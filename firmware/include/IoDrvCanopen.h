@@ -17,6 +17,14 @@ enum {
     CANOPEN_PDO_SYNC = 2,   /* sent after each SYNC, else on change */
 };
 
+/* Who sends SYNC. */
+enum {
+    CANOPEN_SYNC_NONE = 0,
+    CANOPEN_SYNC_IN_BUS_CYCLE = 1,
+    CANOPEN_SYNC_BY_TIMER = 2,
+    CANOPEN_SYNC_OF_OTHERS = 3, /* it is received */
+};
+
 /* What happens to the other nodes of the network while a node is lost. */
 enum {
     CANOPEN_LOST_CONTINUE = 0,
@@ -34,18 +42,22 @@ typedef struct {
 } CANOPEN_PDO;
 
 enum {
-    CANOPEN_PARAM_NETWORK = 1,       /* of a network: number of the CAN controller, 0 if missing */
-    CANOPEN_PARAM_NODE = 2,          /* 1..127; of a network our own, 0 or missing: no heartbeat of ours */
-    CANOPEN_PARAM_HEARTBEAT = 3,     /* [ms] of a network: ours; of a node: its own, 0 or missing: none */
-    CANOPEN_PARAM_SYNC = 4,          /* of a network: 1: a SYNC in each bus cycle */
-    CANOPEN_PARAM_TIMEOUT = 5,       /* of a node [ms]: for a reply to SDO, 1000 if missing */
-    CANOPEN_PARAM_EXPECTED = 6,      /* of a node: 1000h and 1018h:1 to 3, u32 each, 0: any */
-    CANOPEN_PARAM_CONFIG = 7,        /* of a node: its concise DCF (1F22h), bytes */
-    CANOPEN_PARAM_REQUIRED = 0xC0,   /* of a node, 1: no node is started before this one is ready for the first time */
-    CANOPEN_PARAM_ON_LOST = 0xC1,    /* of a node: CANOPEN_LOST_* */
-    CANOPEN_PARAM_GUARD = 0xC2,      /* of a node without heartbeat [ms]: period of guarding, 0 or missing: none */
-    CANOPEN_PARAM_GUARD_LIFE = 0xC3, /* periods without a reply until it is lost */
-    CANOPEN_PARAM_PDO = 0x1000,      /* + n: a CANOPEN_PDO */
+    CANOPEN_PARAM_NETWORK = 1,        /* of a network: number of the CAN controller, 0 if missing */
+    CANOPEN_PARAM_NODE = 2,           /* 1..127; of a network our own, 0 or missing: no heartbeat of ours */
+    CANOPEN_PARAM_HEARTBEAT = 3,      /* [ms] of a network: ours; of a node: its own, 0 or missing: none */
+    CANOPEN_PARAM_SYNC = 4,           /* of a network: CANOPEN_SYNC_* */
+    CANOPEN_PARAM_TIMEOUT = 5,        /* of a node [ms]: for a reply to SDO, 1000 if missing */
+    CANOPEN_PARAM_EXPECTED = 6,       /* of a node: 1000h and 1018h:1 to 3, u32 each, 0: any */
+    CANOPEN_PARAM_CONFIG = 7,         /* of a node: its concise DCF (1F22h), bytes */
+    CANOPEN_PARAM_REQUIRED = 0xC0,    /* of a node, 1: no node is started before this one is ready for the first time */
+    CANOPEN_PARAM_ON_LOST = 0xC1,     /* of a node: CANOPEN_LOST_* */
+    CANOPEN_PARAM_GUARD = 0xC2,       /* of a node without heartbeat [ms]: period of guarding, 0 or missing: none */
+    CANOPEN_PARAM_GUARD_LIFE = 0xC3,  /* periods without a reply until it is lost */
+    CANOPEN_PARAM_SYNC_EVERY = 0xC4,  /* of a network [us]: period of CANOPEN_SYNC_BY_TIMER */
+    CANOPEN_PARAM_SYNC_WINDOW = 0xC5, /* [us] from SYNC to the event of the window, 0 or missing: none */
+    CANOPEN_PARAM_SYNC_EVENT = 0xC6,  /* text: name of the event at each SYNC */
+    CANOPEN_PARAM_WINDOW_EVENT = 0xC7, /* text: name of the event at the end of the window */
+    CANOPEN_PARAM_PDO = 0x1000,        /* + n: a CANOPEN_PDO */
     /* To be read only, u32 each, of a node: */
     CANOPEN_PARAM_BOOTS = 0x8000,
     CANOPEN_PARAM_LOST = 0x8001,

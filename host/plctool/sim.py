@@ -29,6 +29,8 @@ from plctool.iec.areas import Area
 from plctool.iec.types import Type
 from plctool.image.file import image_crc, parse_image, read_program
 from plctool.image.targets import host_target
+from plctool.io.canopen.events import posted_events
+from plctool.io.configuration import configuration_of_image
 from plctool.link import l7, traces
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
@@ -248,10 +250,13 @@ class Simulator(Controller):
         progress(len(data))
 
     def _add_events(self, image: bytes) -> None:
-        """The simulated device has every external event that the program waits for."""
+        """The simulated device has every external event that the program waits for and no driver posts."""
         with suppress(UsageError):  # a bad image is refused with the reason of the device
-            for task in parse_image(image).tasks:
-                if task.external:
+            parsed = parse_image(image)
+            configuration = configuration_of_image(parsed)
+            posted = posted_events(configuration) if configuration is not None else set()
+            for task in parsed.tasks:
+                if task.external and task.external not in posted:
                     _check(self._lib.SimAddEvent(task.external.encode("ascii")), "The simulator has too many events")
 
     def post(self, event: str) -> None:

@@ -127,6 +127,37 @@ def test_foreign_node_is_guarded(hub: CanHub, tmp_path: Path, tool: Any) -> None
         assert "Valves is lost: it does not reply to guarding" in [entry.text for entry in plc.log()]
 
 
+BY_SYNC = """
+VAR_GLOBAL motions : UDINT; END_VAR
+PROGRAM Main VAR inputs, coils : BYTE; door : BOOL; pressure : INT; END_VAR coils := inputs; END_PROGRAM
+PROGRAM Motion motions := motions + 1; END_PROGRAM
+CONFIGURATION Plant RESOURCE Cpu ON Plc
+TASK Slow(INTERVAL := T#100ms, PRIORITY := 5);
+TASK Fast(EVENT := 'Bus.sync', PRIORITY := 1);
+PROGRAM m WITH Slow : Main;
+PROGRAM x WITH Fast : Motion;
+END_RESOURCE END_CONFIGURATION
+"""
+
+
+def test_task_runs_by_the_sync_that_a_timer_sends(hub: CanHub, tmp_path: Path, tool: Any) -> None:
+    image = tmp_path / "app.cdl"
+    program = write_program(tmp_path, line='sync = { every = "T#20ms", window = "T#5ms" }', source=BY_SYNC)
+    built = tool("build", str(program), "-o", str(image))
+    assert built.status == 0, built.err
+    options = ("--can", f"slcan:{hub.paths[0]}", "--node", "5")
+    with Plcrt(tmp_path / "flash", *options), connect(f"can:slcan:{hub.paths[1]}?node=5") as plc:
+        plc.flash(image)
+        with open_bus(f"slcan:{hub.paths[2]}", 500000, 0) as bus:
+            times = []
+            while len(times) < 50:
+                frame = bus.recv(10)
+                assert frame is not None
+                times += [frame.timestamp] if frame.arbitration_id == 0x80 else []
+        eventually(lambda: plc.read("motions") >= 50)
+        assert times[-1] - times[0] > 49 * 0.02 - 0.1
+
+
 def do(plc: Plc, block: str, **inputs: Any) -> tuple[bool, int]:
     """What a block says of a job that begins now."""
     has_error = block != "state"

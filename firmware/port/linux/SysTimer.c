@@ -26,7 +26,7 @@
 #include <time.h>
 
 enum {
-    MAX_TIMERS = APP_MAX_TASKS + 1, /* and the watchdog */
+    MAX_TIMERS = APP_MAX_TASKS + 1 + 2 * CAN_CONTROLLERS, /* the watchdog; SYNC and its window */
     STACK_STEP = PORT_STACK_GUARD + PORT_STACK_SIZE,
 };
 #define NEVER INT64_MAX

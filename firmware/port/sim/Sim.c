@@ -35,7 +35,7 @@
 #define COMM_PAUSE_NS ((RTS_I64)NS_PER_MS / 4)
 #define RUN_LIMIT_NS (SIM_RUN_LIMIT_MS * (RTS_I64)NS_PER_MS)
 
-enum { MAX_TIMERS = APP_MAX_TASKS + 4 };
+enum { MAX_TIMERS = APP_MAX_TASKS + 4 + 2 * CAN_CONTROLLERS };
 
 typedef struct {
     SYS_TIMER_CALLBACK callback; /* NULL: free */

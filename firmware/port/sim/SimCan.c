@@ -52,6 +52,7 @@ static struct {
     RTS_UI32 data_bit_rate;
     CAN_ADDRESS address;
     PF_CAN_URGENT urgent;
+    void (*catch_up)(void);
     RTS_I64 now_ns;
     RTS_I64 end_ns; /* of what is on the bus; NEVER: it is free */
     bool broken;    /* what is on the bus ends with an error */
@@ -412,6 +413,11 @@ void SimCanReset(RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
     bus.address = (CAN_ADDRESS){CAN_ID_BASE, 1};
 }
 
+void SimCanSetClock(void (*catch_up)(void))
+{
+    bus.catch_up = catch_up;
+}
+
 void SimCanSetAddress(RTS_UI32 node, RTS_UI32 base)
 {
     bus.address = (CAN_ADDRESS){base, node};
@@ -555,6 +561,8 @@ RTS_RESULT SysCanSetFilters(RTS_UI32 index, const CAN_FILTER *filters, RTS_UI32 
 RTS_RESULT SysCanSend(RTS_UI32 index, const CAN_FRAME *frame)
 {
     RTS_UNUSED(index);
+    if (bus.catch_up != NULL)
+        bus.catch_up();
     return SimCanSend(SIM_CAN_DEVICE, frame);
 }
 

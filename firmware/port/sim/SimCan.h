@@ -17,6 +17,10 @@ enum { SIM_CAN_NODES = 16, SIM_CAN_QUEUE = 64, SIM_CAN_DEVICE = 0 };
 /* A new bus; all nodes are stopped and have no filters. `data_bit_rate` 0: no FD. */
 void SimCanReset(RTS_UI32 bit_rate, RTS_UI32 data_bit_rate);
 
+/* `catch_up` is called before each frame of the device, to let the bus's time pass until now. NULL: time passes only in
+ * SimCanAdvance. */
+void SimCanSetClock(void (*catch_up)(void));
+
 /* Number and base of the identifiers of the device (SysCanGetAddress). */
 void SimCanSetAddress(RTS_UI32 node, RTS_UI32 base);
 

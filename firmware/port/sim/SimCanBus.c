@@ -19,6 +19,7 @@
 enum { TEST = 1, HEARD = 4096 };
 
 static struct {
+    bool is_catching_up;
     RTS_UI32 frames; /* on the bus when main made its last pass */
     RTS_UI32 first;
     RTS_UI32 count;
@@ -62,6 +63,16 @@ static void advance(RTS_I64 now_ns)
     hear();
 }
 
+/* A frame that a task or a timer sends is not sent before its time. */
+static void catch_up(void)
+{
+    if (sim_bus.is_catching_up)
+        return;
+    sim_bus.is_catching_up = true;
+    advance(SimNow());
+    sim_bus.is_catching_up = false;
+}
+
 RTS_I64 SimCanBusGetDueNs(RTS_I64 now_ns)
 {
     advance(now_ns);
@@ -99,6 +110,7 @@ RTS_RESULT SimCanBus_Hook(CMP_HOOK hook)
     if (hook == CH_INIT_SYSTEM) {
         memset(&sim_bus, 0, sizeof(sim_bus));
         SimCanReset(CAN_BIT_RATE, 0);
+        SimCanSetClock(catch_up);
         SimCanStart(TEST);
         SimCanopenForget();
     }

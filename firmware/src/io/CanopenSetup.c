@@ -13,7 +13,7 @@
 
 #if CANOPEN_MAX_DEVICES > 0
 
-enum { DEFAULT_TIMEOUT_MS = 1000, MAX_MS = 60000, MAX_LIFE = 255 };
+enum { DEFAULT_TIMEOUT_MS = 1000, MAX_MS = 60000, MAX_LIFE = 255, LEAST_SYNC_US = 500, MAX_US = 1000 * MAX_MS };
 
 static RTS_UI32 number(const IoConfigConnector *connector, RTS_UI32 id, RTS_UI32 otherwise)
 {
@@ -118,6 +118,16 @@ static RTS_RESULT add_device(CANOPEN_SETUP *setup, CANOPEN_LINE *line, const IoC
     return result;
 }
 
+static bool read_sync(CANOPEN_SYNC_STATE *sync, const IoConfigConnector *connector)
+{
+    sync->kind = number(connector, CANOPEN_PARAM_SYNC, CANOPEN_SYNC_NONE);
+    sync->every_us = number(connector, CANOPEN_PARAM_SYNC_EVERY, 0);
+    sync->window_us = number(connector, CANOPEN_PARAM_SYNC_WINDOW, 0);
+    sync->timer = sync->window_timer = sync->sync_event = sync->window_event = RTS_INVALID_HANDLE;
+    return sync->every_us <= MAX_US && sync->window_us <= MAX_US &&
+           (sync->kind != CANOPEN_SYNC_BY_TIMER || sync->every_us >= LEAST_SYNC_US);
+}
+
 static RTS_RESULT add_line(CANOPEN_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connector)
 {
     RTS_UI32 network = number(connector, CANOPEN_PARAM_NETWORK, 0);
@@ -137,7 +147,8 @@ static RTS_RESULT add_line(CANOPEN_SETUP *setup, const IO_DRIVER *driver, const 
     line->network = network;
     line->own_node = (RTS_UI8)number(connector, CANOPEN_PARAM_NODE, 0);
     line->heartbeat_ms = number(connector, CANOPEN_PARAM_HEARTBEAT, 0);
-    line->sync = number(connector, CANOPEN_PARAM_SYNC, 0) != 0;
+    if (!read_sync(&line->sync, connector))
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its SYNC cannot be.");
     line->devices = setup->devices + setup->device_count;
     setup->line_count++;
     for (RTS_UI32 i = index + 1; result == ERR_OK && (child = IoMgrConfigGetConnector(i)) != NULL; i++) {

@@ -28,6 +28,18 @@ typedef struct {
     RTS_UI32 sent_ms;
 } CANOPEN_PDO_STATE;
 
+/* Handles that are not in use are RTS_INVALID_HANDLE. */
+typedef struct {
+    RTS_UI32 kind; /* CANOPEN_SYNC_* */
+    RTS_UI32 every_us;
+    RTS_UI32 window_us; /* 0: there is none */
+    RTS_HANDLE timer;
+    RTS_HANDLE window_timer;
+    RTS_HANDLE sync_event;
+    RTS_HANDLE window_event;
+    RTS_UI32 is_open; /* the end of the window is to come */
+} CANOPEN_SYNC_STATE;
+
 typedef struct CANOPEN_LINE CANOPEN_LINE;
 
 typedef struct {
@@ -52,7 +64,7 @@ struct CANOPEN_LINE {
     RTS_UI8 own_node;
     RTS_UI32 heartbeat_ms;
     RTS_UI32 heartbeat_sent_ms;
-    bool sync;
+    CANOPEN_SYNC_STATE sync;
     RTS_UI32 is_safe; /* outputs are those of the safe state; for tasks */
     bool attached;
     bool was_off;

@@ -14,6 +14,7 @@
 #include "AppState.h"
 #include "CanopenCalls.h"
 #include "CanopenDriver.h"
+#include "CanopenSync.h"
 #include "CmpIoMgrEmbedded.h"
 #include "CmpLog.h"
 #include "IecCan.h"
@@ -66,6 +67,8 @@ static bool take_urgent(RTS_UI32 index, const CAN_FRAME *frame)
 {
     CANOPEN_PDO_STATE *state = setup.lines[index].by_cob[frame->id & 0x7FF];
 
+    if (frame->id == CANOPEN_SYNC && (frame->flags & CAN_FLAG_REMOTE) == 0)
+        CanopenSyncTake(&setup.lines[index]);
     if (state == NULL || (frame->flags & CAN_FLAG_REMOTE) != 0)
         return false;
     if (frame->size < state->pdo.size)
@@ -122,6 +125,8 @@ static void release(CANOPEN_LINE *line)
     FOR_EACH_DEVICE (line, device)
         if (device->node.state == MASTER_RUNS || device->node.state == MASTER_START)
             (void)CanopenSendNmt(send, line, NMT_PREOPERATIONAL, device->node.node);
+    if (line->attached)
+        CanopenSyncEnd(line);
     if (line->attached)
         CanDetach(line->network, &line->user);
     line->attached = false;
@@ -182,6 +187,8 @@ static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
         if (result == ERR_OK) {
             leave_out_refused(line);
             result = attach(line);
+            if (result == ERR_OK)
+                result = CanopenSyncBegin(line);
         }
     is_running = result == ERR_OK;
     return result;
@@ -276,14 +283,12 @@ static void send_output(CANOPEN_LINE *line, CANOPEN_PDO_STATE *state, RTS_UI32 r
 
 static RTS_RESULT start_bus_cycle(const IoConfigConnector *connector)
 {
-    static const CAN_FRAME sync = {.id = CANOPEN_SYNC};
     RTS_UI32 now_ms = SysTimeGetMs();
 
     FOR_EACH_LINE (line) {
         if (line->connector != connector || !line->attached)
             continue;
-        if (line->sync)
-            (void)send(line, &sync);
+        CanopenSyncInBusCycle(line);
         FOR_EACH_DEVICE (line, device) {
             RTS_UI32 run = SysAtomicLoad(&device->runs);
             for (RTS_UI32 i = 0; i < device->pdo_count && run != 0; i++)

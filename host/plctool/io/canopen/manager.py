@@ -26,7 +26,7 @@ from pathlib import Path
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
 from plctool.files import check_inside
-from plctool.iec.types import BYTE, LREAL, REAL, UDINT, ArrayType, Type
+from plctool.iec.types import BYTE, LREAL, REAL, UDINT, ArrayType, StringType, Type
 from plctool.io.canopen.data_types import Value
 from plctool.io.canopen.eds import WRITABLE, Eds, load_eds
 from plctool.io.canopen.eds import Entry as EdsEntry
@@ -44,6 +44,7 @@ _GUARD_TIME, _LIFE_TIME_FACTOR, _HEARTBEAT = 0x100C, 0x100D, 0x1017
 _TYPE, _IDENTITY = 0x1000, 0x1018
 _DEFAULT_HEARTBEAT_US = 200_000
 _DURATION_US = (10_000, 30_000_000)
+_SYNC_US = (1000, 10_000_000)
 _LATE = 5  # halves of its event timer until an input is late
 _ON_CHANGE, _ON_SYNC = 255, 1  # transmission types
 _CHANNEL_BITS = (1, 8, 16, 32, 64)
@@ -94,18 +95,55 @@ def read_canopen(table: Table, context: Context) -> list[Connector]:
     network = table.number("network", 0, 15, 0) or 0
     line.takes = f"the CAN network {network}"
     line.node = table.number("node", 1, MAX_NODE) or 0
-    line.sync = table.flag("sync")
+    sync = _read_sync(table, line.name)
+    line.sync = sync.kind != lib.CANOPEN_SYNC_NONE
     heartbeat = table.duration_us("heartbeat", *_DURATION_US, _DEFAULT_HEARTBEAT_US) or 0
     for number, value, name in (
         (lib.CANOPEN_PARAM_NETWORK, network, "network"),
         (lib.CANOPEN_PARAM_NODE, line.node, "node"),
         (lib.CANOPEN_PARAM_HEARTBEAT, heartbeat // 1000, "heartbeat"),
-        (lib.CANOPEN_PARAM_SYNC, int(line.sync), "sync"),
+        (lib.CANOPEN_PARAM_SYNC, sync.kind, "sync"),
+        (lib.CANOPEN_PARAM_SYNC_EVERY, sync.every_us, "sync_every"),
+        (lib.CANOPEN_PARAM_SYNC_WINDOW, sync.window_us, "sync_window"),
     ):
         line.parameters.append(Parameter(int(number), UDINT, value, name))
+    for number, event, name in sync.events(line.name):
+        line.parameters.append(Parameter(number, StringType(len(event)), event, name))
     if line.node:
         line.nodes[line.node] = "this PLC"
     return [line, *each(table.tables("device"), lambda inner: _read_device(inner, line))]
+
+
+@dataclass
+class Sync:
+    """Who sends SYNC (`kind`: CANOPEN_SYNC_*), how often, and when its window ends; 0: it has none."""
+
+    kind: int = int(lib.CANOPEN_SYNC_NONE)
+    every_us: int = 0
+    window_us: int = 0
+
+    def events(self, line: str) -> Iterator[tuple[int, str, str]]:
+        """Those that tasks may wait for: the parameter, the name, the name of the parameter."""
+        if self.kind != lib.CANOPEN_SYNC_NONE:
+            yield int(lib.CANOPEN_PARAM_SYNC_EVENT), f"{line}.sync", "sync_event"
+        if self.window_us:
+            yield int(lib.CANOPEN_PARAM_WINDOW_EVENT), f"{line}.window", "window_event"
+
+
+def _read_sync(table: Table, line: str) -> Sync:
+    """`sync`: true, or a table."""
+    if not isinstance(table.raw("sync"), dict):
+        return Sync(int(lib.CANOPEN_SYNC_IN_BUS_CYCLE if table.flag("sync") else lib.CANOPEN_SYNC_NONE))
+    inner = table.table("sync")
+    assert inner is not None
+    produce = inner.flag("produce", True)
+    every = inner.duration_us("every", *_SYNC_US, required="T#10ms" if produce else "")
+    window = inner.duration_us("window", *_SYNC_US) or 0
+    if every is not None and window >= every:
+        inner.error(f"the window has to end before the next SYNC of {line}", "window")
+    inner.close()
+    kind = lib.CANOPEN_SYNC_BY_TIMER if produce else lib.CANOPEN_SYNC_OF_OTHERS
+    return Sync(int(kind), every or 0, window)
 
 
 def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
@@ -169,6 +207,7 @@ def _read_guard(table: Table) -> Guard | None:
         return None
     every = inner.duration_us("every", *_DURATION_US, required="T#200ms")
     life = inner.number("life", 1, _MAX_LIFE, _DEFAULT_LIFE) or _DEFAULT_LIFE
+    inner.close()
     return Guard((every or _DEFAULT_HEARTBEAT_US) // 1000, life)
 
 

@@ -1,0 +1,128 @@
+"""SYNC of a timer and of another device, and tasks that run by it, on virtual time."""
+
+from __future__ import annotations
+
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from canopen_programs import write_program
+
+from plctool.compiler.syntax.diagnostics import CompileError
+from plctool.sim import Simulator
+
+SYNC, NMT, TPDO, RPDO = 0x080, 0x000, 0x189, 0x209
+FRAME_NS = 300_000  # the longest frame at 500 kbit/s, with its pause
+SOURCE = """
+VAR_GLOBAL motions, answers : UDINT; END_VAR
+PROGRAM Main
+VAR inputs, coils : BYTE; door : BOOL; pressure : INT; END_VAR
+coils := inputs;
+END_PROGRAM
+PROGRAM Motion
+motions := motions + 1;
+END_PROGRAM
+PROGRAM Answer
+answers := answers + 1;
+END_PROGRAM
+CONFIGURATION Plant
+RESOURCE Cpu ON Plc
+{tasks}
+END_RESOURCE
+END_CONFIGURATION
+"""
+CYCLIC = "TASK Slow(INTERVAL := T#100ms, PRIORITY := 5);\nPROGRAM m WITH Slow : Main;\n"
+BY_SYNC = "TASK Motion(EVENT := 'Bus.sync', PRIORITY := 1);\nPROGRAM x WITH Motion : Motion;\n"
+BY_WINDOW = "TASK Answer(EVENT := 'Bus.window', PRIORITY := 2);\nPROGRAM a WITH Answer : Answer;\n"
+IN_SYNC = "TASK Motion(EVENT := 'Bus.sync', PRIORITY := 1);\nPROGRAM m WITH Motion : Main;\n"
+EVERY = 'sync = { every = "T#5ms", window = "T#2ms" }'
+
+
+def of(folder: Path, tasks: str, line: str = EVERY, device: str = 'transmission = "sync"') -> Simulator:
+    """A program with these tasks."""
+    return Simulator.from_sources(
+        write_program(folder, line=line, device=device, source=SOURCE.replace("{tasks}", tasks))
+    )
+
+
+def test_timer_sends_sync_in_its_period_whatever_the_tasks_do(tmp_path: Path) -> None:
+    with of(tmp_path, CYCLIC + BY_SYNC) as plc:
+        plc.run_for(500)
+        plc.can_receive()
+        plc.run_for(1000)
+        times = [f.time_ns for f in plc.can_receive() if f.id == SYNC]
+        assert len(times) == 200
+        assert all(abs(b - a - 5_000_000) <= FRAME_NS for a, b in pairwise(times))
+
+
+def test_tasks_run_at_each_sync_and_at_the_end_of_each_window(tmp_path: Path) -> None:
+    with of(tmp_path, CYCLIC + BY_SYNC + BY_WINDOW) as plc:
+        plc.run_for(500)
+        before = plc.read("motions"), plc.read("answers")
+        plc.run_for(1000)
+        assert (plc.read("motions") - before[0], plc.read("answers") - before[1]) == (200, 200)
+
+
+def test_outputs_of_a_task_that_runs_by_sync_leave_after_it(tmp_path: Path) -> None:
+    with of(tmp_path, IN_SYNC) as plc:
+        plc.run_for(500)
+        plc.set_input("Main.inputs", 0x5A)
+        plc.run_for(30)
+        assert plc.output("Main.coils") == 0x5A
+        plc.can_receive()
+        plc.run_for(500)
+        frames = [f for f in plc.can_receive() if f.id in (SYNC, TPDO, RPDO)]
+        assert [f.id for f in frames].count(RPDO) == 100
+        syncs = [f.time_ns for f in frames if f.id == SYNC]
+        outputs = [f.time_ns for f in frames if f.id == RPDO]
+        assert all(0 < out - sync < 3 * FRAME_NS for sync, out in zip(syncs, outputs, strict=True))
+
+
+def test_values_of_all_nodes_pass_within_two_periods_of_sync(tmp_path: Path) -> None:
+    with of(tmp_path, IN_SYNC) as plc:
+        plc.run_for(500)
+        for value in range(1, 200):  # at every phase of the period
+            plc.set_input("Main.inputs", value)
+            plc.run_for(11)
+            assert plc.read("Main.inputs") == value
+
+
+def test_sync_of_another_device_runs_the_tasks(tmp_path: Path) -> None:
+    with of(tmp_path, CYCLIC + BY_SYNC + BY_WINDOW, 'sync = { produce = false, window = "T#2ms" }') as plc:
+        plc.run_for(500)
+        assert [f for f in plc.can_receive() if f.id == SYNC] == []
+        assert plc.read("motions") == 0
+        for _ in range(50):
+            plc.can_send(SYNC, b"")
+            plc.run_for(7)
+        assert (plc.read("motions"), plc.read("answers")) == (50, 50)
+
+
+def test_sync_goes_on_while_the_program_is_stopped_and_ends_with_its_description(tmp_path: Path) -> None:
+    with of(tmp_path, CYCLIC + BY_SYNC) as plc:
+        plc.run_for(500)
+        plc.stop()
+        plc.can_receive()
+        plc.run_for(100)
+        assert [f.id for f in plc.can_receive()].count(SYNC) == 20
+        plc.start()
+        plc.run_for(100)
+        assert plc.read("Valves.ok")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("sync = {}", "needs every"),
+        ('sync = { every = "T#5ms", window = "T#5ms" }', "the window has to end before the next SYNC of Bus"),
+        ("sync = 3", "sync is"),
+        ('sync = { every = "T#5ms", counter = 3 }', "there is no 'counter' here"),
+    ],
+)
+def test_mistakes_of_sync_are_reported(tmp_path: Path, line: str, message: str) -> None:
+    with pytest.raises(CompileError, match=message):
+        of(tmp_path, CYCLIC, line)
