@@ -569,6 +569,14 @@
 #define CAN_BIT_RATE 500000
 #endif
 
+/* Frames that wait in the driver of a CAN controller: to be sent, and received, a power of two (24 bytes each). */
+#ifndef CAN_DRIVER_TX_FRAMES
+#define CAN_DRIVER_TX_FRAMES 16
+#endif
+#ifndef CAN_DRIVER_RX_FRAMES
+#define CAN_DRIVER_RX_FRAMES 32
+#endif
+
 /* The serial line that carries CAN frames, where there is no controller (CanOnSerial.c). */
 #ifndef CAN_SLCAN_LINE
 #define CAN_SLCAN_LINE 1

@@ -5,8 +5,6 @@
  *
  * The line is number CAN_SLCAN_LINE of SysCom.h, which no other driver may use: COM_MAX_LINES is not above it.
  */
-#include "CmpSettingsEmbedded.h"
-#include "CmpSrvNumbers.h"
 #include "Slcan.h"
 #include "SysCan.h"
 #include "SysCom.h"
@@ -32,13 +30,6 @@ static RTS_UI32 write_line(const RTS_UI8 *data, RTS_UI32 size)
 RTS_UI32 SysCanGetCount(void)
 {
     return SysComGetCount() > CAN_SLCAN_LINE;
-}
-
-void SysCanGetAddress(RTS_UI32 index, CAN_ADDRESS *address)
-{
-    RTS_UNUSED(index);
-    address->base = (RTS_UI32)SettgGetIntValue("CmpBlkDrvCan", "Base", CAN_ID_BASE);
-    address->node = (RTS_UI32)SettgGetIntValue("CmpBlkDrvCan", "Node", CAN_NODE);
 }
 
 RTS_RESULT SysCanOpen(RTS_UI32 index, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)

@@ -57,6 +57,11 @@ void OneUartInterrupt(void)
     transmit();
 }
 
+void OneUartNoteWork(void)
+{
+    line.work = true;
+}
+
 bool BoardHasWork(void)
 {
     bool was = line.work;

@@ -11,6 +11,9 @@
 /* To be called by the UART's interrupt, after what it does not clear by itself has been cleared. */
 void OneUartInterrupt(void);
 
+/* Main has something to do: of other interrupts of the board. */
+void OneUartNoteWork(void);
+
 /* ---- what the board writes; all but UartStart, UartStop and UartIsOn with interrupts masked ---- */
 
 /* Forgets what is in the FIFOs, and sends and receives from now on, with an interrupt for a received byte and for room to

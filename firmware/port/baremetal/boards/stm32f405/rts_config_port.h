@@ -18,6 +18,11 @@
 #undef FILE_STORE_SIZE
 #define FILE_STORE_SIZE 0u
 
+/* CAN1, in the configuration with CAN. */
+#if defined COMM_ENDPOINTS && COMM_ENDPOINTS > 0
+#define BOARD_CAN_COUNT 1
+#endif
+
 #include "rts_config_cortexm.h"
 
 #define BOARD_TARGET_ID TARGET_ID_CORTEX_M4F
