@@ -4,8 +4,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Mailboxes are sent by identifier (TXFP 0). Of one identifier only one frame is in them, and the last free one is for
- * frames of 11 bits: so none of these waits behind frames of tools. FIFO 0 receives frames of 11 bits, FIFO 1 others.
- * Bus off is ended by SysCanRestart (ABOM 0).
+ * frames of 11 bits, which so need not wait for those of tools. FIFO 0 receives frames of 11 bits, FIFO 1 others. Bus off
+ * is ended by SysCanRestart (ABOM 0).
  */
 #include "BxCan.h"
 
@@ -58,7 +58,6 @@ typedef struct {
     RTS_UI32 bit_rate;
     RTS_UI32 overruns;
     RTS_UI32 rank[MAILBOXES]; /* of what is in a mailbox */
-    PF_CAN_URGENT volatile urgent;
     CAN_TX tx;
     CAN_RX rx;
 } CONTROLLER;
@@ -84,8 +83,7 @@ static void fill(RTS_UI32 index, RTS_UI32 mailbox, const CAN_FRAME *frame)
     RTS_UI32 id = (frame->flags & CAN_FLAG_EXTENDED) != 0 ? frame->id << IR_EXTENDED_SHIFT | IR_EXTENDED
                                                           : frame->id << IR_STANDARD_SHIFT;
 
-    for (RTS_UI32 i = 0; i < frame->size; i++)
-        words[i / 4] |= (RTS_UI32)frame->data[i] << 8 * (i % 4);
+    CanToWords(frame->data, frame->size, words);
     if ((frame->flags & CAN_FLAG_REMOTE) != 0)
         id |= IR_REMOTE;
     controllers[index].rank[mailbox] = CanRank(frame);
@@ -153,21 +151,10 @@ static void read_frame(RTS_UI32 index, RTS_UI32 fifo, CAN_FRAME *frame)
     frame->id = (id & IR_EXTENDED) != 0 ? id >> IR_EXTENDED_SHIFT : id >> IR_STANDARD_SHIFT;
     frame->size = (RTS_UI8)(size < CAN_CLASSIC_SIZE ? size : CAN_CLASSIC_SIZE);
     frame->time_us = (RTS_UI32)(SysTimeGetNs() / 1000);
-    if ((id & IR_REMOTE) != 0) {
+    if ((id & IR_REMOTE) != 0)
         frame->flags |= CAN_FLAG_REMOTE;
-        return;
-    }
-    for (RTS_UI32 i = 0; i < frame->size; i++)
-        frame->data[i] = (RTS_UI8)(words[i / 4] >> 8 * (i % 4));
-}
-
-static void take(RTS_UI32 index, const CAN_FRAME *frame)
-{
-    PF_CAN_URGENT urgent = controllers[index].urgent;
-
-    if (urgent != NULL && (frame->flags & CAN_FLAG_EXTENDED) == 0 && urgent(index, frame))
-        return;
-    CanRxPut(&controllers[index].rx, frame);
+    else
+        CanFromWords(words, frame->size, frame->data);
 }
 
 static void receive(RTS_UI32 index, RTS_UI32 fifo)
@@ -180,7 +167,7 @@ static void receive(RTS_UI32 index, RTS_UI32 fifo)
         controllers[index].overruns += (status & RFR_OVERRUN) != 0;
         ChipWrite(at(index, RFR(fifo)), RFR_RELEASE | (status & RFR_OVERRUN));
         (void)ChipWaitFor(at(index, RFR(fifo)), RFR_RELEASE, 0);
-        take(index, &frame);
+        CanRxPut(&controllers[index].rx, index, &frame);
     }
 }
 
@@ -206,7 +193,7 @@ RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)
 /* The interrupt is above main: the handler does not run while main is here. */
 void SysCanSetUrgent(RTS_UI32 index, PF_CAN_URGENT handler)
 {
-    controllers[index].urgent = handler;
+    controllers[index].rx.urgent = handler;
 }
 #endif
 

@@ -61,7 +61,7 @@ bool CanTxTake(CAN_TX *tx, const RTS_UI32 *busy, RTS_UI32 count, bool only_stand
 
 /* ---- received ---- */
 
-void CanRxPut(CAN_RX *rx, const CAN_FRAME *frame)
+static void add(CAN_RX *rx, const CAN_FRAME *frame)
 {
     if (rx->head - SysAtomicLoad(&rx->tail) == CAN_DRIVER_RX_FRAMES) {
         rx->lost++;
@@ -71,6 +71,15 @@ void CanRxPut(CAN_RX *rx, const CAN_FRAME *frame)
     SysAtomicStore(&rx->head, rx->head + 1);
 }
 
+void CanRxPut(CAN_RX *rx, RTS_UI32 index, const CAN_FRAME *frame)
+{
+    PF_CAN_URGENT urgent = rx->urgent;
+    bool is_standard = (frame->flags & CAN_FLAG_EXTENDED) == 0;
+
+    if (urgent == NULL || !is_standard || !urgent(index, frame))
+        add(rx, frame);
+}
+
 bool CanRxTake(CAN_RX *rx, CAN_FRAME *frame)
 {
     if (SysAtomicLoad(&rx->head) == rx->tail)
@@ -78,6 +87,20 @@ bool CanRxTake(CAN_RX *rx, CAN_FRAME *frame)
     *frame = rx->frame[rx->tail % CAN_DRIVER_RX_FRAMES];
     SysAtomicStore(&rx->tail, rx->tail + 1);
     return true;
+}
+
+/* ---- data ---- */
+
+void CanToWords(const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *words)
+{
+    for (RTS_UI32 i = 0; i < size; i++)
+        words[i / 4] = (i % 4 == 0 ? 0 : words[i / 4]) | (RTS_UI32)data[i] << 8 * (i % 4);
+}
+
+void CanFromWords(const RTS_UI32 *words, RTS_UI32 size, RTS_UI8 *data)
+{
+    for (RTS_UI32 i = 0; i < size; i++)
+        data[i] = (RTS_UI8)(words[i / 4] >> 8 * (i % 4));
 }
 
 /* ---- bit timing ---- */

@@ -17,8 +17,9 @@ typedef struct {
     CAN_FRAME frame[CAN_DRIVER_TX_FRAMES];
 } CAN_TX;
 
-/* Received frames; positions run freely. */
+/* Received frames; positions run freely. `urgent` gets those of 11 bits first (SysCanSetUrgent). */
 typedef struct {
+    PF_CAN_URGENT volatile urgent;
     RTS_UI32 head;
     RTS_UI32 tail;
     RTS_UI32 lost;
@@ -35,7 +36,8 @@ bool CanTxPut(CAN_TX *tx, const CAN_FRAME *frame);
  * the controller. `only_standard`: only one of 11 bits. False: there is none. */
 bool CanTxTake(CAN_TX *tx, const RTS_UI32 *busy, RTS_UI32 count, bool only_standard, CAN_FRAME *frame);
 
-void CanRxPut(CAN_RX *rx, const CAN_FRAME *frame);
+/* In the interrupt: a frame of controller `index`. */
+void CanRxPut(CAN_RX *rx, RTS_UI32 index, const CAN_FRAME *frame);
 bool CanRxTake(CAN_RX *rx, CAN_FRAME *frame);
 
 /* Most of each part of a bit that a controller can have. */
@@ -52,6 +54,10 @@ typedef struct {
     RTS_UI16 segment2;
     RTS_UI16 jump;
 } CAN_TIMING;
+
+/* Bytes of data in 32-bit registers, the first byte lowest; CanToWords also clears the rest of the last one. */
+void CanToWords(const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *words);
+void CanFromWords(const RTS_UI32 *words, RTS_UI32 size, RTS_UI8 *data);
 
 /* Of the settings that give exactly this bit rate the one whose sample point is nearest to 87.5 % (CiA 601). False: there
  * is none. */
