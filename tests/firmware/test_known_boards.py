@@ -18,8 +18,11 @@ def configurations(board: Path) -> set[str]:
     build = (BAREMETAL / "meson.build").read_text()
     match = re.search(r"configs = \[(.*?)\] \+ \(board_has_second_uart \? \[(.*?)\] : \[\]\)", build)
     assert match
-    second_uart = "board_has_second_uart = true" in (board / "meson.build").read_text()
-    return set(re.findall(r"'(\w+)'", match[1] + (match[2] if second_uart else "")))
+    text = (board / "meson.build").read_text()
+    own_can = {"can"} if "board_can_sources = " in text else set()
+    return own_can | set(
+        re.findall(r"'(\w+)'", match[1] + (match[2] if "board_has_second_uart = true" in text else ""))
+    )
 
 
 def test_all_boards_are_known_with_their_configurations() -> None:
