@@ -21,6 +21,8 @@ SHARED = [
     "IoDrvSim.h",
     "IoDrvModbus.h",
     "IoDrvCanopen.h",
+    "CanopenObject.h",
+    "IoDrvCanopenDevice.h",
     "IoDrvSysfs.h",
     "CmpIecAbi.h",
     "SysExcept.h",

@@ -108,6 +108,7 @@ enum {
     CMPID_IecCan = 0x0051,
     CMPID_SimCanBus = 0x0052,
     CMPID_IoDrvCanopen = 0x0053,
+    CMPID_IoDrvCanopenDevice = 0x00B8,
     CMPID_IecClock = 0x0072,
     CMPID_IecTaskCalls = 0x00A1,
     CMPID_CmpLogKeep = 0x00AC,

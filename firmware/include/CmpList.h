@@ -24,7 +24,7 @@
 #if IO_MAX_CONNECTORS == 0
 #error "HAS_CmpIoMgrEmbedded: set IO_MAX_CONNECTORS, the devices and buses of a program, in rts_config_port.h."
 #endif
-#elif HAS_CmpIoMgrSrv || HAS_IoDrvSim || HAS_IoDrvGpio || HAS_IoDrvModbus || HAS_IoDrvCanopen
+#elif HAS_CmpIoMgrSrv || HAS_IoDrvSim || HAS_IoDrvGpio || HAS_IoDrvModbus || HAS_IoDrvCanopen || HAS_IoDrvCanopenDevice
 #error "HAS_CmpIoMgrSrv and each HAS_IoDrv... need HAS_CmpIoMgrEmbedded in cmp_list.c."
 #endif
 #if HAS_CmpEventMgrEmbedded && EVENT_MAX_CALLBACKS == 0
@@ -68,6 +68,9 @@
 #endif
 #if HAS_IoDrvCanopen && (CANOPEN_MAX_DEVICES == 0 || !HAS_IecCan)
 #error "HAS_IoDrvCanopen: set CANOPEN_MAX_DEVICES in rts_config_port.h, and HAS_IecCan in cmp_list.c."
+#endif
+#if HAS_IoDrvCanopenDevice && (CANOPEN_DEVICE_DATA == 0 || !HAS_CmpCan)
+#error "HAS_IoDrvCanopenDevice: set CANOPEN_DEVICE_DATA in rts_config_port.h, and HAS_CmpCan in cmp_list.c."
 #endif
 #if HAS_CmpLogKeep && (LOG_KEEP == 0 || !HAS_CmpLog)
 #error \

@@ -57,6 +57,9 @@ X(IecCan)
 #if HAS_IoDrvCanopen
 X(IoDrvCanopen)
 #endif
+#if HAS_IoDrvCanopenDevice
+X(IoDrvCanopenDevice)
+#endif
 #if HAS_CmpForce
 X(CmpForce)
 #endif

@@ -539,6 +539,18 @@
 #define CANOPEN_CALL_SIZE 256
 #endif
 
+/* This controller as a CANopen device (IoDrvCanopenDevice.h): bytes of all values of its dictionary, 0: it is none, and no
+ * flash for it; bytes of its largest value; and PDOs in each direction (about 100 bytes each). */
+#ifndef CANOPEN_DEVICE_DATA
+#define CANOPEN_DEVICE_DATA 0
+#endif
+#ifndef CANOPEN_DEVICE_SDO
+#define CANOPEN_DEVICE_SDO 64
+#endif
+#ifndef CANOPEN_DEVICE_PDOS
+#define CANOPEN_DEVICE_PDOS 4
+#endif
+
 /* Packets that may arrive over CAN at a time, from as many tools; each costs a packet of CAN_PACKET_SIZE bytes
  * and 30. */
 #ifndef CAN_RX_SESSIONS

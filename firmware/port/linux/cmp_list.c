@@ -20,6 +20,7 @@
 #define HAS_IoDrvGpio 1
 #define HAS_IoDrvModbus 1
 #define HAS_IoDrvCanopen 1
+#define HAS_IoDrvCanopenDevice 1
 #define HAS_CmpForce 1
 #define HAS_CmpOperationControl 1
 #define HAS_IecLog 1

@@ -9,6 +9,7 @@
 
 #include <string.h>
 
+#include "../../src/io/CanopenDeviceDriver.h"
 #include "../../src/io/CanopenDriver.h"
 #include "IecCan.h"
 #include "Sim.h"
@@ -79,7 +80,9 @@ RTS_I64 SimCanBusGetDueNs(RTS_I64 now_ns)
     if (IecCanWaits() || SimCanFrames() != sim_bus.frames)
         return now_ns;
     RTS_I64 of_manager = IoDrvCanopenGetDueNs(now_ns);
-    return of_manager < next_ns() ? of_manager : next_ns();
+    RTS_I64 of_device = IoDrvCanopenDeviceGetDueNs(now_ns);
+    RTS_I64 due_ns = of_manager < of_device ? of_manager : of_device;
+    return due_ns < next_ns() ? due_ns : next_ns();
 }
 
 RTS_RESULT SimCanPut(const SIM_CAN_FRAME *frame)

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "../../src/io/ModbusCalls.h"
+#include "../../src/io/CanopenDeviceDriver.h"
 #include "../../src/io/ModbusDriver.h"
 #include "AppState.h"
 #include "CmpEventMgr.h"
@@ -382,24 +383,34 @@ static bool set_bit(const REGION *region, RTS_UI32 bit, bool on)
     return set_value(region->device, region->table, address, value);
 }
 
+static RTS_RESULT set_region(const IoConfigConnector *connector, const REGION *region, const SIM_IO_PLACE *place,
+                             const RTS_UI8 *data)
+{
+    RTS_RESULT result = ERR_OK;
+
+    if (region->memory != NULL)
+        IoDrvModbusFollowInputs();
+    for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++) {
+        if (!set_bit(region, place->bit + i, (data[i / 8] >> i % 8 & 1) != 0))
+            result = ERR_NOMEMORY;
+    }
+    if (result == ERR_OK && region->memory != NULL) {
+        ModbusFindPlace(setup(), connector).server->server.written++;
+        IoMgrConfigNoteData(connector); /* for the next cycle, which may come before the next pass of main */
+    }
+    return result;
+}
+
 static RTS_RESULT set_place(const IoConfigConnector *connector, const SIM_IO_PLACE *place, const RTS_UI8 *data)
 {
     REGION region;
     RTS_RESULT result = find_region(connector, place, &region);
 
+    if (result == ERR_OK)
+        return set_region(connector, &region, place, data);
     if (result == ERR_NOT_SUPPORTED)
-        return SimCanopenSet(connector, place, data);
-    if (result == ERR_OK && region.memory != NULL)
-        IoDrvModbusFollowInputs();
-    for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++) {
-        if (!set_bit(&region, place->bit + i, (data[i / 8] >> i % 8 & 1) != 0))
-            result = ERR_NOMEMORY;
-    }
-    if (result == ERR_OK && region.memory != NULL) {
-        ModbusFindPlace(setup(), connector).server->server.written++;
-        IoMgrConfigNoteData(connector); /* for the next cycle, which may come before the next pass of main */
-    }
-    return result;
+        result = IoDrvCanopenDeviceSet(connector, place->parameter, place->bit, place->bits, data);
+    return result == ERR_NOT_SUPPORTED ? SimCanopenSet(connector, place, data) : result;
 }
 
 static RTS_RESULT get_place(const IoConfigConnector *connector, const SIM_IO_PLACE *place, RTS_UI8 *data)
@@ -407,8 +418,10 @@ static RTS_RESULT get_place(const IoConfigConnector *connector, const SIM_IO_PLA
     REGION region;
     RTS_RESULT result = find_region(connector, place, &region);
 
-    if (result == ERR_NOT_SUPPORTED)
-        return SimCanopenGet(connector, place, data);
+    if (result == ERR_NOT_SUPPORTED) {
+        result = IoDrvCanopenDeviceGet(connector, place->parameter, place->bit, place->bits, data);
+        return result == ERR_NOT_SUPPORTED ? SimCanopenGet(connector, place, data) : result;
+    }
     if (result == ERR_OK)
         memset(data, 0, (place->bits + 7) / 8);
     for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++)

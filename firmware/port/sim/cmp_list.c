@@ -36,6 +36,7 @@
 #ifdef SIM_HAS_BUSES
 #define HAS_IoDrvModbus 1
 #define HAS_IoDrvCanopen 1
+#define HAS_IoDrvCanopenDevice 1
 #define HAS_CmpCan 1
 #define HAS_IecCan 1
 #define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim) X(SimModbus)
