@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from plctool.io.canopen.device import read_canopen_device
 from plctool.io.canopen.manager import read_canopen
 from plctool.io.gpio import read_gpio
 from plctool.io.local import read_local
@@ -17,6 +18,7 @@ Kind = Callable[[Table, Context], list[Connector]]
 
 KINDS: dict[str, Kind] = {
     "canopen": read_canopen,
+    "canopen_device": read_canopen_device,
     "gpio": read_gpio,
     "iio": read_iio,
     "local": read_local,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from plctool.cli.commands.canopen.eds import add_check
+from plctool.cli.commands.canopen.eds import add_check, add_eds_of_image
 from plctool.cli.commands.canopen.lss import add_lss
 from plctool.cli.commands.canopen.messages import add_emcy, add_pdo
 from plctool.cli.commands.canopen.nodes import add_nmt, add_scan
@@ -12,5 +12,5 @@ from plctool.cli.parser import Parser
 
 def canopen_arguments(command: Parser) -> None:
     action = command.adder_of_actions()
-    for add in (add_check, add_scan, add_nmt, add_sdo, add_emcy, add_pdo, add_watch, add_lss):
+    for add in (add_check, add_eds_of_image, add_scan, add_nmt, add_sdo, add_emcy, add_pdo, add_watch, add_lss):
         add(action)

@@ -1,4 +1,4 @@
-"""`plctool canopen check`: what is in an EDS or DCF, and what is wrong with it."""
+"""`plctool canopen check` and `eds`: diagnostics of an EDS or DCF, and the EDS of this PLC."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from plctool.cli import output
+from plctool.cli.arguments import add_image
+from plctool.cli.builds import image_of
 from plctool.cli.documents import Document, diagnostic_document
 from plctool.cli.output import EXIT_OK, EXIT_USAGE
 from plctool.cli.parser import Parser
 from plctool.errors import counted
-from plctool.files import usable_path
+from plctool.files import usable_path, write_atomically
 from plctool.io.canopen.eds import Eds, load_eds
 
 
@@ -24,6 +26,32 @@ def _check(args: argparse.Namespace) -> int:
     document, texts = check(args.eds)
     output.show(args, document, lambda d: "\n".join([*texts, check_text(d)]), colours=True)
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
+
+
+def add_eds_of_image(action: Callable[..., Parser]) -> None:
+    eds = action("eds", "write the EDS of a program that makes this PLC a CANopen device", _eds)
+    add_image(eds)
+    eds.add_argument(
+        "-o", "--output", type=usable_path, metavar="FILE.eds", help="default: beside the image, with its name"
+    )
+
+
+def _eds(args: argparse.Namespace) -> int:
+    return output.show(args, write_eds(image_of(args), args.output), lambda d: f"{d['eds']} written")
+
+
+def write_eds(path: Path, to: Path | None) -> Document:
+    """Writes the EDS of an image."""
+    from plctool.debug.symbols import find_symbols
+    from plctool.image.file import describe_image, parse_image, read_program
+    from plctool.io.canopen.eds_of_image import eds_of_image
+
+    program = read_program(path)
+    symbols = find_symbols(int(describe_image(program)["crc"], 16), path)
+    to = path.with_suffix(".eds") if to is None else to
+    text = eds_of_image(parse_image(program), symbols.io.get("channels", []), to.name)
+    write_atomically(to, text.encode("ascii", "replace"))
+    return {"eds": str(to)}
 
 
 def check(path: Path) -> tuple[Document, list[str]]:
