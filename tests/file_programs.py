@@ -10,7 +10,7 @@ from plctool.controller import Controller
 from plctool.testing.waiting import eventually
 
 NO_ERROR, HANDLE_INVALID, NOT_EXIST, EXIST, NO_MORE_ENTRIES = 0, 5103, 5104, 5105, 5106
-READ_ONLY, WRONG_PARAMETER, INCOMPLETE, NOT_IMPLEMENTED, TOO_MANY = 5108, 5109, 5111, 5112, 5113
+NOT_EMPTY, READ_ONLY, WRONG_PARAMETER, INCOMPLETE, NOT_IMPLEMENTED, TOO_MANY = 5107, 5108, 5109, 5111, 5112, 5113
 WRITE, READ, READ_WRITE, APPEND, APPEND_OR_CREATE = 0, 1, 2, 3, 5
 
 DATA = 600  # bytes of the buffer of the program: several calls
@@ -21,7 +21,8 @@ VAR
     data : ARRAY[0..{DATA - 1}] OF BYTE;
     open : FILE.Open; close : FILE.Close; read : FILE.Read; write : FILE.Write; setPos : FILE.SetPos;
     getPos : FILE.GetPos; atEnd : FILE.EOF; delete : FILE.Delete; rename : FILE.Rename; getSize : FILE.GetSize;
-    dirOpen : FILE.DirOpen; dirList : FILE.DirList; dirClose : FILE.DirClose;
+    dirOpen : FILE.DirOpen; dirList : FILE.DirList; dirClose : FILE.DirClose; copy : FILE.Copy;
+    dirCreate : FILE.DirCreate; dirRemove : FILE.DirRemove; dirRename : FILE.DirRename; all : BOOL;
     modes : ARRAY[0..5] OF FILE.MODE := [FILE.MODE.MWRITE, FILE.MODE.MREAD, FILE.MODE.MRDWR, FILE.MODE.MAPPD,
         FILE.MODE.MREADPLUS, FILE.MODE.MAPPDPLUS];
     flood : UDINT; opened : UDINT; refused : UDINT; many : FILE.Open; again : BOOL; idle : BOOL;
@@ -47,13 +48,22 @@ rename(xExecute := op = 9, sFileNameOld := name, sFileNameNew := other);
 IF rename.xDone OR rename.xError THEN ended(0, rename.eError); END_IF
 getSize(xExecute := op = 10, sFileName := name);
 IF getSize.xDone OR getSize.xError THEN ended(getSize.szSize, getSize.eError); END_IF
-dirOpen(xExecute := op = 11, sDirName := '');
+dirOpen(xExecute := op = 11, sDirName := name);
 IF dirOpen.xDone OR dirOpen.xError THEN ended(dirOpen.hDir, dirOpen.eError); END_IF
 dirList(xExecute := op = 12, hDir := handle);
 IF dirList.xDone OR dirList.xError THEN
     entry := dirList.deDirEntry.sEntry;
+    all := dirList.deDirEntry.xDirectory;
     ended(dirList.deDirEntry.szSize, dirList.eError);
 END_IF
+copy(xExecute := op = 13, sFileNameSource := name, sFileNameDest := other, xOverWrite := all);
+IF copy.xDone OR copy.xError THEN ended(copy.szSize, copy.eError); END_IF
+dirCreate(xExecute := op = 14, sDirName := name, xParent := all);
+IF dirCreate.xDone OR dirCreate.xError THEN ended(0, dirCreate.eError); END_IF
+dirRemove(xExecute := op = 15, sDirName := name, xRecursive := all);
+IF dirRemove.xDone OR dirRemove.xError THEN ended(0, dirRemove.eError); END_IF
+dirRename(xExecute := op = 16, sDirNameOld := name, sDirNameNew := other);
+IF dirRename.xDone OR dirRename.xError THEN ended(0, dirRename.eError); END_IF
 many(xExecute := flood > 0 AND NOT again, sFileName := name);
 again := many.xDone OR many.xError;
 IF again AND flood > 0 THEN
@@ -68,6 +78,120 @@ result := what;
 error := why;
 op := 0;
 END_METHOD
+END_PROGRAM
+"""
+
+
+WAITING = """
+PROGRAM Main
+VAR
+    go : BOOL; done : BOOL; wrong : INT; count : INT; opened, refused : UDINT;
+    f, d : RTS_IEC_HANDLE; r : RTS_IEC_RESULT; n, position : UDINT; text : STRING := 'hello'; name : STRING;
+    info : DirInfo; data : ARRAY[0..4999] OF BYTE; got : ARRAY[0..4999] OF BYTE; i : DINT; fw : DWORD;
+END_VAR
+IF go THEN
+    go := FALSE;
+    // a file in a folder, from its begin to its end
+    f := SysFileOpen('trend/a', AM_WRITE, ADR(r));
+    check(f = 16#FFFFFFFF AND r = 16#10);
+    check(SysDirCreate('trend') = 0);
+    check(SysDirCreate('trend') = 16#12);
+    f := SysFile.SysFileOpen('trend/a', SysFile.ACCESS_MODE.AM_WRITE, ADR(r));
+    check(r = 0);
+    FOR i := 0 TO 4999 DO data[i] := DINT_TO_BYTE(i * 7 + i / 251); END_FOR
+    check(SysFileWrite(f, ADR(data), 5000, ADR(r)) = 5000 AND r = 0);
+    check(SysFileGetPos(f, ADR(position)) = 0 AND position = 5000);
+    check(SysFileGetSize('trend/a', ADR(r)) = 0 AND r = 16#10);
+    check(SysFileClose(f) = 0);
+    check(SysFileClose(f) = 16#14);
+    f := SysFileOpen('trend/a', AM_READ, ADR(r));
+    check(SysFileGetSizeByHandle(f, ADR(r)) = 5000);
+    check(SysFileEOF(f) = 1);
+    check(SysFileRead(f, ADR(got), 6000, ADR(r)) = 5000 AND r = 0);
+    check(MEMCMP(ADR(got), ADR(data), 5000) = 0);
+    check(SysFileEOF(f) = 0);
+    check(SysFileSetPos(f, 4998) = 0);
+    MEMSET(ADR(got), 16#AA, 10);
+    check(SysFileRead(f, ADR(got), 10, ADR(r)) = 2 AND got[0] = data[4998] AND got[2] = 16#AA);
+    check(SysFileSetPos(f, 5001) = 2);
+    check(SysFileWrite(f, ADR(data), 1, ADR(r)) = 0 AND r = 16#14);
+    check(SysFileClose(f) = 0);
+    f := SysFileOpen('trend/a', AM_READ_PLUS, ADR(r));
+    check(r = 16#0C);
+    check(SysFileRename('trend/a', 'b') = 0);
+    check(SysFileCopy('c', 'b', ADR(n)) = 0 AND n = 5000);
+    check(SysFileDelete('b') = 0);
+    check(SysFileDelete('b') = 16#10);
+    // names that lead out of the folder
+    check(SysFileDelete('../c') = 2);
+    check(SysFileDelete('/c') = 2);
+    check(SysDirCreate('') = 2);
+    check(SysDirDelete2('..', TRUE, FALSE) = 2);
+    check(SysFileDelete('Application.cdl') = 16#27);
+    // folders
+    check(SysDirCreate2('x/y/z', TRUE) = 0);
+    check(SysDirDelete('x') = 16#1B);
+    check(SysDirRename('x', 'trend/x') = 0);
+    check(SysDirDelete2('trend/x', TRUE, TRUE) = 0);
+    d := SysDirOpen('trend', ADR(name), 80, ADR(info), ADR(r));
+    check(r = 0 AND name = 'x' AND info.ulFlags = DF_DIRECTORY);
+    check(SysDirRead(d, ADR(name), 80, ADR(info)) = 16#15);
+    check(SysDirClose(d) = 0);
+    d := SysDirOpen('', ADR(name), 2, 0, ADR(r));
+    check(r = 0 OR r = 16#0F); // trend and c, in whatever order
+    check(SysDirClose(d) = 0);
+    check(SysDirDelete2('trend', TRUE, FALSE) = 0);
+    // what stays of a file that is written over, under the names of Fastwel
+    check(FwSysDirCreate('log\\deep') = 1 AND FwSysDirExist('log/deep') = 1 AND FwSysDirExist('\\USB Storage') = 0);
+    fw := FwSysFileOpen('log\\f', 'cw');
+    check(fw <> 0 AND FwSysFileWrite(fw, ADR(data), 3000) = 3000 AND FwSysFileClose(fw) = 1);
+    fw := FwSysFileOpen('log\\f', 'w');
+    check(FwSysFileWrite(fw, ADR(text), 5) = 5 AND FwSysFileSetPos(fw, 2998) = 1);
+    check(FwSysFileSetPos(fw, 5) = 0 AND FwSysFileSetPos(fw, 3001) = 0);
+    check(FwSysFileWrite(fw, ADR(text), 5) = 5 AND FwSysFileClose(fw) = 1);
+    check(FwSysFileGetSize('log/f') = 3003 AND FwSysFileExists('log/g') = 0 AND FwSysFileGetSize('log/g') = -1);
+    fw := FwSysFileOpen('log/f', 'r');
+    check(FwSysFileRead(fw, ADR(got), 5000) = 3003 AND FwSysFileEOF(fw) = 1 AND FwSysFileClose(fw) = 1);
+    MEMCPY(ADR(data), ADR(text), 5);
+    check(MEMCMP(ADR(got), ADR(data), 2998) = 0 AND MEMCMP(ADR(got) + 2998, ADR(text), 5) = 0);
+    fw := FwSysFileOpen('log/f', 'w'); // nothing is written over
+    check(FwSysFileClose(fw) = 1 AND FwSysFileGetSize('log/f') = 3003);
+    check(FwSysFileOpen('log/f', 'rw') = 0 AND FwSysDirRemove('log') = 0 AND FwSysFileDelete('log\\f') = 1);
+    // 10 000 opens, none closed
+    FOR i := 1 TO 10000 DO
+        f := SysFileOpen('c', AM_READ, ADR(r));
+        opened := opened + SEL(r = 0, UDINT#0, UDINT#1);
+        refused := refused + SEL(r = 16#11, UDINT#0, UDINT#1);
+    END_FOR
+    done := TRUE;
+END_IF
+
+METHOD check
+VAR_INPUT right : BOOL; END_VAR
+count := count + 1;
+IF NOT right AND wrong = 0 THEN
+    wrong := count;
+END_IF
+END_METHOD
+END_PROGRAM
+"""
+
+FULL = """
+PROGRAM Main
+VAR
+    go, done : BOOL; f : RTS_IEC_HANDLE; r, closed : RTS_IEC_RESULT; n, total : UDINT; data : ARRAY[0..39999] OF BYTE;
+END_VAR
+IF go THEN
+    go := FALSE;
+    f := SysFileOpen('c', AM_WRITE, ADR(r));
+    REPEAT
+        n := SysFileWrite(f, ADR(data), 40000, ADR(r));
+        total := total + n;
+    UNTIL r <> 0
+    END_REPEAT
+    closed := SysFileClose(f);
+    done := TRUE;
+END_IF
 END_PROGRAM
 """
 
@@ -119,12 +243,12 @@ class Files:
         assert self.close(handle) == NO_ERROR
         return content
 
-    def names(self) -> dict[str, int]:
-        """What FILE.DirList gives."""
-        assert self.call(11) == NO_ERROR
+    def names(self, folder: str = "") -> dict[str, int]:
+        """What FILE.DirList gives; the name of a folder has a / at its end."""
+        assert self.call(11, name=folder) == NO_ERROR
         handle, found = self.result, {}
         while not (error := self.call(12, handle=handle)):
-            found[self.plc.read("Main.entry")] = self.result
+            found[self.plc.read("Main.entry") + "/" * self.plc.read("Main.all")] = self.result
         assert error == NO_MORE_ENTRIES
         assert self.close(handle) == NO_ERROR
         return found
@@ -196,7 +320,7 @@ class ProgramFiles:
         assert files.put("b", b"2") == NO_ERROR
         assert files.call(9, name="a", other="b") == EXIST
         assert files.call(9, name="none", other="c") == NOT_EXIST
-        assert files.call(9, name="a", other="c/d") == WRONG_PARAMETER
+        assert files.call(9, name="a", other="c/d") == NOT_EXIST
         assert files.call(9, name="a", other="c") == NO_ERROR
         assert files.call(8, name="b") == NO_ERROR
         assert files.call(8, name="b") == NOT_EXIST
@@ -204,12 +328,65 @@ class ProgramFiles:
 
     def test_name_that_leads_out_of_the_folder_is_refused(self, plc: Controller) -> None:
         files = self.of(plc)
-        for name in ("../a", "/etc/passwd", "..", ".", "", ".a", "a/b", "a\\b", "a b", "x" * 33, "x" * 255):
+        for name in (
+            "../a",
+            "/etc/passwd",
+            "..",
+            ".",
+            "",
+            ".a",
+            "a/../b",
+            "a//b",
+            "a/",
+            "a/.b",
+            "a\\b",
+            "a b",
+            "x" * 33,
+            "x" * 255,
+        ):
             assert files.open(name, WRITE) == WRONG_PARAMETER, name
             assert files.open(name) == WRONG_PARAMETER, name
             assert files.call(10, name=name) == WRONG_PARAMETER, name
             assert files.call(8, name=name) == WRONG_PARAMETER, name
             assert files.call(9, name=name, other="b") == WRONG_PARAMETER, name
+
+    def test_folder_has_files_and_folders_until_it_is_removed(self, plc: Controller) -> None:
+        files = self.of(plc)
+        assert files.put("trend/may.csv", b"1") == NOT_EXIST  # the folder
+        assert files.call(14, name="trend/2026", all=False) == NOT_EXIST
+        assert files.call(14, name="trend/2026", all=True) == NO_ERROR
+        assert files.call(14, name="trend", all=False) == EXIST
+        assert files.put("trend/may.csv", b"12") == NO_ERROR
+        assert files.put("trend/2026/b", b"123") == NO_ERROR
+        assert files.put("trend", b"") == EXIST
+        assert files.names() == {"trend/": 0}
+        assert files.names("trend") == {"2026/": 0, "may.csv": 2}
+        assert files.names("trend/2026") == {"b": 3}
+        assert files.call(15, name="trend", all=False) == NOT_EMPTY
+        assert files.call(16, name="trend", other="trend/2026/x") == WRONG_PARAMETER
+        assert files.call(16, name="trend", other="x" * 25) == WRONG_PARAMETER  # 2026/b would have 32 characters
+        assert files.call(16, name="trend", other="old") == NO_ERROR
+        assert files.get("old/2026/b") == b"123"
+        assert files.call(11, name="trend") == NOT_EXIST
+        assert files.call(15, name="old", all=True) == NO_ERROR
+        assert files.names() == {}
+        assert files.call(15, name="old", all=True) == NOT_EXIST
+        for name in ("", "/", "..", "../x", "a/..", "/tmp", "x" * 33):
+            assert files.call(14, name=name, all=True) == WRONG_PARAMETER
+            assert files.call(15, name=name, all=True) == WRONG_PARAMETER
+            assert name == "" or files.call(11, name=name) == WRONG_PARAMETER
+
+    def test_copy_has_what_the_file_has(self, plc: Controller) -> None:
+        files = self.of(plc)
+        assert files.put("a", PATTERN[:1500]) == NO_ERROR
+        assert (files.call(13, name="a", other="b", all=False), files.result) == (NO_ERROR, 1500)
+        assert files.get("b") == PATTERN[:1500]
+        assert files.put("a", b"new") == NO_ERROR
+        assert files.call(13, name="a", other="b", all=False) == EXIST
+        assert files.call(13, name="a", other="b", all=True) == NO_ERROR
+        assert files.get("b") == b"new"
+        assert files.call(13, name="none", other="c", all=True) == NOT_EXIST
+        assert files.call(13, name="a", other="Application.cdl", all=True) == READ_ONLY
 
     def test_program_cannot_change_what_the_device_makes(self, plc: Controller) -> None:
         files = self.of(plc)

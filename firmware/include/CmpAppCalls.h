@@ -56,6 +56,9 @@ RTS_I32 AppCallTake(PF_APP_CALL carry_out, const APP_CALL_ARGUMENTS *arguments);
 /* True if a call waits for main. From any context. */
 bool AppCallsWait(void);
 
+/* Carries out what waits; part of CH_COMM_CYCLE. */
+void AppCallsServe(void);
+
 /* The data of a call as a string; false if it has no end within them. */
 bool AppCallIsText(const APP_CALL *call);
 

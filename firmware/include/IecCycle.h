@@ -115,6 +115,11 @@ typedef struct {
 /* ERR_OK, ERR_FAILED: begin or init did, ERR_TIMEOUT: a cycle takes too long, and nothing was done. From main. */
 RTS_RESULT IecCycleExchange(const CYCLE_EXCHANGE *exchange);
 
+#if APP_CALL_WAIT_MS > 0
+/* What it calls while it waits for the cycles to end: tasks may wait for main. From main. */
+void IecCycleServeWaiting(void (*serve)(void));
+#endif
+
 /* Other code and other tasks, within `begin` and `init`. `kept`: a bit for each task that has the same record as before but
  * for its entry; the others begin as after IecCycleCreate. `prototype`: where the code is, and its imports. */
 void IecCycleSetCode(const CDL_TASK *records, RTS_UI32 count, RTS_UI32 kept, const IEC_CONTEXT *prototype);

@@ -342,6 +342,12 @@
 #define APP_CALL_DATA 128
 #endif
 
+/* How long a task may wait for such a call [ms], where tasks run beside main (SysMain.h). 0: they cannot, no flash for it,
+ * and a program that does is refused. */
+#ifndef APP_CALL_WAIT_MS
+#define APP_CALL_WAIT_MS 0
+#endif
+
 /* Files that a program may have open at a time (IecFile.h); 68 bytes of RAM for each. It needs HAS_IecFile in cmp_list.c
  * and one of EVENT_MAX_CALLBACKS. 0: no flash for them, and a program that opens one is refused. */
 #ifndef IEC_FILES

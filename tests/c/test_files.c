@@ -48,17 +48,9 @@ static void what_is_put_is_got_back_also_after_a_restart(void)
 
 static void names_that_are_none_are_refused(void)
 {
-    static const char *const names[] = {"/etc/passwd",
-                                        "../up",
-                                        "..",
-                                        ".",
-                                        ".hidden",
-                                        "a/b",
-                                        "a\\b",
-                                        "a b",
-                                        "a\xC3\xA4",
-                                        "%s",
-                                        "123456789012345678901234567890123"};
+    static const char *const names[] = {"/etc/passwd", "../up",     "..",     ".",
+                                        ".hidden",     "a//b",      "a/../b", "a\\b",
+                                        "a b",         "a\xC3\xA4", "%s",     "123456789012345678901234567890123"};
     RTS_UI32 handle;
 
     setup();
@@ -68,10 +60,27 @@ static void names_that_are_none_are_refused(void)
         CHECK_EQUAL(ask_named(SRV_FILE_DELETE, names[i], (RTS_UI32)strlen(names[i]), 0), ERR_PARAMETER);
         CHECK_EQUAL(ask_named(SRV_FILE_INFO, names[i], (RTS_UI32)strlen(names[i]), 0), ERR_PARAMETER);
     }
+    CHECK_EQUAL(put_begin("a/", pattern, 4, &handle), ERR_PARAMETER); /* a folder */
     CHECK_EQUAL(ask_named(SRV_FILE_INFO, "a\0b", 3, 0), ERR_PARAMETER);
     CHECK_EQUAL(ask_named(SRV_FILE_INFO, "\0\0\0\0", 4, 0), ERR_PARAMETER);
     CHECK_EQUAL(ask_named(SRV_FILE_INFO, pattern, 500, 0), ERR_PARAMETER);
     CHECK_EQUAL(put("12345678901234567890123456789012", pattern, 4), ERR_OK);
+}
+
+static void a_tool_puts_files_into_folders_and_deletes_those_that_are_empty(void)
+{
+    setup();
+    CHECK_EQUAL(put("trend/2026/may", pattern, 4), ERR_OK);
+    CHECK_EQUAL(put("trend/2026", pattern, 4), ERR_DUPLICATE);
+    CHECK_EQUAL(put("trend/2026/may/x", pattern, 4), ERR_DUPLICATE);
+    CHECK_EQUAL(FileStoreCreateFolder("trend/empty"), ERR_OK);
+    CHECK_EQUAL(ask_named(SRV_FILE_DELETE, "trend/", 6, 0), ERR_ENTRIES_REMAINING);
+    CHECK_EQUAL(ask_named(SRV_FILE_DELETE, "trend/empty/", 12, 0), ERR_OK);
+    CHECK_EQUAL(ask_named(SRV_FILE_DELETE, "trend/empty/", 12, 0), ERR_NO_OBJECT);
+    CHECK_EQUAL(ask_named(SRV_FILE_DELETE, "../", 3, 0), ERR_PARAMETER);
+    CHECK_EQUAL(ask_named(SRV_FILE_DELETE, "/", 1, 0), ERR_PARAMETER);
+    CHECK_EQUAL(ask_named(SRV_FILE_DELETE, "trend/2026/may", 14, 0), ERR_OK);
+    CHECK(!FileStoreIsFolder("trend"));
 }
 
 static void what_there_is_not_is_said(void)
@@ -427,6 +436,7 @@ int main(void)
     NEEDS_X86_64;
     RUN(what_is_put_is_got_back_also_after_a_restart);
     RUN(names_that_are_none_are_refused);
+    RUN(a_tool_puts_files_into_folders_and_deletes_those_that_are_empty);
     RUN(what_there_is_not_is_said);
     RUN(what_the_device_makes_cannot_be_changed);
     RUN(a_full_store_says_so_and_keeps_what_it_has);

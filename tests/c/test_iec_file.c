@@ -50,6 +50,11 @@ static RTS_UI64 call_get(RTS_I32 number, RTS_UI32 index)
     return ((RTS_UI64(*)(RTS_I32, RTS_UI32))CMFindExternal("call_get")->function)(number, index);
 }
 
+static RTS_UI8 call_wait(RTS_I32 number)
+{
+    return ((RTS_UI8(*)(RTS_I32))CMFindExternal("call_wait")->function)(number);
+}
+
 static RTS_UI8 call_free(RTS_I32 number)
 {
     return ((RTS_UI8(*)(RTS_I32))CMFindExternal("call_free")->function)(number);
@@ -58,6 +63,7 @@ static RTS_UI8 call_free(RTS_I32 number)
 /* ---- what blocks do with them ---- */
 
 static RTS_UI32 result;
+static bool waits; /* for a call, as SysFileOpen does */
 
 static void put_bytes(RTS_I32 number, const RTS_UI8 *data, RTS_UI32 size)
 {
@@ -77,6 +83,8 @@ static bool call(RTS_UI32 operation, RTS_UI32 handle, RTS_UI32 value, const void
     put_bytes(number, data, size);
     CHECK(call_send(number, size));
     RTS_I32 state = 0;
+    if (waits && !call_wait(number))
+        return false;
     for (int i = 0; i < 100 && state == 0; i++) {
         (void)SimCommCycle();
         state = call_state(number);
@@ -128,6 +136,8 @@ static void setup(void)
     CHECK_EQUAL(SimStart(), ERR_OK);
     build_counter(&image, 1);
     CHECK_EQUAL(download(&image), ERR_OK);
+    if (waits)
+        CHECK_EQUAL(AppStartApplication(), ERR_OK); /* for its tasks only */
 }
 
 /* ---- tests ---- */
@@ -209,11 +219,9 @@ static void every_operation_with_every_odd_argument_is_an_error_of_the_library(v
 
     setup();
     memset(data, 'a', sizeof data); /* no end */
-    for (RTS_UI32 operation = 0; operation < 16; operation++) {
+    for (RTS_UI32 operation = 0; operation < 20; operation++) {
         for (RTS_UI32 i = 0; i < RTS_COUNT(odd); i++) {
             for (RTS_UI32 size = 0; size <= sizeof data; size += sizeof data / 2) {
-                if (operation == IEC_FILE_OPEN_DIR)
-                    continue;
                 CHECK(!call(operation, odd[i], odd[i], data, size));
                 CHECK(result >= IEC_FILE_HANDLE_INVALID && result <= IEC_FILE_TOO_MANY);
             }
@@ -254,6 +262,47 @@ static void a_name_without_end_is_refused(void)
     CHECK_EQUAL(result, IEC_FILE_WRONG_PARAMETER);
     CHECK(!call(IEC_FILE_RENAME, 0, 0, "a\0b", 3));
     CHECK_EQUAL(result, IEC_FILE_WRONG_PARAMETER);
+    CHECK(!call(IEC_FILE_COPY, 0, 0, "a\0b", 3));
+    CHECK_EQUAL(result, IEC_FILE_WRONG_PARAMETER);
+    CHECK(!call(IEC_FILE_RENAME_DIR, 0, 0, "a\0b", 3));
+    CHECK_EQUAL(result, IEC_FILE_WRONG_PARAMETER);
+}
+
+/* Its marks count as files. */
+static void folders_end_with_the_entries_of_the_catalog(void)
+{
+    char name[] = "d00";
+
+    setup();
+    for (int i = 0; i < FILE_STORE_FILES; i++) {
+        name[1] = (char)('0' + i / 10);
+        name[2] = (char)('0' + i % 10);
+        CHECK(call(IEC_FILE_CREATE_DIR, 0, 0, name, sizeof name));
+    }
+    CHECK(!call(IEC_FILE_CREATE_DIR, 0, 0, "more", 5));
+    CHECK_EQUAL(result, IEC_FILE_INCOMPLETE);
+    CHECK(!put_file("file", IEC_FILE_MODE_WRITE, pattern, 1));
+    CHECK(call(IEC_FILE_DELETE_DIR, 0, 0, "d00", 4));
+    CHECK(put_file("d01/file", IEC_FILE_MODE_WRITE, pattern, 1));
+    CHECK(!call(IEC_FILE_DELETE_DIR, 0, 0, "d01", 4));
+    CHECK_EQUAL(result, IEC_FILE_NOT_EMPTY);
+}
+
+/* Main does not wait for itself: what has the simulator serve it is the task that waits. */
+static void a_call_of_a_program_that_is_stopped_is_not_waited_for(void)
+{
+    RTS_I32 number;
+
+    setup();
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    number = file_call(IEC_FILE_SIZE, 0, 0);
+    put_bytes(number, (const RTS_UI8 *)"a", 2);
+    CHECK(call_send(number, 2));
+    CHECK(!call_wait(number));
+    CHECK(!call_wait(number + 1));
+    CHECK(!call_wait(0));
+    CHECK_EQUAL(SimCommCycle(), ERR_OK);
+    CHECK_EQUAL(call_state(number), -IEC_FILE_NOT_EXIST);
 }
 
 /* ---- power cuts ---- */
@@ -332,6 +381,81 @@ static void a_power_cut_while_renaming_leaves_one_name(void)
     cut_everywhere(rename_and_delete, NULL, one_name_or_none, 10);
 }
 
+static void move_and_delete_folder(void *unused)
+{
+    RTS_UNUSED(unused);
+    (void)call(IEC_FILE_CREATE_DIR, 0, 1, "x/y", 4);
+    (void)put_file("x/a", IEC_FILE_MODE_WRITE, pattern, 10);
+    (void)put_file("x/y/b", IEC_FILE_MODE_WRITE, pattern, 10);
+    (void)call(IEC_FILE_RENAME_DIR, 0, 0, "x\0z", 4);
+    (void)call(IEC_FILE_DELETE_DIR, 0, 1, "z", 2);
+}
+
+static bool all_or_none(void)
+{
+    bool was_moved = FileStoreIsFolder("z");
+    const FILE_ENTRY *first = FileStoreFind(was_moved ? "z/a" : "x/a");
+    const FILE_ENTRY *second = FileStoreFind(was_moved ? "z/y/b" : "x/y/b");
+
+    return has("a", pattern, 1000) && !(was_moved && FileStoreIsFolder("x")) && !(second != NULL && first == NULL) &&
+           !(was_moved && second == NULL);
+}
+
+static void a_power_cut_while_a_folder_is_moved_or_deleted_leaves_all_of_it_or_none(void)
+{
+    cut_everywhere(move_and_delete_folder, NULL, all_or_none, 30);
+}
+
+static void copy_file(void *unused)
+{
+    RTS_UNUSED(unused);
+    (void)call(IEC_FILE_COPY, 0, 1, "a\0b", 4);
+}
+
+static bool copy_or_not(void)
+{
+    return has("a", pattern, 1000) && has("b", pattern + 2, 100) != has("b", pattern, 1000);
+}
+
+static void a_power_cut_while_copying_leaves_the_previous_file_or_the_copy(void)
+{
+    cut_everywhere(copy_file, NULL, copy_or_not, 50);
+}
+
+/* Over the begin of the file: the rest comes when it is closed. */
+static void update(void *unused)
+{
+    RTS_UNUSED(unused);
+    if (!open_as("a", IEC_FILE_MODE_UPDATE))
+        return;
+    RTS_UI32 handle = result;
+    if (call(IEC_FILE_WRITE, handle, 0, pattern + 1, 300))
+        (void)call(IEC_FILE_CLOSE, handle, 0, NULL, 0);
+}
+
+static bool old_or_updated(void)
+{
+    static RTS_UI8 both[1000];
+
+    memcpy(both, pattern + 1, 300);
+    memcpy(both + 300, pattern + 300, 700);
+    return has("a", pattern, 1000) != has("a", both, 1000) && has("b", pattern + 2, 100);
+}
+
+static void a_power_cut_while_updating_leaves_the_previous_file_or_the_new_one(void)
+{
+    cut_everywhere(update, NULL, old_or_updated, 50);
+}
+
+static void a_power_cut_while_a_task_waits_leaves_the_previous_file_or_the_new_one(void)
+{
+    RTS_UI32 mode = IEC_FILE_MODE_WRITE;
+
+    waits = true;
+    cut_everywhere(replace, &mode, old_or_new, 100);
+    waits = false;
+}
+
 /* A fault of one flash operation, without a cut. */
 static void a_flash_fault_leaves_the_previous_file_or_the_new_one(void)
 {
@@ -388,6 +512,12 @@ int main(void)
     RUN(a_power_cut_leaves_the_previous_file_or_the_new_one);
     RUN(a_power_cut_while_appending_leaves_the_previous_file_or_the_longer_one);
     RUN(a_power_cut_while_renaming_leaves_one_name);
+    RUN(folders_end_with_the_entries_of_the_catalog);
+    RUN(a_call_of_a_program_that_is_stopped_is_not_waited_for);
+    RUN(a_power_cut_while_a_folder_is_moved_or_deleted_leaves_all_of_it_or_none);
+    RUN(a_power_cut_while_copying_leaves_the_previous_file_or_the_copy);
+    RUN(a_power_cut_while_updating_leaves_the_previous_file_or_the_new_one);
+    RUN(a_power_cut_while_a_task_waits_leaves_the_previous_file_or_the_new_one);
     RUN(a_flash_fault_leaves_the_previous_file_or_the_new_one);
     return test_result();
 }

@@ -66,3 +66,30 @@ def test_file_in_place_of_the_folder_is_refused(tool, image, tmp_path) -> None:
     (tmp_path / "file").write_bytes(b"x")
     assert tool("run", str(image), "--files", str(tmp_path / "file")).status == 2
     assert (tmp_path / "file").read_bytes() == b"x"
+
+
+def test_folders_are_those_of_the_program_and_links_lead_nowhere(tool, tmp_path) -> None:
+    source = tmp_path / "folders.st"
+    source.write_text("""
+PROGRAM Main
+VAR file : RTS_IEC_HANDLE; result : RTS_IEC_RESULT; END_VAR
+SysDirCreate2('trend/empty', TRUE);
+SysFileCopy('trend/new', 'trend/old', 0);
+SysFileDelete('trend/old');
+SysFileClose(SysFileOpen('away', AM_WRITE, ADR(result)));
+END_PROGRAM
+""")
+    assert tool("build", str(source), "-o", str(tmp_path / "folders.cdl")).status == 0
+    device, outside = tmp_path / "device", tmp_path / "outside"
+    (device / "trend").mkdir(parents=True)
+    (device / "trend" / "old").write_bytes(b"1")
+    outside.write_bytes(b"mine")
+    (device / "away").symlink_to(outside)
+    done = tool("run", str(tmp_path / "folders.cdl"), "--cycles", "1", "--files", str(device))
+    assert done.status == 2 and "away is a link" in done.err
+    assert outside.read_bytes() == b"mine"
+    (device / "away").unlink()
+    (device / "trend" / "old").write_bytes(b"1")
+    assert tool("run", str(tmp_path / "folders.cdl"), "--cycles", "1", "--files", str(device)).status == 0
+    assert [path.name for path in sorted((device / "trend").iterdir())] == ["empty", "new"]
+    assert (device / "trend" / "new").read_bytes() == b"1" and (device / "away").read_bytes() == b""

@@ -10,7 +10,8 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from file_programs import NO_ERROR, PROGRAM, WRITE, Files, ProgramFiles
+from changing import built
+from file_programs import NO_ERROR, PROGRAM, WAITING, WRITE, Files, ProgramFiles
 
 from plctool import connect
 from plctool.device import Plc
@@ -44,3 +45,37 @@ def test_tool_gets_what_the_program_wrote_and_is_refused_while_it_writes(plc: Pl
     assert done.status != 0 and "the program is writing a file" in done.err
     assert files.close(files.result) == NO_ERROR
     tool.ok("files", "put", "log.csv", "--name", "other", *link)
+
+
+def test_functions_that_wait_do_all_of_it_in_one_cycle(plc: Plc, tool) -> None:
+    plc.flash(tool.build("waiting", WAITING))
+    plc.write({"Main.go": True})
+    eventually(lambda: plc.read("Main.done"))
+    assert plc.read("Main.wrong") == 0  # or the number of the check, from 1
+    assert (plc.read("Main.opened"), plc.read("Main.refused")) == (16, 9984)
+
+
+LOGGING = """
+PROGRAM Main
+VAR
+    f : RTS_IEC_HANDLE; r : RTS_IEC_RESULT; text : STRING := 'line'; cycles, bad : UDINT; step : UDINT := 1;
+END_VAR
+f := SysFileOpen('log', AM_READ, ADR(r));
+SysFileClose(f);
+cycles := cycles + step;
+END_PROGRAM
+"""
+
+
+def test_program_that_always_waits_is_changed_and_stopped_at_once(plc: Plc, tool) -> None:
+    plc.flash(tool.build("logging", LOGGING))
+    eventually(lambda: plc.read("Main.cycles") > 10)
+    changed = built(tool.folder, LOGGING.replace("+ step", "+ step + step"), plc.symbols())
+    plc.add_symbols(changed.symbols)
+    plc.change(changed.image)
+    for _ in range(5):
+        plc.stop()
+        assert plc.status().exception is None
+        plc.start()
+    cycles = plc.read("Main.cycles")
+    eventually(lambda: plc.read("Main.cycles") > cycles)

@@ -11,7 +11,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from file_programs import NO_ERROR, PROGRAM, WRITE, Files, ProgramFiles
+from file_programs import FULL, NO_ERROR, PROGRAM, WAITING, WRITE, Files, ProgramFiles
 
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -75,3 +75,27 @@ def test_call_takes_one_cycle_more(plc: Simulator) -> None:
     plc.write({"Main.name": "none", "Main.op": 10})
     plc.run_cycles(2)
     assert plc.read("Main.op") == 0
+
+
+def simulate(source: str, folder: Path) -> Simulator:
+    (folder / "waiting.st").write_text(source)
+    built = compile_sources([folder / "waiting.st"])
+    return Simulator(built.image, built.symbols)
+
+
+def test_functions_that_wait_do_all_of_it_in_one_cycle(tmp_path: Path) -> None:
+    with simulate(WAITING, tmp_path) as plc:
+        plc.write({"Main.go": True})
+        plc.run_cycles(1)
+        assert (plc.read("Main.done"), plc.read("Main.wrong")) == (True, 0)  # or the number of the check, from 1
+        assert (plc.read("Main.opened"), plc.read("Main.refused")) == (16, 9984)
+
+
+def test_function_that_finds_no_room_keeps_the_previous_file(tmp_path: Path) -> None:
+    with simulate(FULL, tmp_path) as plc:
+        plc.put_file("c", b"old")
+        plc.write({"Main.go": True})
+        plc.run_cycles(1)
+        assert (plc.read("Main.r"), plc.read("Main.closed")) == (0x29, 0x14)  # ERR_DISK_FULL, ERR_INVALID_HANDLE
+        assert 500_000 < plc.read("Main.total") < 1 << 20
+        assert plc.files() == {"c": b"old"}

@@ -10,6 +10,8 @@
 
 #include <limits.h>
 #include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
 static struct {
     const PORT_SOURCE *source[PORT_MAX_SOURCES];
@@ -59,9 +61,40 @@ void SysTimeWantPass(RTS_UI32 ms)
     waiting.hurry = true;
 }
 
+/* ---- threads that wait for main ---- */
+
+static int nudge = -1; /* atomic */
+
+void PortWaitNudge(void)
+{
+    const uint64_t one = 1;
+    int file = __atomic_load_n(&nudge, __ATOMIC_ACQUIRE);
+    if (file >= 0) {
+        (void)!write(file, &one, sizeof(one));
+    }
+}
+
+/* What poll looks at for it, in its last place. */
+static void poll_nudge(struct pollfd *polled)
+{
+    if (nudge < 0) {
+        __atomic_store_n(&nudge, eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), __ATOMIC_RELEASE);
+    }
+    polled->fd = nudge;
+    polled->events = POLLIN;
+}
+
+static void take_nudge(const struct pollfd *polled)
+{
+    uint64_t count;
+    if ((polled->revents & POLLIN) != 0) {
+        (void)!read(polled->fd, &count, sizeof(count));
+    }
+}
+
 bool PortWait(int timeout_ms)
 {
-    struct pollfd polled[PORT_MAX_SOURCES];
+    struct pollfd polled[PORT_MAX_SOURCES + 1];
     bool more = waiting.more;
     if (waiting.hurry && (timeout_ms < 0 || waiting.hurry_ms < timeout_ms)) {
         timeout_ms = waiting.hurry_ms;
@@ -72,5 +105,13 @@ bool PortWait(int timeout_ms)
         polled[i].fd = waiting.source[i]->file; /* poll passes over a negative one */
         polled[i].events = waiting.source[i]->events;
     }
-    return more || poll(polled, waiting.count, timeout_ms) > 0;
+    poll_nudge(&polled[waiting.count]);
+    if (more) {
+        return true;
+    }
+    if (poll(polled, waiting.count + 1, timeout_ms) <= 0) {
+        return false;
+    }
+    take_nudge(&polled[waiting.count]);
+    return true;
 }

@@ -52,6 +52,8 @@ bool PortWaitAdd(const PORT_SOURCE *source);
 void PortWaitRemove(const PORT_SOURCE *source);
 /* In this pass something was done after which there may be more to do: the next PortWait does not wait. */
 void PortWaitNotNow(void);
+/* The running PortWait ends, or the next one does not wait. From any thread; before the first one it does nothing. */
+void PortWaitNudge(void);
 /* Waits until one of them is ready, or a signal comes, `timeout_ms` at most, or less if a component wants it
  * (SysTimeWantPass). Returns whether there may be something to
  * do. */

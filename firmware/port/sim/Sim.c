@@ -7,6 +7,7 @@
 #include "Sim.h"
 
 #include <setjmp.h>
+#include <signal.h>
 #include <string.h>
 #include <time.h>
 
@@ -16,8 +17,10 @@
 #include "CmpScheduleTimer.h"
 #include "CyclePhases.h"
 #include "SimLink.h"
+#include "SysAtomic.h"
 #include "SysExcept.h"
 #include "SysLock.h"
+#include "SysMain.h"
 #include "SysTime.h"
 #include "SysTimeRtc.h"
 #include "SysTimer.h"
@@ -108,6 +111,49 @@ static RTS_RESULT with_landing(RTS_RESULT (*fn)(void *arg), void *arg)
     sim.landing = false;
     return sim.power_lost ? (RTS_RESULT)SIM_POWER_CUT : result;
 }
+
+/* ---- a task that waits for main ---- */
+
+#if APP_CALL_WAIT_MS > 0
+
+static RTS_UI32 serving;
+
+bool SimIsServing(void)
+{
+    return SysAtomicLoad(&serving) != 0;
+}
+
+/* Main is the thread that the task runs in. A power cut ends what it does at once, and the cycle of the task at its end. No
+ * cycle is aborted in between, as that would leave the work of main in its middle. */
+bool SysMainWait(const RTS_UI32 *word, RTS_UI32 value)
+{
+    jmp_buf before;
+#ifndef _WIN32
+    sigset_t all, signals;
+
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &signals);
+#endif
+    RTS_UNUSED(word);
+    RTS_UNUSED(value);
+    SysAtomicStore(&serving, 1);
+    memcpy(&before, &sim.jump, sizeof before);
+    if (setjmp(sim.jump) == 0)
+        AppCallsServe();
+    memcpy(&sim.jump, &before, sizeof before);
+    SysAtomicStore(&serving, 0);
+#ifndef _WIN32
+    pthread_sigmask(SIG_SETMASK, &signals, NULL);
+#endif
+    return !sim.power_lost;
+}
+
+void SysMainWake(const RTS_UI32 *word)
+{
+    RTS_UNUSED(word);
+}
+
+#endif
 
 static void forget_timers(void)
 {
@@ -379,6 +425,8 @@ static void run_timer(TIMER *timer)
     if (timer->interval_ns == 0)
         timer->due_ns = NEVER; /* it may be triggered again now */
     timer->callback(timer->param, due_ns);
+    if (sim.power_lost && sim.landing)
+        longjmp(sim.jump, 1);
     if (timer->interval_ns != 0)
         set_next_due(timer);
 }

@@ -53,7 +53,7 @@ static void look(RTS_UI32 index, SEEN *seen)
     if (!IecTaskReadGuard(index, &guard) || AppBpIsHalted() || runtime != seen->runtime ||
         guard.serial != seen->serial || guard.start_ns != seen->start_ns) {
         *seen = (SEEN){runtime, guard.serial, guard.start_ns, processor_ms()};
-    } else if (processor_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms)) {
+    } else if (processor_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms) && !SimIsServing()) {
         SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
     }
 }

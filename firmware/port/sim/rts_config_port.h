@@ -39,6 +39,7 @@
 #define SETTINGS 1
 #define APP_CALLS 32
 #define APP_CALL_DATA 2048
+#define APP_CALL_WAIT_MS 1000
 #define IEC_FILES 16
 #define IEC_SOCKETS 64
 #define IEC_COMS 8

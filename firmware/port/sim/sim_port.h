@@ -61,4 +61,7 @@ extern const SIM_BUS *SimBus;
 RTS_RESULT SimModbus_Hook(CMP_HOOK hook);
 RTS_RESULT SimCanBus_Hook(CMP_HOOK hook);
 
+/* True while a task that waits for main does its work. From any thread. */
+bool SimIsServing(void);
+
 #endif

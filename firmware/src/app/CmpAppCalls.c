@@ -11,7 +11,9 @@
 
 #include "AppEventIds.h"
 #include "CmpEventMgr.h"
+#include "IecCycle.h"
 #include "SysAtomic.h"
+#include "SysMain.h"
 #include "SysTime.h"
 
 enum {
@@ -155,6 +157,24 @@ static RTS_UI32 call_room(void)
     return APP_CALL_DATA;
 }
 
+#if APP_CALL_WAIT_MS > 0
+/* Waits until a call has ended. False: it has not, since the program is stopped, or for too long. */
+static RTS_UI8 call_wait(RTS_I32 number)
+{
+    RTS_UI32 since_ms = SysTimeGetMs();
+    const APP_CALL *call = find(number, SENT);
+
+    while (call != NULL && find(number, SENT) != NULL && IecCycleMayRun() &&
+           SysTimeGetMs() - since_ms < APP_CALL_WAIT_MS) {
+        if (!SysMainWait(&call->state, SENT))
+            return 0;
+    }
+    return find(number, ENDED) != NULL;
+}
+
+APP_GATE(call_wait);
+#endif
+
 APP_GATE(call_put);
 APP_GATE(call_send);
 APP_GATE(call_state);
@@ -171,6 +191,9 @@ static const CMP_EXT_FUNCTION functions[] = {
     {"call_get", 0x8AB81E45, VERSION, (RTS_PFN)APP_GATED(call_get)},
     {"call_free", 0x1B521845, VERSION, (RTS_PFN)APP_GATED(call_free)},
     {"call_room", 0x3B585A62, VERSION, (RTS_PFN)call_room},
+#if APP_CALL_WAIT_MS > 0
+    {"call_wait", 0xF11F5D3D, VERSION, (RTS_PFN)APP_GATED(call_wait)},
+#endif
 };
 
 /* ---- main ---- */
@@ -193,6 +216,9 @@ static void carry_out(APP_CALL *call)
     call->error = error;
     call->since_ns = SysTimeGetNs();
     SysAtomicStore(&call->state, ENDED);
+#if APP_CALL_WAIT_MS > 0
+    SysMainWake(&call->state);
+#endif
 }
 
 /* Frees what has ended and has not been fetched: the block is not called any more. Without a number no task finds it. */
@@ -208,7 +234,7 @@ static void free_abandoned(APP_CALL *call)
     SysAtomicStore(&call->state, FREE);
 }
 
-static void poll_calls(void)
+void AppCallsServe(void)
 {
     for (RTS_UI32 i = 0; i < APP_CALLS; i++) {
         APP_CALL *call = &calls.slot[i];
@@ -233,9 +259,12 @@ RTS_RESULT CmpAppCalls_Hook(CMP_HOOK hook)
     if (hook == CH_INIT)
         CMP_CLEAR(calls);
     else if (hook == CH_COMM_CYCLE)
-        poll_calls();
+        AppCallsServe();
     if (hook != CH_INIT3)
         return ERR_OK;
+#if APP_CALL_WAIT_MS > 0 && ONLINE_CHANGE && BP_MAX > 0
+    IecCycleServeWaiting(AppCallsServe);
+#endif
     RTS_RESULT result = EventRegisterCallback(CMPID_CmpAppEmbedded, EVT_PrepareExit, end_with_variables, NULL);
     return result == ERR_OK ? CMRegisterExternal(functions, RTS_COUNT(functions)) : result;
 }

@@ -24,6 +24,7 @@ typedef enum { CLOSED, READING, WRITING, COPYING, LISTING } USE;
 /* An open file. */
 typedef struct {
     USE use;
+    bool updates; /* what of `entry` is not written over stays */
     RTS_UI32 handle;
     FILE_ENTRY entry;  /* that is read, or copied; of a file that is written its name */
     RTS_UI32 position; /* in it; of the list the next index */
@@ -66,6 +67,7 @@ static RTS_UI32 use_file(OPEN_FILE *file, USE use)
 {
     file->use = use;
     file->position = 0;
+    file->updates = false;
     file->crc = 0;
     file->handle = (++files.opened % (UINT32_MAX / SLOTS) + 1) * SLOTS + (RTS_UI32)(file - files.file);
     return file->handle;
@@ -85,6 +87,8 @@ static RTS_I32 error_of(RTS_RESULT result)
         return IEC_FILE_NOT_EXIST;
     case ERR_DUPLICATE:
         return IEC_FILE_EXIST;
+    case ERR_ENTRIES_REMAINING:
+        return IEC_FILE_NOT_EMPTY;
     case ERR_DISK_FULL:
     case ERR_FT_FILE_SIZE_MISMATCH:
         return IEC_FILE_INCOMPLETE;
@@ -113,6 +117,22 @@ static RTS_I32 check_own(const char *name)
     return is_of_device(name) ? IEC_FILE_READ_ONLY : 0;
 }
 
+/* The same of one that is to be written: its folder is there. */
+static RTS_I32 check_new(const char *name)
+{
+    RTS_I32 error = check_own(name);
+
+    return error == 0 && !FileStoreHasFolderOf(name) ? IEC_FILE_NOT_EXIST : error;
+}
+
+/* The second string of the data; NULL if it has no end. */
+static const char *second_name(const APP_CALL *call)
+{
+    RTS_UI32 length = (RTS_UI32)strlen((const char *)call->data) + 1;
+
+    return memchr(call->data + length, '\0', call->size - length) != NULL ? (const char *)call->data + length : NULL;
+}
+
 /* True if the open file of that name is written by the program. */
 static bool is_written(const char *name)
 {
@@ -134,10 +154,11 @@ static RTS_I32 open_to_read(APP_CALL *call, OPEN_FILE *file, const char *name)
     return 0;
 }
 
-/* Waits while a tool writes a file. */
-static RTS_I32 open_to_write(APP_CALL *call, OPEN_FILE *file, const char *name, bool append)
+/* Waits while a tool writes a file. It begins with the content of `previous`, NULL: it is empty. If the file is updated, that
+ * comes later, up to where it is written over. */
+static RTS_I32 open_to_write(APP_CALL *call, OPEN_FILE *file, const char *name, const FILE_ENTRY *previous,
+                             bool updates)
 {
-    const FILE_ENTRY *previous = append ? FileStoreFind(name) : NULL;
     RTS_RESULT result;
 
     if (FileStoreIsWriting())
@@ -149,8 +170,9 @@ static RTS_I32 open_to_write(APP_CALL *call, OPEN_FILE *file, const char *name, 
     memcpy(file->entry.name, name, strlen(name) + 1);
     if (previous != NULL)
         file->entry = *previous;
-    call->result = use_file(file, previous != NULL ? COPYING : WRITING);
-    return previous != NULL ? APP_CALL_PENDING : 0;
+    call->result = use_file(file, previous != NULL && !updates ? COPYING : WRITING);
+    file->updates = updates;
+    return file->use == COPYING ? APP_CALL_PENDING : 0;
 }
 
 static RTS_RESULT write_bytes(OPEN_FILE *file, const RTS_UI8 *data, RTS_UI32 size)
@@ -162,19 +184,17 @@ static RTS_RESULT write_bytes(OPEN_FILE *file, const RTS_UI8 *data, RTS_UI32 siz
     return result;
 }
 
-/* Writes the next part of the previous file. The name is no longer needed: the data of the call are the buffer. */
-static RTS_RESULT copy_part(APP_CALL *call, OPEN_FILE *file)
+/* Writes the next part of the previous file, at most up to `end`. The name is no longer needed: the data of the call are the
+ * buffer. */
+static RTS_RESULT copy_part(APP_CALL *call, OPEN_FILE *file, RTS_UI32 end)
 {
-    RTS_UI32 size = file->entry.size - file->position;
+    RTS_UI32 size = end - FileStorePosition();
     RTS_RESULT result;
 
     if (size > sizeof call->data)
         size = sizeof call->data;
-    result = FileStoreRead(&file->entry, file->position, call->data, size);
-    if (result == ERR_OK)
-        result = write_bytes(file, call->data, size);
-    file->position += size;
-    return result;
+    result = FileStoreRead(&file->entry, FileStorePosition(), call->data, size);
+    return result == ERR_OK ? write_bytes(file, call->data, size) : result;
 }
 
 /* Gives up a file that is written: the previous one stays. */
@@ -186,27 +206,55 @@ static RTS_I32 give_up(OPEN_FILE *file, RTS_RESULT result)
 }
 
 /* Some parts in a pass, so that communication goes on. */
-static RTS_I32 copy_parts(APP_CALL *call, OPEN_FILE *file)
+static RTS_I32 copy_up_to(APP_CALL *call, OPEN_FILE *file, RTS_UI32 end)
 {
-    for (RTS_UI32 i = 0; i < COPIES && file->position < file->entry.size; i++) {
-        RTS_RESULT result = copy_part(call, file);
+    for (RTS_UI32 i = 0; i < COPIES && FileStorePosition() < end; i++) {
+        RTS_RESULT result = copy_part(call, file, end);
         if (result != ERR_OK)
             return give_up(file, result);
     }
-    if (file->position < file->entry.size)
-        return APP_CALL_PENDING;
-    file->use = WRITING;
-    return 0;
+    return FileStorePosition() < end ? APP_CALL_PENDING : 0;
+}
+
+static RTS_I32 copy_all(APP_CALL *call, OPEN_FILE *file)
+{
+    RTS_I32 error = copy_up_to(call, file, file->entry.size);
+
+    if (error == 0)
+        file->use = WRITING;
+    return error;
+}
+
+/* Modes in which a file is written. */
+static bool writes(RTS_UI32 mode)
+{
+    return mode == IEC_FILE_MODE_WRITE || mode == IEC_FILE_MODE_APPEND || mode == IEC_FILE_MODE_APPEND_OR_CREATE ||
+           mode == IEC_FILE_MODE_UPDATE || mode == IEC_FILE_MODE_UPDATE_OR_CREATE;
+}
+
+static RTS_I32 begin_to_write(APP_CALL *call, OPEN_FILE *file, const char *name)
+{
+    const FILE_ENTRY *previous = FileStoreFind(name);
+    RTS_UI32 mode = call->value;
+    RTS_I32 error = check_new(name);
+
+    if (error != 0)
+        return error;
+    if ((mode == IEC_FILE_MODE_APPEND || mode == IEC_FILE_MODE_UPDATE) && previous == NULL)
+        return IEC_FILE_NOT_EXIST;
+    if (find_writer() != NULL)
+        return IEC_FILE_TOO_MANY;
+    return open_to_write(call, file, name, mode == IEC_FILE_MODE_WRITE ? NULL : previous,
+                         mode == IEC_FILE_MODE_UPDATE || mode == IEC_FILE_MODE_UPDATE_OR_CREATE);
 }
 
 static RTS_I32 open_file(APP_CALL *call)
 {
     const char *name = (const char *)call->data;
     OPEN_FILE *file = find_open(call->result); /* that is copied */
-    RTS_I32 error;
 
     if (file != NULL)
-        return copy_parts(call, file);
+        return copy_all(call, file);
     if (!FileStoreIsName(name))
         return IEC_FILE_WRONG_PARAMETER;
     file = find_closed();
@@ -214,25 +262,18 @@ static RTS_I32 open_file(APP_CALL *call)
         return IEC_FILE_TOO_MANY;
     if (call->value == IEC_FILE_MODE_READ)
         return open_to_read(call, file, name);
-    if (call->value != IEC_FILE_MODE_WRITE && call->value != IEC_FILE_MODE_APPEND &&
-        call->value != IEC_FILE_MODE_APPEND_OR_CREATE)
-        return IEC_FILE_NOT_IMPLEMENTED;
-    error = check_own(name);
-    if (error != 0)
-        return error;
-    if (call->value == IEC_FILE_MODE_APPEND && FileStoreFind(name) == NULL)
-        return IEC_FILE_NOT_EXIST;
-    if (find_writer() != NULL)
-        return IEC_FILE_TOO_MANY;
-    return open_to_write(call, file, name, call->value != IEC_FILE_MODE_WRITE);
+    return writes(call->value) ? begin_to_write(call, file, name) : IEC_FILE_NOT_IMPLEMENTED;
 }
 
 /* ---- what is open ---- */
 
-static RTS_I32 close_file(OPEN_FILE *file)
+static RTS_I32 close_file(APP_CALL *call, OPEN_FILE *file)
 {
     bool was_written = file->use == WRITING;
+    RTS_I32 error = was_written && file->updates ? copy_up_to(call, file, file->entry.size) : 0;
 
+    if (error != 0)
+        return error;
     file->use = CLOSED;
     return was_written ? error_of(FileStoreFinish(file->crc)) : 0;
 }
@@ -262,26 +303,71 @@ static RTS_I32 write_file(APP_CALL *call, OPEN_FILE *file)
     return result == ERR_OK ? 0 : give_up(file, result);
 }
 
-static RTS_I32 set_position(OPEN_FILE *file, RTS_UI32 position)
+/* Of a file that is written only forward, over what stays of the previous one. */
+static RTS_I32 set_position(APP_CALL *call, OPEN_FILE *file)
 {
-    if (position > file->entry.size)
+    RTS_UI32 position = call->value;
+    RTS_UI32 most = file->use == WRITING && !file->updates ? 0 : file->entry.size;
+
+    if (file->use == WRITING && position == FileStorePosition())
+        return 0;
+    if (position > most || (file->use == WRITING && position < FileStorePosition()))
         return IEC_FILE_WRONG_PARAMETER;
+    if (file->use == WRITING)
+        return copy_up_to(call, file, position);
     file->position = position;
     return 0;
 }
 
+/* The rest of a name after the path of a folder, NULL if it is not in it. */
+static const char *rest_in(const FILE_ENTRY *file, const char *folder)
+{
+    RTS_SIZE length = strlen(folder);
+
+    if (file == NULL)
+        return NULL;
+    if (length == 0)
+        return file->name;
+    if (strncmp(file->name, folder, length) != 0 || file->name[length] != '/')
+        return NULL;
+    return file->name[length + 1] != '\0' ? file->name + length + 1 : NULL;
+}
+
+/* Characters of the first name in `rest`, with the `/` of a folder. */
+static RTS_SIZE length_of_first(const char *rest)
+{
+    const char *end = strchr(rest, '/');
+
+    return end != NULL ? (RTS_SIZE)(end - rest) + 1 : strlen(rest);
+}
+
+/* True if an entry before `index` begins with the same folder. */
+static bool was_listed(const char *folder, RTS_UI32 index, const char *rest, RTS_SIZE length)
+{
+    for (RTS_UI32 i = 0; i < index; i++) {
+        const char *earlier = rest_in(FileStoreGet(i), folder);
+        if (earlier != NULL && strncmp(earlier, rest, length) == 0)
+            return rest[length - 1] == '/';
+    }
+    return false;
+}
+
+/* The position of a list is the index of the entry that comes next. */
 static RTS_I32 list(APP_CALL *call, OPEN_FILE *file)
 {
-    const FILE_ENTRY *entry = NULL;
-
-    while (entry == NULL && file->position < FILE_STORE_FILES)
-        entry = FileStoreGet(file->position++);
-    if (entry == NULL)
-        return IEC_FILE_NO_MORE_ENTRIES;
-    memcpy(call->data, entry->name, sizeof entry->name);
-    call->size = sizeof entry->name;
-    call->result = entry->size;
-    return 0;
+    while (file->position < FILE_STORE_FILES) {
+        RTS_UI32 index = file->position++;
+        const FILE_ENTRY *entry = FileStoreGet(index);
+        const char *rest = rest_in(entry, file->entry.name);
+        if (rest == NULL || was_listed(file->entry.name, index, rest, length_of_first(rest)))
+            continue;
+        memset(call->data, 0, sizeof entry->name);
+        memcpy(call->data, rest, length_of_first(rest));
+        call->size = sizeof entry->name;
+        call->result = strchr(rest, '/') == NULL ? entry->size : 0;
+        return 0;
+    }
+    return IEC_FILE_NO_MORE_ENTRIES;
 }
 
 static RTS_I32 do_with_open(APP_CALL *call)
@@ -292,11 +378,13 @@ static RTS_I32 do_with_open(APP_CALL *call)
     if (file == NULL || file->use == COPYING) /* a program that guesses its handle */
         return IEC_FILE_HANDLE_INVALID;
     if (call->operation == IEC_FILE_CLOSE)
-        return close_file(file);
-    if (call->operation == IEC_FILE_GET_POS && file->use == WRITING) {
+        return close_file(call, file);
+    if ((call->operation == IEC_FILE_GET_POS || call->operation == IEC_FILE_OPEN_SIZE) && file->use == WRITING) {
         call->result = FileStorePosition();
         return 0;
     }
+    if (call->operation == IEC_FILE_SET_POS && file->use == WRITING)
+        needed = WRITING;
     if (file->use != needed)
         return IEC_FILE_HANDLE_INVALID;
     switch (call->operation) {
@@ -305,9 +393,12 @@ static RTS_I32 do_with_open(APP_CALL *call)
     case IEC_FILE_WRITE:
         return write_file(call, file);
     case IEC_FILE_SET_POS:
-        return set_position(file, call->value);
+        return set_position(call, file);
     case IEC_FILE_GET_POS:
         call->result = file->position;
+        return 0;
+    case IEC_FILE_OPEN_SIZE:
+        call->result = file->entry.size;
         return 0;
     case IEC_FILE_AT_END:
         call->result = file->position == file->entry.size;
@@ -333,17 +424,120 @@ static RTS_I32 delete_file(const char *name)
 static RTS_I32 rename_file(const APP_CALL *call)
 {
     const char *name = (const char *)call->data;
-    RTS_UI32 length = (RTS_UI32)strlen(name) + 1;
-    const char *new_name = name + length;
+    const char *new_name = second_name(call);
     RTS_I32 error = check_own(name);
 
-    if (memchr(new_name, '\0', call->size - length) == NULL)
+    if (new_name == NULL)
         return IEC_FILE_WRONG_PARAMETER;
     if (error == 0)
-        error = check_own(new_name);
+        error = check_new(new_name);
     if (error == 0 && (is_written(name) || is_written(new_name)))
         error = IEC_FILE_TOO_MANY;
     return error == 0 ? error_of(FileStoreRename(name, new_name)) : error;
+}
+
+/* The first pass of a copy. */
+static RTS_I32 begin_copy(APP_CALL *call)
+{
+    const char *name = (const char *)call->data;
+    const char *new_name = second_name(call);
+    const FILE_ENTRY *source = FileStoreFind(name);
+    OPEN_FILE *file = find_closed();
+    RTS_I32 error;
+
+    if (!FileStoreIsName(name) || new_name == NULL || strcmp(name, new_name) == 0)
+        return IEC_FILE_WRONG_PARAMETER;
+    if (source == NULL)
+        return IEC_FILE_NOT_EXIST;
+    error = check_new(new_name);
+    if (error != 0)
+        return error;
+    if (call->value == 0 && FileStoreFind(new_name) != NULL)
+        return IEC_FILE_EXIST;
+    if (file == NULL || find_writer() != NULL)
+        return IEC_FILE_TOO_MANY;
+    return open_to_write(call, file, new_name, source, false);
+}
+
+static RTS_I32 copy_file(APP_CALL *call)
+{
+    OPEN_FILE *file = find_open(call->result);
+    RTS_I32 error;
+
+    if (file == NULL)
+        return begin_copy(call);
+    error = copy_all(call, file);
+    if (error != 0)
+        return error;
+    call->result = file->entry.size;
+    return close_file(call, file);
+}
+
+/* ---- folders ---- */
+
+/* The file that the program writes is not moved away under it. */
+static bool is_written_in(const char *folder)
+{
+    const OPEN_FILE *writer = find_writer();
+
+    return writer != NULL && rest_in(&writer->entry, folder) != NULL;
+}
+
+/* Those above it, from the first on. */
+static RTS_RESULT create_folders_above(const char *path)
+{
+    char folder[FILE_NAME_MAX + 1] = "";
+    RTS_RESULT result = ERR_OK;
+
+    for (RTS_UI32 i = 0; i < FILE_NAME_MAX && path[i] != '\0' && result == ERR_OK; i++) {
+        if (path[i] == '/' && !FileStoreIsFolder(folder))
+            result = FileStoreCreateFolder(folder);
+        folder[i] = path[i];
+    }
+    return result;
+}
+
+static RTS_I32 create_folder(const APP_CALL *call)
+{
+    const char *path = (const char *)call->data;
+    RTS_RESULT result = ERR_OK;
+
+    if (!FileStoreIsName(path))
+        return IEC_FILE_WRONG_PARAMETER;
+    if (call->value != 0)
+        result = create_folders_above(path);
+    return error_of(result == ERR_OK ? FileStoreCreateFolder(path) : result);
+}
+
+static RTS_I32 delete_folder(const APP_CALL *call)
+{
+    const char *path = (const char *)call->data;
+
+    return is_written_in(path) ? IEC_FILE_TOO_MANY : error_of(FileStoreDeleteFolder(path, call->value != 0));
+}
+
+static RTS_I32 rename_folder(const APP_CALL *call)
+{
+    const char *path = (const char *)call->data;
+    const char *new_path = second_name(call);
+
+    if (new_path == NULL)
+        return IEC_FILE_WRONG_PARAMETER;
+    if (is_written_in(path))
+        return IEC_FILE_TOO_MANY;
+    if (FileStoreIsName(new_path) && !FileStoreHasFolderOf(new_path))
+        return IEC_FILE_NOT_EXIST;
+    return error_of(FileStoreRenameFolder(path, new_path));
+}
+
+static RTS_I32 is_folder(APP_CALL *call)
+{
+    const char *path = (const char *)call->data;
+
+    if (path[0] != '\0' && !FileStoreIsName(path))
+        return IEC_FILE_WRONG_PARAMETER;
+    call->result = FileStoreIsFolder(path);
+    return 0;
 }
 
 static RTS_I32 get_size(APP_CALL *call)
@@ -359,10 +553,16 @@ static RTS_I32 get_size(APP_CALL *call)
 
 static RTS_I32 open_list(APP_CALL *call)
 {
+    const char *path = (const char *)call->data;
     OPEN_FILE *file = find_closed();
 
+    if (path[0] != '\0' && !FileStoreIsName(path))
+        return IEC_FILE_WRONG_PARAMETER;
+    if (!FileStoreIsFolder(path))
+        return IEC_FILE_NOT_EXIST;
     if (file == NULL)
         return IEC_FILE_TOO_MANY;
+    memcpy(file->entry.name, path, strlen(path) + 1);
     call->result = use_file(file, LISTING);
     return 0;
 }
@@ -382,6 +582,33 @@ static RTS_I32 undo_open(const APP_CALL *call)
     return 0;
 }
 
+/* What has a name, or two. */
+static RTS_I32 do_with_name(APP_CALL *call)
+{
+    switch (call->operation) {
+    case IEC_FILE_OPEN:
+        return open_file(call);
+    case IEC_FILE_DELETE:
+        return delete_file((const char *)call->data);
+    case IEC_FILE_RENAME:
+        return rename_file(call);
+    case IEC_FILE_SIZE:
+        return get_size(call);
+    case IEC_FILE_OPEN_DIR:
+        return open_list(call);
+    case IEC_FILE_COPY:
+        return copy_file(call);
+    case IEC_FILE_CREATE_DIR:
+        return create_folder(call);
+    case IEC_FILE_DELETE_DIR:
+        return delete_folder(call);
+    case IEC_FILE_RENAME_DIR:
+        return rename_folder(call);
+    default:
+        return is_folder(call);
+    }
+}
+
 /* In main. */
 static RTS_I32 carry_out(APP_CALL *call)
 {
@@ -392,24 +619,19 @@ static RTS_I32 carry_out(APP_CALL *call)
     case IEC_FILE_DELETE:
     case IEC_FILE_RENAME:
     case IEC_FILE_SIZE:
-        break;
     case IEC_FILE_OPEN_DIR:
-        return open_list(call);
+    case IEC_FILE_COPY:
+    case IEC_FILE_CREATE_DIR:
+    case IEC_FILE_DELETE_DIR:
+    case IEC_FILE_RENAME_DIR:
+    case IEC_FILE_IS_DIR:
+        break;
     default:
         return do_with_open(call);
     }
     if (call->result == 0 && !AppCallIsText(call)) /* a file that is copied has its handle there */
         return IEC_FILE_WRONG_PARAMETER;
-    switch (call->operation) {
-    case IEC_FILE_OPEN:
-        return open_file(call);
-    case IEC_FILE_DELETE:
-        return delete_file((const char *)call->data);
-    case IEC_FILE_RENAME:
-        return rename_file(call);
-    default:
-        return get_size(call);
-    }
+    return do_with_name(call);
 }
 
 /* ---- what the library calls ---- */

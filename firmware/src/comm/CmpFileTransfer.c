@@ -242,8 +242,8 @@ static bool may_change(const FILE_KIND *kind)
 
 /* ---- what requests say ---- */
 
-/* A name with or without NUL; ERR_PARAMETER if no file can have it. */
-static RTS_RESULT read_name(const SRV_REQUEST *request, FILE_ENTRY *entry)
+/* A name with or without NUL, of a file or of a folder. */
+static RTS_RESULT read_path(const SRV_REQUEST *request, FILE_ENTRY *entry)
 {
     BTAG tag;
     RTS_RESULT result = BTagFind(&request->tags, TAG_FILE_NAME, 0, request->tags.size, &tag);
@@ -258,7 +258,15 @@ static RTS_RESULT read_name(const SRV_REQUEST *request, FILE_ENTRY *entry)
     if (length > FILE_NAME_MAX)
         return ERR_PARAMETER;
     memcpy(entry->name, tag.data, length);
-    return FileStoreIsName(entry->name) ? ERR_OK : ERR_PARAMETER;
+    return ERR_OK;
+}
+
+/* ERR_PARAMETER if no file can have it. */
+static RTS_RESULT read_name(const SRV_REQUEST *request, FILE_ENTRY *entry)
+{
+    RTS_RESULT result = read_path(request, entry);
+
+    return result != ERR_OK || FileStoreIsName(entry->name) ? result : (RTS_RESULT)ERR_PARAMETER;
 }
 
 static RTS_RESULT find_source(const SRV_REQUEST *request, SOURCE *source)
@@ -269,14 +277,6 @@ static RTS_RESULT find_source(const SRV_REQUEST *request, SOURCE *source)
         return result;
     source->kind = kind_of(source->entry.name);
     return source->kind->find(&source->entry);
-}
-
-/* A name that may be written or deleted. */
-static RTS_RESULT read_own_name(const SRV_REQUEST *request, FILE_ENTRY *entry)
-{
-    RTS_RESULT result = read_name(request, entry);
-
-    return result == ERR_OK && !may_change(kind_of(entry->name)) ? ERR_OPERATION_DENIED : result;
 }
 
 /* A name that may be written. */
@@ -665,12 +665,26 @@ static RTS_RESULT cancel(SRV_REQUEST *request, BTAG_WRITER *reply)
     return end_or_cancel(request, reply, true);
 }
 
+/* A folder has its name as the list shows it, with a `/` at the end. */
+static RTS_RESULT delete_entry(char *name)
+{
+    RTS_SIZE length = strlen(name);
+
+    if (length > 0 && name[length - 1] == '/') {
+        name[length - 1] = '\0';
+        return FileStoreDeleteFolder(name, false);
+    }
+    if (!FileStoreIsName(name))
+        return ERR_PARAMETER;
+    return may_change(kind_of(name)) ? FileStoreDelete(name) : (RTS_RESULT)ERR_OPERATION_DENIED;
+}
+
 static RTS_RESULT delete_file(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     FILE_ENTRY entry;
-    RTS_RESULT result = read_own_name(request, &entry);
+    RTS_RESULT result = read_path(request, &entry);
 
-    return write_result(reply, result == ERR_OK ? FileStoreDelete(entry.name) : result);
+    return write_result(reply, result == ERR_OK ? delete_entry(entry.name) : result);
 }
 
 static const SRV_SERVICE services[] = {

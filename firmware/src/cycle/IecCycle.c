@@ -584,6 +584,18 @@ enum { TASKS_RUN_BESIDE_MAIN = !RTS_ONE_CORE && BP_HOLDS_TASKS };
 #if BP_MAX > 0
 #define NO_TASK 0xFFFFFFFFu
 
+#if APP_CALL_WAIT_MS > 0
+static void (*serve_waiting)(void);
+
+void IecCycleServeWaiting(void (*serve)(void))
+{
+    serve_waiting = serve;
+}
+#define serve_tasks_that_wait() (serve_waiting != NULL ? serve_waiting() : (void)0)
+#else
+#define serve_tasks_that_wait() ((void)0)
+#endif
+
 static bool hold_all(void)
 {
     RTS_UI32 since_ms = SysTimeGetMs();
@@ -596,6 +608,7 @@ static bool hold_all(void)
             return true;
         if (SysTimeGetMs() - since_ms > ONLINE_CHANGE_WAIT_MS)
             break;
+        serve_tasks_that_wait();
         SysTimePause();
     }
     IecCycleRelease();

@@ -38,13 +38,34 @@ static bool is_name_character(char c)
            c == '-';
 }
 
+/* Returns the characters of a path of names with `/` between them, 0 if there is anything else in it. */
+static RTS_UI32 length_of_path(const char *path)
+{
+    bool begins = true; /* a name */
+    RTS_UI32 length;
+
+    for (length = 0; length <= FILE_NAME_MAX && path[length] != '\0'; length++) {
+        char c = path[length];
+        if (begins ? !is_name_character(c) || c == '.' : !is_name_character(c) && c != '/')
+            return 0;
+        begins = c == '/';
+    }
+    return length <= FILE_NAME_MAX ? length : 0;
+}
+
 bool FileStoreIsName(const char *name)
 {
-    RTS_UI32 length = 0;
+    RTS_UI32 length = length_of_path(name);
 
-    while (length <= FILE_NAME_MAX && is_name_character(name[length]))
-        length++;
-    return length > 0 && length <= FILE_NAME_MAX && name[length] == '\0' && name[0] != '.';
+    return length > 0 && name[length - 1] != '/';
+}
+
+/* The entry of a folder has a `/` at its end. */
+static bool is_mark(const char *name)
+{
+    RTS_UI32 length = length_of_path(name);
+
+    return length > 0 && name[length - 1] == '/';
 }
 
 /* Bytes of flash that a file takes: whole sectors. */
@@ -103,6 +124,48 @@ static RTS_UI32 gap(RTS_UI32 index)
     return file == NULL ? 0 : file->start + span(file->size);
 }
 
+/* ---- folders ---- */
+
+/* True if the file, or the folder, of the name is below the folder with this path, or is it. */
+static bool is_below(const char *name, const char *folder)
+{
+    RTS_SIZE length = strlen(folder);
+
+    return strncmp(name, folder, length) == 0 && name[length] == '/';
+}
+
+bool FileStoreIsFolder(const char *path)
+{
+    for (RTS_UI32 i = 0; i < FILE_STORE_FILES; i++) {
+        if (is_below(store.catalog.file[i].name, path))
+            return true;
+    }
+    return path[0] == '\0';
+}
+
+/* ERR_DUPLICATE if a folder has the name, or a file that of one of its folders. */
+static RTS_RESULT check_way(const char *name)
+{
+    if (FileStoreIsFolder(name))
+        return ERR_DUPLICATE;
+    for (RTS_UI32 i = 0; i < FILE_STORE_FILES; i++) {
+        const FILE_ENTRY *file = FileStoreGet(i);
+        if (file != NULL && !is_mark(file->name) && is_below(name, file->name))
+            return ERR_DUPLICATE;
+    }
+    return ERR_OK;
+}
+
+bool FileStoreHasFolderOf(const char *path)
+{
+    const char *end = strrchr(path, '/');
+    char folder[FILE_NAME_MAX + 1] = "";
+
+    if (end != NULL)
+        memcpy(folder, path, (RTS_SIZE)(end - path));
+    return FileStoreIsFolder(folder);
+}
+
 static RTS_UI32 largest_gap(RTS_UI32 *start)
 {
     RTS_UI32 largest = 0;
@@ -144,8 +207,9 @@ RTS_UI32 FileStoreRoom(void)
 /* A record may hold anything. */
 static bool is_valid(const FILE_ENTRY *file)
 {
-    return memchr(file->name, '\0', sizeof(file->name)) != NULL && FileStoreIsName(file->name) &&
-           file->size <= capacity() && file->start <= capacity() - file->size && span(file->start) == file->start;
+    return memchr(file->name, '\0', sizeof(file->name)) != NULL && length_of_path(file->name) > 0 &&
+           (!is_mark(file->name) || file->size == 0) && file->size <= capacity() &&
+           file->start <= capacity() - file->size && span(file->start) == file->start;
 }
 
 static void read_catalog(void)
@@ -190,6 +254,14 @@ static RTS_RESULT change(FILE_ENTRY *place, const FILE_ENTRY *value)
 
 /* ---- writing ---- */
 
+/* Whether a file of that name can begin. */
+static RTS_RESULT check_name(const char *name)
+{
+    if (!FileStoreIsName(name))
+        return ERR_PARAMETER;
+    return store.opened == ERR_OK ? check_way(name) : store.opened;
+}
+
 /* The entry that the file will have. */
 static FILE_ENTRY *place_of(const char *name)
 {
@@ -209,11 +281,11 @@ static void begin_at_place(const char *name)
 
 RTS_RESULT FileStoreBegin(const char *name, RTS_UI32 size, RTS_UI32 crc)
 {
+    RTS_RESULT result = check_name(name);
+
     FileStoreAbort();
-    if (!FileStoreIsName(name))
-        return ERR_PARAMETER;
-    if (store.opened != ERR_OK)
-        return store.opened;
+    if (result != ERR_OK)
+        return result;
     if (size > capacity() || place_of(name) == NULL || !find_place(span(size), &store.next.start))
         return ERR_DISK_FULL;
     store.next.size = size;
@@ -224,11 +296,11 @@ RTS_RESULT FileStoreBegin(const char *name, RTS_UI32 size, RTS_UI32 crc)
 
 RTS_RESULT FileStoreCreate(const char *name)
 {
+    RTS_RESULT result = check_name(name);
+
     FileStoreAbort();
-    if (!FileStoreIsName(name))
-        return ERR_PARAMETER;
-    if (store.opened != ERR_OK)
-        return store.opened;
+    if (result != ERR_OK)
+        return result;
     if (place_of(name) == NULL)
         return ERR_DISK_FULL;
     store.next.start = 0; /* of an empty file in a store that is full */
@@ -323,10 +395,10 @@ RTS_RESULT FileStoreDelete(const char *name)
 
 RTS_RESULT FileStoreRename(const char *name, const char *new_name)
 {
-    if (store.opened != ERR_OK)
-        return store.opened;
-    if (!FileStoreIsName(new_name))
-        return ERR_PARAMETER;
+    RTS_RESULT result = check_name(new_name);
+
+    if (result != ERR_OK)
+        return result;
     if (FileStoreFind(name) == NULL)
         return ERR_NO_OBJECT;
     if (FileStoreFind(new_name) != NULL)
@@ -335,6 +407,128 @@ RTS_RESULT FileStoreRename(const char *name, const char *new_name)
     memset(renamed.name, 0, sizeof(renamed.name));
     memcpy(renamed.name, new_name, strlen(new_name));
     return change(find(name), &renamed);
+}
+
+/* ---- making and deleting folders ---- */
+
+/* The entry of a folder that is made; false if the path is too long for one. */
+static bool make_mark(FILE_ENTRY *mark, const char *path)
+{
+    RTS_SIZE length = strlen(path);
+
+    memset(mark, 0, sizeof(*mark));
+    if (!FileStoreIsName(path) || length >= FILE_NAME_MAX)
+        return false;
+    memcpy(mark->name, path, length);
+    mark->name[length] = '/';
+    return true;
+}
+
+RTS_RESULT FileStoreCreateFolder(const char *path)
+{
+    FILE_ENTRY mark;
+    RTS_RESULT result = make_mark(&mark, path) ? check_name(path) : (RTS_RESULT)ERR_PARAMETER;
+
+    if (result != ERR_OK)
+        return result;
+    if (FileStoreFind(path) != NULL)
+        return ERR_DUPLICATE;
+    if (!FileStoreHasFolderOf(path))
+        return ERR_NO_OBJECT;
+    return find("") == NULL ? (RTS_RESULT)ERR_DISK_FULL : change(find(""), &mark);
+}
+
+/* Writes a catalog of which several entries have changed. On an error it is what flash has. */
+static RTS_RESULT write_changed(void)
+{
+    RTS_RESULT result = FlashLogAppend(&store.log, CATALOG_TAG, &store.catalog, sizeof(store.catalog));
+
+    if (result != ERR_OK)
+        read_catalog();
+    return result;
+}
+
+/* ERR_PARAMETER not a path of a folder, ERR_NO_OBJECT there is none. */
+static RTS_RESULT check_folder(const char *path)
+{
+    if (!FileStoreIsName(path))
+        return ERR_PARAMETER;
+    if (store.opened != ERR_OK)
+        return store.opened;
+    return FileStoreIsFolder(path) ? (RTS_RESULT)ERR_OK : ERR_NO_OBJECT;
+}
+
+/* True if nothing but its own entry is in the folder. */
+static bool is_empty(const char *path)
+{
+    RTS_SIZE length = strlen(path) + 1;
+
+    for (RTS_UI32 i = 0; i < FILE_STORE_FILES; i++) {
+        const char *name = store.catalog.file[i].name;
+        if (is_below(name, path) && name[length] != '\0')
+            return false;
+    }
+    return true;
+}
+
+RTS_RESULT FileStoreDeleteFolder(const char *path, bool with_files)
+{
+    RTS_RESULT result = check_folder(path);
+
+    if (result != ERR_OK)
+        return result;
+    if (!with_files && !is_empty(path))
+        return ERR_ENTRIES_REMAINING;
+    for (RTS_UI32 i = 0; i < FILE_STORE_FILES; i++) {
+        FILE_ENTRY *file = &store.catalog.file[i];
+        if (is_below(file->name, path))
+            memset(file, 0, sizeof(*file));
+    }
+    return write_changed();
+}
+
+/* Replaces the path of a folder in the name of what is in it; false if the name becomes too long. With `commit` false it only
+ * looks. */
+static bool move(FILE_ENTRY *file, const char *path, const char *new_path, bool commit)
+{
+    RTS_SIZE before = strlen(path);
+    RTS_SIZE after = strlen(new_path);
+    RTS_SIZE rest = strlen(file->name + before);
+    char name[sizeof(file->name)] = "";
+
+    if (after + rest > FILE_NAME_MAX)
+        return false;
+    memcpy(name, new_path, after);
+    memcpy(name + after, file->name + before, rest);
+    if (commit)
+        memcpy(file->name, name, sizeof(name));
+    return true;
+}
+
+static bool move_all(const char *path, const char *new_path, bool commit)
+{
+    for (RTS_UI32 i = 0; i < FILE_STORE_FILES; i++) {
+        FILE_ENTRY *file = &store.catalog.file[i];
+        if (is_below(file->name, path) && !move(file, path, new_path, commit))
+            return false;
+    }
+    return true;
+}
+
+RTS_RESULT FileStoreRenameFolder(const char *path, const char *new_path)
+{
+    RTS_RESULT result = check_folder(path);
+
+    if (result == ERR_OK)
+        result = check_name(new_path);
+    if (result != ERR_OK)
+        return result;
+    if (FileStoreFind(new_path) != NULL)
+        return ERR_DUPLICATE;
+    if (is_below(new_path, path) || !move_all(path, new_path, false))
+        return ERR_PARAMETER;
+    (void)move_all(path, new_path, true);
+    return write_changed();
 }
 
 #endif

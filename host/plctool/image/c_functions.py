@@ -30,7 +30,8 @@ _FUNCTIONS = {
         call_result(DINT):UDINT                             32    48
         call_get(DINT,UDINT):LWORD                          48    64
         call_free(DINT):BOOL                                32    48
-        call_room():UDINT                                   16    16""",
+        call_room():UDINT                                   16    16
+        call_wait(DINT):BOOL                                48    64""",
     "IecFile": """
         file_call(UDINT,UDINT,UDINT):DINT                   80   112""",
     "IecSocket": """

@@ -27,11 +27,17 @@ _POSITION = Layout("FILE_POSITION")
 _TRIES = 4  # of a file whose channel was lost, or that changed while it was read
 _BLOCK_OVERHEAD = 48  # layer 7 header and tags around a part, bytes
 _MOST_BYTES = 1 << 28  # of a file, whatever a device says
-_NAME = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{lib.FILE_NAME_MAX - 1}}}")
+_PART = "[A-Za-z0-9_-][A-Za-z0-9._-]*"
+_NAME = re.compile(rf"(?=.{{1,{lib.FILE_NAME_MAX}}}\Z){_PART}(?:/{_PART})*")
+_FOLDER = re.compile(rf"(?=.{{1,{lib.FILE_NAME_MAX}}}\Z)(?:{_PART}/)+")
 
 _WHY = {
     lib.ERR_NO_OBJECT: "it has no such file; 'plctool files list' shows what there is",
-    lib.ERR_PARAMETER: f"no file can have this name: up to {lib.FILE_NAME_MAX} letters, digits and . _ -, no folders",
+    lib.ERR_PARAMETER: (
+        f"no file can have this name: up to {lib.FILE_NAME_MAX} letters, digits and . _ -, with / after each folder"
+    ),
+    lib.ERR_DUPLICATE: "a folder has this name, or a file that of its folder; take another one",
+    lib.ERR_ENTRIES_REMAINING: "the folder is not empty; delete its files first",
     lib.ERR_DISK_FULL: "there is no room for it; delete others with 'plctool files delete'",
     lib.ERR_OPERATION_DENIED: "the device makes this file itself; it can only be read",
     lib.ERR_NO_CONSISTENCY: "it changed while it was read; try again",
@@ -137,7 +143,9 @@ def _write_once(session: Session, name: str, data: bytes, progress: Progress) ->
 
 
 def delete_file(session: Session, name: str) -> None:
-    _check_name(name)
+    """Deletes a file, or a folder that is empty: its name ends with a /."""
+    if not _FOLDER.fullmatch(name):
+        _check_name(name)
     look(session)
     named = bintag.text(lib.TAG_FILE_NAME, name)
 

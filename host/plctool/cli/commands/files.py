@@ -26,14 +26,14 @@ def files_arguments(command: Parser) -> None:
     get.add_argument("name", type=utf8, metavar="NAME", help="as 'plctool files list' shows it")
     get.add_argument(
         "-o", "--output", type=usable_path, metavar="FILE",
-        help="- for the standard output; default: its name, in this folder",
+        help="- for the standard output; default: its name without folders, in this folder",
     )  # fmt: skip
     add_link(get)
     put = action("put", "copy a file to the device, in place of the previous one of its name", _put)
     put.add_argument("file", type=usable_path, metavar="FILE")
     put.add_argument("--name", type=utf8, metavar="NAME", help="on the device; default: that of the file")
     add_link(put)
-    delete = action("delete", "delete a file of the device", _delete)
+    delete = action("delete", "delete a file of the device, or a folder that is empty", _delete)
     delete.add_argument("name", type=utf8, metavar="NAME", help="as 'plctool files list' shows it")
     add_link(delete)
 
@@ -46,7 +46,7 @@ def _get(args: argparse.Namespace) -> int:
     output.check_one_output(args)
     return with_progress(
         args,
-        lambda plc, show: get_file(plc, args.name, output_or(args, args.name), show),
+        lambda plc, show: get_file(plc, args.name, output_or(args, args.name.rpartition("/")[2]), show),
         lambda d: f"{d['name'] if d['file'] == str(STDOUT) else d['file']}: {d['size']} bytes",
         output.beside_output(args),
     )
