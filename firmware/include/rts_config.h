@@ -233,6 +233,13 @@
 #define APP_RETAIN_SAVE_US 1000000
 #endif
 
+/* 1: the port has RAM that keeps its content while the power is off (SysSram.h), and retain variables have a copy there, made
+ * in each pass of main in which they changed: nothing is lost that main has seen. It takes twice the retain area and 48
+ * bytes; a smaller one is not used. Records in flash go on, for a battery that is empty. 0: no flash for it. */
+#ifndef APP_RETAIN_SRAM
+#define APP_RETAIN_SRAM 0
+#endif
+
 /* 1: the port tells when the power is about to fail (AppPowerFails.h), and retain variables are saved then. If the power is
  * still there after APP_POWER_BACK_MS, the program is started again. 0: no flash for it. */
 #ifndef APP_POWER_FAIL

@@ -134,6 +134,10 @@ void SimSetFileStore(RTS_UI32 size);
  * SimStart; it stays. */
 void SimSetKeptLog(RTS_UI32 size);
 
+/* Bytes of RAM that keeps its content while the power is off (SysSram.h), at most 16 KiB, with anything in it; the default is 0.
+ * From power off. */
+void SimSetSram(RTS_UI32 size);
+
 /* A file, as a program or a tool writes it. While power is on. Errors as FileStoreBegin; ERR_INVALID_STATE: one is being
  * written. */
 RTS_RESULT SimPutFile(const char *name, const RTS_UI8 *data, RTS_UI32 size);

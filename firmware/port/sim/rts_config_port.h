@@ -44,6 +44,7 @@
 #define IEC_SOCKETS 64
 #define IEC_COMS 8
 #define APP_POWER_FAIL 1
+#define APP_RETAIN_SRAM 1
 #define IEC_TASK_CALLS 1
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */
 #define TRACE_BUFFER (1024 * 1024)

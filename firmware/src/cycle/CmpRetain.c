@@ -12,6 +12,7 @@
 
 #include "CmpLog.h"
 #include "IecCycle.h"
+#include "RetainSram.h"
 #include "RetainTable.h"
 #include "SettingValues.h"
 #include "SysFileFlash.h"
@@ -24,6 +25,9 @@ static struct {
     RTS_UI8 *area;
     RTS_UI32 tag; /* of its records */
     bool failed;  /* the last save failed, and was logged */
+#if APP_RETAIN_SRAM
+    RTS_UI32 record_ms; /* when the last record of values in SRAM was due */
+#endif
 } retain;
 
 /* All zero without an application. */
@@ -66,6 +70,48 @@ void RetainAttach(RTS_UI8 *area, const RETAIN_TABLE *table, RTS_UI32 tag)
     retain.tag = tag;
     retain.last_check_ms = SysTimeGetMs();
 }
+
+/* ---- a copy in RAM that survives ---- */
+
+#if APP_RETAIN_SRAM
+static bool has_sram(void)
+{
+    return RetainSramFits(kept.table->area_size);
+}
+
+/* The copy of the variables that was made last. */
+static void copy_to_sram(void)
+{
+    RetainSramSave(retain.tag, retain.log.sequence, saved_area, kept.table->area_size);
+}
+
+/* True if the variables differ from that copy. */
+static bool is_behind(void)
+{
+    return kept.settled && has_sram() && memcmp(saved_area, retain.area, kept.table->area_size) != 0;
+}
+
+/* Saves the copy that was made. True: a record in flash is not due. */
+static bool is_in_sram(void)
+{
+    if (!has_sram())
+        return false;
+    copy_to_sram();
+    if (SysTimeGetMs() - retain.record_ms < SAVE_MS)
+        return true;
+    retain.record_ms = SysTimeGetMs();
+    return false;
+}
+
+static bool load_from_sram(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range)
+{
+    return RetainSramLoad(tag, retain.log.sequence, range, saved_area, table->area_size);
+}
+#else
+#define is_behind() false
+#define is_in_sram() false
+#define load_from_sram(table, tag, range) false
+#endif
 
 /* ---- where values come from ---- */
 
@@ -175,6 +221,7 @@ void RetainPutBack(void)
 RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range)
 {
     RTS_RESULT result;
+    bool newer; /* than flash */
 
     if (!HAS_RETAIN)
         return ERR_NO_OBJECT;
@@ -183,14 +230,15 @@ RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE r
     if (table->size == 0)
         return ERR_NO_OBJECT;
     result = FlashLogRead(&retain.log, range, tag, saved_area, table->area_size);
-    if (result != ERR_OK)
+    newer = load_from_sram(table, tag, range);
+    if (result != ERR_OK && !newer)
         return result;
     kept.source = *table;
     kept.persistent_only = is_of_application_before();
     if (kept.persistent_only)
         return ERR_OK;
     RetainPutBack(); /* at once, to be read while the application waits */
-    kept.saved_valid = true;
+    kept.saved_valid = !newer;
     kept.settled = true;
     return ERR_OK;
 }
@@ -318,7 +366,7 @@ static bool is_due(void)
 {
     RTS_UI32 now_ms = SysTimeGetMs();
 
-    if (kept.asked)
+    if (kept.asked || is_behind())
         return true;
     if (!kept.settled || now_ms - retain.last_check_ms < SAVE_MS)
         return false;
@@ -332,7 +380,7 @@ static void save_when_due(void)
         return;
     kept.saved_valid = false;
     kept.asked = !IecTaskBetweenCycles(take_copy);
-    if (!kept.asked)
+    if (!kept.asked && !is_in_sram())
         (void)save_copy();
 }
 

@@ -3,6 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#include "AppPowerFails.h"
 #include "BareMetal.h"
 #include "SysFlash.h"
 #include "SysTarget.h"
@@ -36,6 +37,9 @@ enum { TIMER_ENABLE_IRQ = 9, WATCHDOG_INTEN_RESEN = 3, WATCHDOG_KEY = 0x1ACCE551
 void BoardInit(void)
 {
     IrqEnable(IRQ_TIMER0, LEVEL_DEVICE);
+#if APP_POWER_FAIL
+    IrqEnable(IRQ_GPIO0, LEVEL_DEVICE);
+#endif
     UartInit();
     FlashInit();
     MpuProtect(MPU_HOLE, HOLE_BASE, HOLE_LOG2, MPU_NO_ACCESS);
@@ -53,6 +57,14 @@ void AlarmIrq(void)
     TIMER_INTCLEAR = 1;
     SysTimerAlarm();
 }
+
+#if APP_POWER_FAIL
+/* A supply monitor on a line of GPIO port 0: the edge that says that the input voltage falls. */
+void SupplyIrq(void)
+{
+    AppPowerFails();
+}
+#endif
 
 /* The first time-out is an NMI, the second one resets. */
 void BoardWatchdogStart(RTS_UI32 ms)

@@ -20,4 +20,10 @@
 #define BOARD_FLASH_SECTOR_SIZE 4096u
 #define FLASH_READS_FAIL 0 /* it is memory */
 
+/* In the full configuration this board stands for one with backup RAM and a supply monitor. */
+#ifdef FILE_STORE_FILES
+#define APP_RETAIN_SRAM 1
+#define APP_POWER_FAIL 1
+#endif
+
 #endif
