@@ -253,14 +253,10 @@ class Board:
 
         Not in the first KiB, which QEMU's debugger takes for as inaccessible as the vectors are.
         """
-        self.write_memory(self.address_of(function) & ~1, code)
-
-    def write_memory(self, address: int, data: bytes) -> None:
-        """Writes RAM, flash or a register, as a debugger does."""
         self._qmp("human-monitor-command", **{"command-line": "gdbserver unix:gdb,server=on,wait=off"})
         with _connect(self.folder / "gdb") as stub:
-            where = f"{address:x},{len(data):x}"
-            answers = [_ask_debugger(stub, request) for request in (f"M{where}:{data.hex()}", "D")]
+            where = f"{self.address_of(function) & ~1:x},{len(code):x}"
+            answers = [_ask_debugger(stub, request) for request in (f"M{where}:{code.hex()}", "D")]
         self._qmp("human-monitor-command", **{"command-line": "gdbserver none"})
         if answers != ["OK", "OK"]:
             raise RuntimeError(f"QEMU's debugger says {answers}")
