@@ -265,7 +265,7 @@ PLACES = {
 }
 HEEDED_AT = {
     "qualified_only": {"VAR_GLOBAL", "enumeration", "named enumeration"},
-    "external": {"FUNCTION"},
+    "external": {"FUNCTION", "FUNCTION_BLOCK"},
     "shared_output": {"variable"},
 }
 
@@ -284,9 +284,9 @@ def test_an_attribute_that_is_heeded_says_so_where_it_is_not(name: str, place: s
     assert all(name in message or "written in C" in message for _, message in found)
 
 
-def test_code_in_c_is_for_functions() -> None:
-    assert effects("external", "FUNCTION_BLOCK", " := 'f'") == [
-        ("error", "only a FUNCTION can be written in C, not a FUNCTION_BLOCK")
+def test_code_in_c_is_for_functions_and_blocks() -> None:
+    assert effects("external", "PROGRAM", " := 'f'") == [
+        ("error", "only a FUNCTION or FUNCTION_BLOCK can be written in C, not a PROGRAM")
     ]
     assert effects("external_name", "FUNCTION", " := 'f'") == [
         ("error", "the name of a function in C is written {attribute 'external' := 'name'}")

@@ -125,6 +125,28 @@ def test_a_c_function_is_called_by_a_program(product: Callable[[str], Path], con
         eventually(lambda: plc.read("Main.level") == 7.5)
 
 
+def test_a_function_block_in_c_keeps_to_its_instance_and_the_structure_of_the_firmware(
+    product: Callable[[str], Path],
+) -> None:
+    folder = product("full")
+    (source,) = blocks("c-functions.md", "acmepid.st")
+    (folder / "acmepid.st").write_text(source)
+    assert plctool(["export-itf", str(folder / "acmepid.st"), "-o", str(folder)]) == 0
+    body, (implementation,) = folder / "acmepid.c", blocks("c-functions.md", "acmepid.c")
+    registration = body.read_text().partition("static const CMP_EXT_FUNCTION")
+    body.write_text(implementation + "\n" + registration[1] + registration[2])
+    merge(folder / "cmp_list.c", '#include "acmepidItf.h"\n#define PORT_COMPONENTS(X) X(acmepid)')
+    text = program("VAR one : AcmePid(gain := 2); two : AcmePid(gain := 3); END_VAR", "one(setpoint := 5); two();")
+    good = compile_text(source + text, TARGET, folder)
+    other = compile_text(source.replace("VAR\n    gain", "VAR\n    first : BOOL; gain") + text, TARGET, folder)
+    with Board(MACHINE, make(folder), folder) as board, Plc(Connection(board.line())) as plc:
+        with pytest.raises(DeviceError, match=r"acme_pid__main \(other parameters\)"):
+            plc.flash(other.path)
+        plc.flash(good.path)
+        eventually(lambda: plc.read("Main.one.y") == 10.0)
+        assert plc.read("Main.two.gain") == 3.0
+
+
 def test_a_driver_from_the_blank_one_has_a_device(product: Callable[[str], Path]) -> None:
     folder = product("io")
     for name in ("IoDrvBlank.c", "IoDrvBlank.h"):

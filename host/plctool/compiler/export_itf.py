@@ -3,6 +3,9 @@
 The header holds the types, the prototypes and the entries of the function table; it is written again whenever the
 library changes. The C file is a component for the runtime's list (docs/porting.md); once written, it is the user's.
 
+The body and the methods of a block get one structure each, as in CODESYS: with the instance, the parameters and the
+result. The program calls them as it calls functions, so the header has a small function between the two.
+
 SPDX-License-Identifier: Apache-2.0
 """
 
@@ -14,7 +17,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from plctool.compiler.semantics.declarations.functions import interface_text
-from plctool.compiler.typed.nodes import Direction, Parameter, Pou
+from plctool.compiler.typed.nodes import Direction, Parameter, Pou, PouKind
 from plctool.errors import UsageError
 from plctool.iec.types import (
     MAX_ALIGN,
@@ -31,6 +34,7 @@ from plctool.iec.types import (
     base_of,
     is_scalar,
 )
+from plctool.image.c_functions import version_text
 
 _C_WORDS = frozenset((
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern", "float",
@@ -97,16 +101,21 @@ def _header(name: str, functions: list[Pou]) -> str:
         "/* The number of the component in log entries; any that no other component has. */",
         f"enum {{ CMPID_{name} = 0x{0x8000 | zlib.crc32(name.encode()) & 0x7FFF:04X} }};",
     ]
-    for t in _named_types(functions):
-        lines += ["", *_type_lines(t)]
+    types = _named_types(functions)
+    if any(isinstance(t, StructType) for t in types):
+        lines.append("")
+    lines += [f"typedef {_struct_word(t)} {_type_name(t)} {_type_name(t)};" for t in types if isinstance(t, StructType)]
+    for t in types:
+        lines += ["", *_type_lines(t)] if isinstance(t, EnumType) or t.fields else []
     for pou in functions:
         assert pou.external is not None
-        version = pou.external.version
         text = interface_text(pou.external.name, pou)
-        place = f"{text}, version {version >> 16}.{version & 0xFFFF}"
-        lines += ["", f"/* {place} */", f"{_prototype(pou)};"]
+        lines += ["", *(_call_structure(pou) if pou.instance is not None else [])]
+        lines += [f"/* {text}, version {version_text(pou.external.version)} */", f"{_prototype(pou)};"]
+    for pou in functions:
+        lines += ["", *_wrapper(pou)] if pou.instance is not None else []
     lines += ["", "/* They have all rights of the runtime, also where the program that calls them has not. */"]
-    lines += [f"APP_GATE({pou.external.name});" for pou in functions if pou.external is not None]
+    lines += [f"APP_GATE({_called(pou)});" for pou in functions]
     lines += ["", "/* The entries of the table for CMRegisterExternal: name, signature, version, function. */"]
     entries = [_entry(pou) for pou in functions]
     lines.append(f"#define {name.upper()}_EXT_FUNCTIONS \\")
@@ -118,22 +127,96 @@ def _header(name: str, functions: list[Pou]) -> str:
 def _entry(pou: Pou) -> str:
     external = pou.external
     assert external is not None
-    function = f"(RTS_PFN)APP_GATED({external.name})"
+    function = f"(RTS_PFN)APP_GATED({_called(pou)})"
     return f'{{"{external.name}", 0x{external.signature:08X}, 0x{external.version:08X}, {function}}}'
 
 
 def _prototype(pou: Pou) -> str:
-    """`RTS_I16 name(RTS_I16 a, const char *s, RTS_UI32 s_capacity)`"""
-    words = list(_parameters(pou))
-    result = "void"
-    if pou.result is not None and is_scalar(pou.result.type):
-        result = _value(pou.result.type)
+    """`RTS_I16 name(RTS_I16 a, const char *s, RTS_UI32 s_capacity)`, or with the structure of a block or method."""
+    if pou.instance is not None:
+        return f"void {_external(pou)}({_structure_of(pou)} *p)"
+    return _declaration(_result_of(pou), _external(pou), list(_parameters(pou)))
+
+
+def _result_of(pou: Pou) -> str:
+    """The C type that a function returns."""
+    return _value(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
+
+
+def _declaration(result: str, name: str, words: list[str]) -> str:
     space = "" if result.endswith("*") else " "
-    start = f"{result}{space}{_external(pou)}("
+    start = f"{result}{space}{name}("
     line = f"{start}{', '.join(words) or 'void'})"
     if len(line) <= _WIDTH:
         return line
     return start + (",\n" + " " * len(start)).join(words) + ")"
+
+
+# ---- blocks and methods ----------------------------------------------------------------------------------------------
+
+
+def _called(pou: Pou) -> str:
+    """The C function that programs call."""
+    return _external(pou) if pou.instance is None else f"{_external(pou)}_called"
+
+
+def _block_name(pou: Pou) -> str:
+    return _external(pou).rpartition("__")[0]
+
+
+def _structure_of(pou: Pou) -> str:
+    """The type of what a block or method gets: `acme_pid_main_struct`, as in CODESYS."""
+    return "_".join((*_external(pou).rsplit("__", 1), "struct"))
+
+
+def _members_of(pou: Pou) -> list[str]:
+    """The parameters of a method, without the instance; those of a block are variables of it."""
+    return list(_parameters(pou)) if pou.kind is PouKind.METHOD else []
+
+
+def _call_structure(pou: Pou) -> list[str]:
+    """The type of the instance before the body of the block; what the body or a method gets."""
+    assert pou.instance is not None
+    block = f"{_block_name(pou)}_struct"
+    lines = [f"typedef {_type_name(pou.instance)} {block};", ""] if pou.kind is PouKind.FUNCTION_BLOCK else []
+    lines += ["typedef struct {", f"    {block} *pInstance;", *(f"    {word};" for word in _members_of(pou))]
+    result = _result_of(pou)
+    if result != "void":
+        space = "" if result.endswith("*") else " "
+        lines.append(f"    {result}{space}{_result_member(pou)};")
+    return [*lines, f"}} {_structure_of(pou)};"]
+
+
+def _result_member(pou: Pou) -> str:
+    assert pou.result is not None
+    return c_name(pou.result.name)
+
+
+def _name_in(word: str) -> str:
+    """The name that a parameter in C declares."""
+    return str(_NAME.findall(word)[-1])
+
+
+def _wrapper(pou: Pou) -> list[str]:
+    """What programs call: it puts the parameters into the structure."""
+    words = _members_of(pou)
+    parameters = [f"{_block_name(pou)}_struct *instance", *words]
+    values = ["instance", *map(_name_in, words)]
+    if _result_of(pou) != "void":
+        values.append("0")
+    lines = [
+        _declaration(f"static inline {_result_of(pou)}", _called(pou), parameters),
+        "{",
+        f"    {_structure_of(pou)} p = {{{', '.join(values)}}};",
+        "",
+        f"    {_external(pou)}(&p);",
+    ]
+    if _result_of(pou) != "void":
+        lines.append(f"    return p.{_result_member(pou)};")
+    return [*lines, "}"]
+
+
+# ---- parameters ------------------------------------------------------------------------------------------------------
 
 
 def _parameters(pou: Pou) -> Iterator[str]:
@@ -148,7 +231,7 @@ def _parameters(pou: Pou) -> Iterator[str]:
 def _parameter(parameter: Parameter, names: set[str]) -> Iterator[str]:
     """`names`: of all parameters, among which the result has to find one of its own."""
     t, name = parameter.variable.type, c_name(parameter.variable.name)
-    if name == "result":
+    if name in ("result", "instance", "p"):  # of ours
         while name in names:
             name += "_"
     if is_scalar(t) and not parameter.by_reference:
@@ -211,12 +294,13 @@ def _is_named(t: EnumType | StructType) -> bool:
 def _named_types(functions: list[Pou]) -> list[EnumType | StructType]:
     """The enums and structs the functions need, each after what it consists of."""
     found: dict[EnumType | StructType, None] = {}
+    pointed: list[Type] = []  # which are declared, but need not be complete before
 
     def add(t: Type) -> None:
         if isinstance(t, ArrayType):
             add(t.element)
         elif isinstance(t, PointerType):
-            add(t.target)
+            pointed.append(t.target)
         elif isinstance(t, EnumType) and _is_named(t):
             found[t] = None
         elif isinstance(t, StructType) and t not in found:
@@ -225,11 +309,16 @@ def _named_types(functions: list[Pou]) -> list[EnumType | StructType]:
             found[t] = None
 
     for pou in functions:
-        for parameter in pou.parameters:
+        if pou.instance is not None:
+            add(pou.instance)
+        for parameter in pou.parameters if pou.kind is not PouKind.FUNCTION_BLOCK else []:
             add(parameter.variable.type)
         if pou.result is not None:
             add(pou.result.type)
-    return list(found)
+    while pointed:
+        add(pointed.pop())
+    enums = [t for t in found if isinstance(t, EnumType)]
+    return [*enums, *(t for t in found if isinstance(t, StructType))]
 
 
 def _type_lines(t: EnumType | StructType) -> Iterable[str]:
@@ -238,9 +327,9 @@ def _type_lines(t: EnumType | StructType) -> Iterable[str]:
         return [f"typedef {_value(t.base)} {_type_name(t)};", f"enum {{ {values} }};"]
     name, packed = _type_name(t), t.pack < MAX_ALIGN
     lines = [f"#pragma pack(push, {t.pack})"] if packed else []
-    lines += ["typedef union {" if t.union else "typedef struct {"]
+    lines += [f"{_struct_word(t)} {name} {{"]
     lines += [f"    {_member(f)};" for f in t.fields]
-    lines += [f"}} {name};", *(["#pragma pack(pop)"] if packed else [])]
+    lines += ["};", *(["#pragma pack(pop)"] if packed else [])]
     lines += [f"RTS_STATIC_ASSERT(sizeof({name}) == {t.size}, {name}_size);"]
     lines += [
         f"RTS_STATIC_ASSERT(offsetof({name}, {c_name(f.name)}) == {f.offset}, {name}_{c_name(f.name)});"
@@ -248,6 +337,10 @@ def _type_lines(t: EnumType | StructType) -> Iterable[str]:
         if f.bit is None
     ]
     return lines
+
+
+def _struct_word(t: StructType) -> str:
+    return "union" if t.union else "struct"
 
 
 def _member(f: Field) -> str:
@@ -305,6 +398,9 @@ def _source(name: str, header: str, functions: list[Pou]) -> str:
 
 def _body(pou: Pou) -> Iterator[str]:
     """A body that compiles and does nothing yet."""
+    if pou.instance is not None:
+        yield "    RTS_UNUSED(p);"
+        return
     scalar = pou.result is not None and is_scalar(pou.result.type)
     if scalar:
         assert pou.result is not None
@@ -312,6 +408,6 @@ def _body(pou: Pou) -> Iterator[str]:
         yield f"    {value}{'' if value.endswith('*') else ' '}result = 0;"
         yield ""
     for word in _parameters(pou):
-        yield f"    RTS_UNUSED({_NAME.findall(word)[-1]});"
+        yield f"    RTS_UNUSED({_name_in(word)});"
     if scalar:
         yield "    return result;"

@@ -5,6 +5,7 @@ Those that a vendor adds are not known here.
 
 from __future__ import annotations
 
+import re
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -184,6 +185,26 @@ _WITHOUT_FPU = frozenset(
 
 VERSION = 0x00010000
 """Of the library of all of them."""
+
+
+_VERSION = re.compile(r"(\d{1,3})\.(\d{1,3})(?:\.(\d{1,3})\.(\d{1,3}))?")
+
+
+def parse_version(text: str) -> int | None:
+    """The number of a version '1.0' (major << 16 | minor) or '1.0.0.0' (a byte each, the first one not 0), which are
+    apart by the uppermost byte. Of both the device compares the upper half, and wants no less in the lower one."""
+    found = _VERSION.fullmatch(text)
+    parts = [int(part) for part in found.groups() if part is not None] if found else []
+    if not parts or max(parts) > 255 or (len(parts) == 4 and parts[0] == 0):
+        return None
+    return parts[0] << 16 | parts[1] if len(parts) == 2 else int.from_bytes(bytes(parts), "big")
+
+
+def version_text(version: int) -> str:
+    """The version as it is written."""
+    if version >> 24:
+        return ".".join(str(part) for part in version.to_bytes(4, "big"))
+    return f"{version >> 16}.{version & 0xFFFF}"
 
 
 @dataclass(frozen=True)

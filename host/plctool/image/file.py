@@ -18,6 +18,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError
 from plctool.files import read_image
 from plctool.iec.areas import Area
+from plctool.image.c_functions import version_text
 from plctool.project import IMAGE_SUFFIX, SYMBOL_SUFFIX
 
 NO_AREA = int(lib.APP_AREA_NONE)
@@ -694,7 +695,7 @@ def describe_image(data: bytes) -> dict[str, Any]:
             {"name": functions[number], "offset": offset} for number, offset in sorted(image.functions.items())
         ],
         "externals": [
-            {"name": e.name, "signature": f"{e.signature:08X}", "version": f"{e.version >> 16}.{e.version & 0xFFFF}"}
+            {"name": e.name, "signature": f"{e.signature:08X}", "version": version_text(e.version)}
             for e in image.externals
         ],
         "tasks": [

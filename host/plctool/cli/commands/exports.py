@@ -111,6 +111,7 @@ def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
     from plctool.compiler.front import check_sources
     from plctool.files import make_folder
     from plctool.iec.dialect import find_dialect
+    from plctool.image.c_functions import version_text
 
     files, dialect = settings.files, find_dialect(settings.dialect)
     # A file of functions alone has not the programs that a description beside it names.
@@ -141,7 +142,7 @@ def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
         "source": str(source),
         "source_written": written,
         "functions": [
-            {"interface": text, "signature": f"{signature:08X}", "version": f"{version >> 16}.{version & 0xFFFF}"}
+            {"interface": text, "signature": f"{signature:08X}", "version": version_text(version)}
             for text, signature, version in interface.functions
         ],
     }

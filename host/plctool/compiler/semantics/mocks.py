@@ -6,14 +6,14 @@ All of it happens in the syntax tree, before anything is checked, and only for t
   counts, and its methods, actions and properties do nothing;
 - a method or property named in a test has members of its own, so that it can return a value and count its calls;
 - a function gets the global variables `__mock_f` and `__value_f`; while it is mocked, it returns the value;
-- a function that is implemented in C, and not in this process, raises an exception unless it is mocked.
+- a function or block that is implemented in C, and not in this process, raises an exception unless it is mocked.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from plctool.compiler.base.source import Source
@@ -74,8 +74,10 @@ class Mocks:
         """The declarations with what the tests need to replace parts of them."""
         result: list[ast.Declaration] = []
         for decl in declarations:
-            if isinstance(decl, ast.PouDecl) and decl.keyword is ast.Unit.FUNCTION_BLOCK and self._blocks:
-                result.append(self._block(decl))
+            if isinstance(decl, ast.PouDecl) and decl.keyword is ast.Unit.FUNCTION_BLOCK:
+                block = _raising_block(decl) if _is_elsewhere(decl, "__main") else decl
+                # The layout of a block in C stays as it is.
+                result.append(self._block(block) if self._blocks and "external" not in block.attributes else block)
             elif isinstance(decl, ast.PouDecl) and decl.keyword is ast.Unit.FUNCTION:
                 result += self._function(decl)
             else:
@@ -112,11 +114,8 @@ class Mocks:
             mocked = False
         pos, body, attributes = decl.pos, decl.body, decl.attributes
         if _is_elsewhere(decl):
-            code = ast.Literal(pos, ast.LiteralKind.INT, lib.RTSEXCPT_UNRESOLVED_EXTREFS)
-            attributes = {name: text for name, text in attributes.items() if name != "external"}
-            body = [ast.ExprStmt(pos, ast.Call(pos, ast.Name(pos, _RAISE), [ast.Argument(pos, None, code)]))]
-            if decl.result is not None:  # which is assigned in C
-                body.append(_assign(pos, decl.name, ast.Name(pos, decl.name)))
+            attributes = _without_external(attributes)
+            body = _raising_body(decl)
         if not mocked or decl.result is None:
             return [replace(decl, body=body, attributes=attributes)]
         value = ast.VarDecl(pos, [(pos, value_of(decl.name))], None, decl.result, None)
@@ -142,10 +141,30 @@ def _member(decl: ast.PouDecl, name: str, *, chosen: bool) -> ast.PouDecl:
     return replace(decl, body=[ast.If(pos, [(condition, [*give, ast.Return(pos)])], []), *decl.body])
 
 
-def _is_elsewhere(decl: ast.PouDecl) -> bool:
-    """Whether a function is implemented in C, but not in the simulator."""
+def _is_elsewhere(decl: ast.PouDecl, suffix: str = "") -> bool:
+    """Whether a unit is implemented in C, but not in the simulator. `suffix`: of the name of its C function."""
     name = decl.attributes.get("external")
-    return name is not None and not lib.SimHasExternal(name.lower().encode("latin-1", "replace"))
+    return name is not None and not lib.SimHasExternal(f"{name}{suffix}".lower().encode("latin-1", "replace"))
+
+
+def _without_external(attributes: Mapping[str, str]) -> dict[str, str]:
+    return {name: text for name, text in attributes.items() if name not in ("external", "version")}
+
+
+def _raising_body(decl: ast.PouDecl) -> list[ast.Stmt]:
+    """What takes the place of a body in C that is elsewhere."""
+    pos = decl.pos
+    code = ast.Literal(pos, ast.LiteralKind.INT, lib.RTSEXCPT_UNRESOLVED_EXTREFS)
+    body: list[ast.Stmt] = [ast.ExprStmt(pos, ast.Call(pos, ast.Name(pos, _RAISE), [ast.Argument(pos, None, code)]))]
+    if decl.result is not None:  # which is assigned in C
+        body.append(_assign(pos, decl.name, ast.Name(pos, decl.name)))
+    return body
+
+
+def _raising_block(decl: ast.PouDecl) -> ast.PouDecl:
+    """A block in C whose calls raise an exception. Its instances can be made, so that they can be mocked."""
+    members = [m if m.name.casefold() in INITIALISERS else replace(m, body=_raising_body(m)) for m in decl.members]
+    return replace(decl, body=_raising_body(decl), members=members, attributes=_without_external(decl.attributes))
 
 
 def _variable(pos: int, name: str, type_name: str) -> ast.VarDecl:

@@ -8,7 +8,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from enum import StrEnum
 
 from plctool.compiler.base.source import Source
@@ -156,7 +156,9 @@ class _Check:
         for block in decl.blocks[_given(decl) :]:
             self._section(kind, block)
         if "external" in decl.attributes and decl.keyword is ast.Unit.FUNCTION:
-            self._external(decl)
+            self._external(decl, _PARAMETERS)
+        elif "external" in decl.attributes and decl.keyword is ast.Unit.FUNCTION_BLOCK:
+            self._external_block(decl)
         for member in decl.members:
             inside = _IN_INTERFACE.get(_kind(member)) if kind is Kind.INTERFACE else _kind(member)
             if inside is not None:
@@ -164,14 +166,36 @@ class _Check:
             else:
                 self._error(member.pos, f"an INTERFACE has no {member.keyword}; it has METHOD and PROPERTY")
 
-    def _external(self, decl: ast.PouDecl) -> None:
+    def _external(self, decl: ast.PouDecl, allowed: Container[Section]) -> None:
         """What the C function does is not said here."""
         if decl.body:
             self._error(decl.body[0].pos, f"{decl.name} is written in C, so it has no statements here")
+        elif decl.chart is not None:
+            self._error(decl.pos, f"{decl.name} is written in C, so it has no chart here")
         for block in decl.blocks:
-            if block.keyword not in _PARAMETERS and block.decls:
+            if block.keyword not in allowed and block.decls:
                 message = f"{decl.name} is written in C, so it has no {block.keyword} here"
                 self._error(block.pos, message)
+
+    def _external_block(self, decl: ast.PouDecl) -> None:
+        """The C code knows the variables of an instance by a structure, which is the same in all programs."""
+        self._external(decl, (*_PARAMETERS, Section.VAR))
+        for line in (line for block in decl.blocks for line in block.decls):
+            if line.edge is not None or line.location is not None:
+                what = "an edge" if line.edge is not None else "an address"
+                self._error(line.pos, f"{decl.name} is written in C, so its variables cannot have {what}")
+        if decl.bases or decl.interfaces:
+            offset, name = (*decl.bases, *decl.interfaces)[0]
+            advice = "call it in a block that does"
+            self._error(offset, f"{decl.name} is written in C, so it cannot extend or implement {name}; {advice}")
+        if Modifier.ABSTRACT in decl.modifiers:
+            self._error(decl.pos, f"{decl.name} is written in C, so it cannot be ABSTRACT")
+        for member in decl.members:
+            if member.keyword is ast.Unit.METHOD:
+                self._external(member, _PARAMETERS)
+            else:
+                message = f"{decl.name} is written in C, so it has methods, but no {_kind(member)}; write a METHOD"
+                self._error(member.pos, message)
 
     def _modifiers(self, decl: ast.PouDecl, kind: Kind) -> None:
         given = decl.modifiers - {Modifier.CLASS}

@@ -24,7 +24,7 @@ from plctool.compiler.semantics.pools import write_pools
 from plctool.compiler.semantics.rules.control import write_body
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc_statements import statements_of
-from plctool.compiler.semantics.symbols import TypeSymbol
+from plctool.compiler.semantics.symbols import PouSymbol, TypeSymbol
 from plctool.compiler.semantics.trail import reserve_trail
 from plctool.compiler.semantics.world import Declarers, World
 from plctool.compiler.sources.imports import ImportedLibrary
@@ -92,10 +92,16 @@ class Program:
             self.variables.global_variable(variable)
 
     def external_functions(self) -> list[Pou]:
-        """The functions the program declares that are implemented in C, in order."""
+        """The functions, blocks and methods the program declares that are implemented in C, in order."""
         functions = [s for s in self.world.names.functions() if not is_generic(s.decl)]
         declared = [self._functions.function(s, {}) for s in functions]
-        return [info.pou for info in declared if info is not None and info.pou.external is not None]
+        found = [info.pou for info in declared if info is not None]
+        for symbol in self.world.names.units():
+            if isinstance(symbol, PouSymbol) and "external" in symbol.decl.attributes:
+                block = self._blocks.block(symbol) if symbol.keyword is ast.Unit.FUNCTION_BLOCK else None
+                if block is not None and block.cls is not None:
+                    found += [block.pou, *(self._classes.signature(m).pou for m in block.cls.members.values())]
+        return [pou for pou in found if pou.external is not None]
 
     def check_bodies(self) -> None:
         """Checks all bodies, and those of the library and of the programs they need; what is left over at the end."""

@@ -27,9 +27,9 @@ HEEDED: dict[str, frozenset[str]] = {
     "call_after_init": frozenset(("FUNCTION_BLOCK", "METHOD")),
     "call_on": frozenset(("FUNCTION",)),
     "instance-path": frozenset(("variable",)),
-    "external": frozenset(("FUNCTION",)),
+    "external": frozenset(("FUNCTION", "FUNCTION_BLOCK")),
     "fault": frozenset(("TEST",)),
-    "version": frozenset(("FUNCTION",)),
+    "version": frozenset(("FUNCTION", "FUNCTION_BLOCK")),
     "shared_output": frozenset(("variable",)),
 }
 """What does something, and before what."""
@@ -39,7 +39,7 @@ OF_THE_LIBRARY = frozenset((
 ))  # fmt: skip
 """What the standard library promises of its units; nothing checks it, so programs cannot (docs/internals.md)."""
 
-_NOT_IN_C = "only a FUNCTION can be written in C"
+_NOT_IN_C = "only a FUNCTION or FUNCTION_BLOCK can be written in C"
 REFUSED = {
     "external": _NOT_IN_C,
     "external_name": "the name of a function in C is written {attribute 'external' := 'name'}",

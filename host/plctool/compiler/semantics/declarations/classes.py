@@ -45,6 +45,11 @@ def _is_enumeration_value(symbol: VarSymbol) -> bool:
     return isinstance(symbol.type, EnumType) and symbol.value is not None and symbol.name in symbol.type.values
 
 
+def _name_in_c(block: ast.PouDecl, member: str) -> str:
+    """The C function of the body (`main`) or a method of a block that is written in C."""
+    return f"{block.attributes['external']}__{member}"
+
+
 class Classes:
     """Declares classes and interfaces when they are first referred to."""
 
@@ -103,6 +108,9 @@ class Classes:
                 scope.error(offset, "recursion", f"{symbol.decl.name} extends itself: {self._hierarchy.circle(symbol)}")
             elif ast.Modifier.FINAL in base.decl.modifiers:
                 scope.error(offset, "inheritance", f"{name} is FINAL and cannot be extended")
+            elif "external" in base.decl.attributes:
+                advice = f"declare a variable of it in {symbol.decl.name}"
+                scope.error(offset, "inheritance", f"{name} is written in C and cannot be extended; {advice}")
             return info
         if isinstance(base, PouSymbol) and base.keyword is ast.Unit.INTERFACE:
             scope.error(offset, "inheritance", f"{name} is an interface; write IMPLEMENTS {name}")
@@ -189,6 +197,14 @@ class Classes:
                 self._see(cls, key, symbol)
         cls.names.update(scope.edges)
 
+    def in_c(self, info: BlockInfo, scope: Scope) -> None:
+        """Makes a block whose variables are declared one whose body is implemented in C."""
+        assert info.cls is not None
+        decl = info.cls.symbol.decl
+        for symbol in info.members.values():
+            symbol.used = True  # in C
+        self._functions.set_external(info.pou, _name_in_c(decl, "main"), decl.attributes, scope)
+
     def _see(self, cls: ClassInfo, key: str, symbol: VarSymbol) -> None:
         other = cls.names.get(key)
         if isinstance(other, MemberSymbol) and _is_enumeration_value(symbol):
@@ -273,7 +289,9 @@ class Classes:
             scope.use(decl.namespace.using)
         scope.names.update(cls.instance_variables.get(decl.member_key, {}))
         self._functions.signature(info, decl, scope)
-        if not member.abstract:
+        if "external" in cls.symbol.decl.attributes:
+            self._functions.set_external(pou, _name_in_c(cls.symbol.decl, decl.name), cls.symbol.decl.attributes, scope)
+        elif not member.abstract:
             self._world.bodies.add(scope, decl)
         elif decl.body:
             reason = "belongs to an INTERFACE" if cls.is_interface else "is ABSTRACT"

@@ -6,6 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 
 from plctool.compiler.semantics.conversions import is_global
@@ -39,20 +40,22 @@ from plctool.compiler.typed.nodes import (
     Initial,
     Parameter,
     Pou,
+    PouKind,
     Storage,
     Variable,
 )  # fmt: skip
 from plctool.iec.types import (
     ArrayType,
+    EnumType,
     OpenArrayType,
+    ReferenceType,
     StringType,
     StructType,
     Type,
 )  # fmt: skip
-from plctool.image.c_functions import interface_signature
+from plctool.image.c_functions import interface_signature, parse_version
 
 _NAMESPACE = re.compile(r"\w+\.(?=[^\W\d])")
-_VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")
 
 
 class Functions:
@@ -92,9 +95,7 @@ class Functions:
         self.signature(info, decl, scope)
         external = decl.attributes.get("external")
         if external is not None:
-            pou.external = self._external(external, info)
-            if not scope.library:
-                self._check_declared_once(pou.external, pou)
+            self.set_external(pou, external, decl.attributes, scope)
         else:
             self._world.bodies.add(scope, decl)
         return info
@@ -183,15 +184,16 @@ class Functions:
         wanted = isinstance(t, OpenArrayType) or "by_reference" in line.attributes or "by_reference" in attributes
         return wanted and isinstance(t, StringType | ArrayType | StructType)
 
-    def _external(self, name: str, info: FunctionInfo) -> External:
-        """The C function: its interface text is `name(TYPE,&TYPE):RESULT`."""
-        version = _VERSION.fullmatch(info.attributes.get("version", "1.0"))
+    def set_external(self, pou: Pou, name: str, attributes: Mapping[str, str], scope: Scope) -> None:
+        """Makes a unit whose parameters are declared one that is implemented by the C function `name`."""
+        version = parse_version(attributes.get("version", "1.0"))
         if version is None:
-            self._world.diagnostics.error(info.pou.pos, "attribute", "the attribute version is written '1.0'")
-            return External(name, 0, 0)
-        major, minor = (int(part) for part in version.groups())
-        text = interface_text(name.lower(), info.pou)
-        return External(name.lower(), interface_signature(text), major << 16 | minor)
+            message = "the attribute version is written '1.0' or '1.0.0.0', of numbers up to 255"
+            self._world.diagnostics.error(pou.pos, "attribute", message)
+        name = name.lower()
+        pou.external = External(name, interface_signature(_signed_text(name, pou)), version or 0)
+        if not scope.library:
+            self._check_declared_once(pou.external, pou)
 
     def _check_declared_once(self, external: External, pou: Pou) -> None:
         """A device has one C function of a name."""
@@ -205,10 +207,37 @@ class Functions:
 
 
 def interface_text(name: str, pou: Pou) -> str:
-    """What the signature of a C function is made of: `name(TYPE,&TYPE):RESULT`."""
-    types = (("&" if p.by_reference else "") + _interface_name(p.variable.type) for p in pou.parameters)
+    """The interface of a C function: `name(TYPE,&TYPE):RESULT`. A block or method has the instance first, and the
+    variables of a block are in that."""
+    types = [("&" if p.by_reference else "") + _interface_name(p.variable.type) for p in pou.parameters]
+    if pou.instance is not None:
+        types = ["&" + _interface_name(pou.instance), *(types if pou.kind is PouKind.METHOD else [])]
     result = "" if pou.result is None else ":" + _interface_name(pou.result.type)
     return f"{name}({','.join(types)}){result}"
+
+
+def _signed_text(name: str, pou: Pou) -> str:
+    """The same of a block or method with the layout of the instance, and of what else is passed by its address."""
+    if pou.instance is None:
+        return interface_text(name, pou)
+    parameters = pou.parameters if pou.kind is PouKind.METHOD else []
+    types = (_layout(p.variable.type, pou.instance) for p in parameters)
+    result = "" if pou.result is None else ":" + _layout(pou.result.type, pou.instance)
+    return f"{name}({','.join(('&' + _layout(pou.instance), *types))}){result}"
+
+
+def _layout(t: Type, *known: StructType) -> str:
+    """The name of a type, and where its members are unless it is one of those that are `known`."""
+    if isinstance(t, ReferenceType):
+        return "&" + _layout(t.target, *known)
+    if isinstance(t, ArrayType):
+        return f"{t.count}*{_layout(t.element, *known)}"
+    if isinstance(t, EnumType):
+        return f"{_interface_name(t)}={t.base.name}"
+    if not isinstance(t, StructType) or t in known:
+        return _NAMESPACE.sub("", t.name).upper()
+    members = (f"{f.name.upper()}@{f.offset}:{_layout(f.type, t, *known)}" for f in t.fields)
+    return f"{_interface_name(t)}[{t.size}]{{{','.join(members)}}}"
 
 
 def _interface_name(t: Type) -> str:

@@ -102,7 +102,10 @@ class Blocks:
         info.members |= {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol) and s.role is not Role.TEMP}
         self._world.blocks[layout] = info
         self._classes.end_block(info, scope)
-        self._world.bodies.add(scope, decl)
+        if "external" in decl.attributes:
+            self._classes.in_c(info, scope)
+        else:
+            self._world.bodies.add(scope, decl)
         return info
 
     def layout(self, symbol: PouSymbol) -> StructType | None:
