@@ -23,7 +23,7 @@ FLOORS = (
     ("link",),
     ("canopen", "gateway"),
     ("controller", "compiler", "sim_io"),
-    ("doc", "fmt"),
+    ("doc", "fmt", "v3"),
     ("sim_can", "sim_functions", "sim_net", "sim_worker"),
     ("device", "sim"),
     ("", "controller_documents", "dump_file", "sim_plant"),

@@ -29,7 +29,7 @@ from plctool.testing.plcrt import find_plcrt
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-BLOCK = re.compile(r"^```(sh|python|(?:iecst|toml|ini) \S+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```(sh|python|(?:iecst|toml|ini|m4) \S+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHOWN_PORT = "/dev/pts/4"
 SHOWN_MODBUS_PORT = "5020"
 SHOWN_ADDRESS, SHOWN_BROADCAST = "192.168.1.5", "192.168.1.255"
@@ -171,7 +171,9 @@ def test_what_the_document_says_works(document: Path, reader: Reader) -> None:
         if language == "python":
             reader.run_python(text)
             continue
-        if language.startswith(("iecst", "toml", "ini")):  # a file that the reader saves under the name that is said
+        if language.startswith(
+            ("iecst", "toml", "ini", "m4")
+        ):  # a file that the reader saves under the name that is said
             path = reader.folder / language.split()[1]
             path.parent.mkdir(exist_ok=True)
             path.write_text(text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import random
+import re
 import struct
 import tempfile
 import zipfile
@@ -34,6 +35,8 @@ from plctool.link.connection import PATIENCE, Connection
 from plctool.link.session import Session
 from plctool.link.sim import SimTransport
 from plctool.sim import Simulator
+from plctool.v3.component import export_component
+from plctool.v3.m4_interface import read_m4
 
 ROOT = Path(__file__).parents[2]
 _temporary = tempfile.TemporaryDirectory(prefix="fuzz-")  # as long as this process
@@ -342,6 +345,16 @@ def files(*patterns: str) -> Callable[[], Iterator[bytes]]:
     return lambda: (path.read_bytes() for pattern in patterns for path in sorted(ROOT.glob(pattern)) if path.is_file())
 
 
+def m4(data: bytes) -> None:
+    with suppress(UsageError):
+        export_component([read_m4("CmpFooItf.m4", data.decode("latin-1"))])
+
+
+def m4_files() -> Iterator[bytes]:
+    page = (ROOT / "docs/v3-components.md").read_text()
+    yield from (text.encode() for text in re.findall(r"^```m4 \S+\n(.*?)^```", page, re.MULTILINE | re.DOTALL))
+
+
 @dataclass(frozen=True)
 class Target:
     run: Callable[[bytes], None]
@@ -358,6 +371,7 @@ TARGETS = {
     "production": Target(production, production_files),
     "sources": Target(sources, source_files),
     "eds": Target(eds, files("examples/canopen/*.eds", "tests/canopen/*.eds")),
+    "m4": Target(m4, m4_files),
     "project": Target(project, project_files),
     "library": Target(library, library_files),
     "source_archive": Target(source_archive, source_archives),

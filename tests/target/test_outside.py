@@ -147,6 +147,25 @@ def test_a_function_block_in_c_keeps_to_its_instance_and_the_structure_of_the_fi
         assert plc.read("Main.two.gain") == 3.0
 
 
+def test_a_component_of_codesys_starts_and_is_called_by_a_program(product: Callable[[str], Path]) -> None:
+    folder = product("full")
+    files = ("CmpFooItf.m4", "CmpFooDep.m4", "CmpFoo.c")
+    for name in files:
+        (text,) = blocks("v3-components.md", name)
+        (folder / name).write_text(text)
+    assert plctool(["export-itf", "--from", *(str(folder / name) for name in files[:2]), "-o", str(folder)]) == 0
+    (lines,) = blocks("v3-components.md", "cmp_list.c")
+    merge(folder / "cmp_list.c", lines)
+    call = "r := FooScale(total, 3, 2.5, 'Anna', valid => valid);"
+    text = program("VAR total : DINT; valid : BOOL; r : REAL; END_VAR", call)
+    built = compile_text((folder / "CmpFoo.st").read_text() + text, TARGET, folder)
+    with Board(MACHINE, make(folder), folder) as board, Plc(Connection(board.line())) as plc:
+        assert ("CmpFoo", "Foo is there, 4") in [(entry.component, entry.text) for entry in plc.log()]
+        plc.flash(built.path)
+        eventually(lambda: plc.read("Main.r") == 7.5)
+        assert plc.read("Main.valid") is True
+
+
 def test_a_driver_from_the_blank_one_has_a_device(product: Callable[[str], Path]) -> None:
     folder = product("io")
     for name in ("IoDrvBlank.c", "IoDrvBlank.h"):

@@ -143,6 +143,16 @@ def _result_of(pou: Pou) -> str:
     return _value(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
 
 
+def result_type(pou: Pou) -> str:
+    """The C type that a C function returns to a program, `void` also for a result that is no scalar."""
+    return _result_of(pou)
+
+
+def call_declaration(pou: Pou, name: str) -> str:
+    """The first line of a static function `name` that programs call as they call that of `pou`."""
+    return _declaration(f"static {_result_of(pou)}", name, list(_parameters(pou)))
+
+
 def _declaration(result: str, name: str, words: list[str]) -> str:
     space = "" if result.endswith("*") else " "
     start = f"{result}{space}{name}("

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from plctool.cli.projects import Settings
 
 
+_MOST_M4 = 1 << 20  # bytes of an interface file
+
+
 def export_arguments(command: Parser) -> None:
     add_sources(command)
     command.add_argument("-o", "--output", dest="xml", type=file_path, required=True, metavar="FILE.xml")
@@ -34,6 +37,10 @@ def export_itf_arguments(command: Parser) -> None:
         "-o", "--output", type=file_path, default=Path(), metavar="DIR", help="default: the current folder"
     )
     command.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
+    command.add_argument(
+        "--from", dest="m4", type=file_path, nargs="+", metavar="FILE.m4",
+        help="read these interface and dependency files of a CODESYS component instead of sources",
+    )  # fmt: skip
     add_dialect(command)
     add_io_files(command, "write the C header of this board instead")
     command.set_defaults(action=_export_itf)
@@ -94,6 +101,8 @@ def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list
 
 
 def _export_itf(args: argparse.Namespace) -> int:
+    if args.m4 is not None:
+        return output.show(args, export_m4(args.m4, args.output), m4_text)
     if args.device is not None:
         return output.show(args, export_board(args.device, args.output), lambda d: str(d["header"]))
     args.no_warn, args.werror = [], None
@@ -153,6 +162,41 @@ def interface_text(document: dict[str, Any]) -> str:
     kept = "" if document["source_written"] else " (kept as it is; --force replaces it)"
     functions = table(document["functions"], document["functions"][0])
     return f"{functions}\n{document['header']}\n{document['source']}{kept}"
+
+
+def export_m4(files: list[Path], folder: Path) -> Document:
+    """Writes what a component of CODESYS needs here, from its m4 files. Raises UsageError with the line."""
+    from plctool.compiler.semantics.declarations.functions import interface_text as text_of
+    from plctool.files import make_folder, read_regular
+    from plctool.image.c_functions import version_text
+    from plctool.v3.component import export_component
+    from plctool.v3.m4_interface import read_m4
+
+    component = export_component([read_m4(str(f), read_regular(f, _MOST_M4).decode("latin-1")) for f in files])
+    for name in component.files:
+        check_not_read(folder / name, files, "-o interface, a folder for it")
+        check_no_way_out(folder / name, folder, "-o interface, a folder for it")
+    make_folder(folder)
+    for name, text in component.files.items():
+        write_atomically(folder / name, text.encode("latin-1", "replace"))
+    functions = [(pou.external, pou) for pou in component.functions if pou.external is not None]
+    return {
+        "files": [str(folder / name) for name in component.files],
+        "functions": [
+            {
+                "interface": text_of(external.name, pou),
+                "signature": f"{external.signature:08X}",
+                "version": version_text(external.version),
+            }
+            for external, pou in functions
+        ],
+    }
+
+
+def m4_text(document: dict[str, Any]) -> str:
+    """The functions that programs call, and the files."""
+    rows = document["functions"]
+    return "\n".join([*([table(rows, rows[0])] if rows else []), *document["files"]])
 
 
 def export_board(device: Path, folder: Path) -> Document:
