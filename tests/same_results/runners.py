@@ -28,7 +28,7 @@ _PORTABLE = [
 ]
 _BARE_SOURCES = [
     *_PORTABLE,
-    *(FIRMWARE / "port/sim" / name for name in ("Sim.c", "SimEvent.c", "SimNet.c", "SimTarget.c")),
+    *(FIRMWARE / "port/sim" / name for name in ("Sim.c", "SimEvent.c", "SimNet.c", "SimSram.c", "SimTarget.c")),
     FIRMWARE / "port/baremetal/common/CmpCompilerCalls.c",
     FIRMWARE / "port/baremetal/blank/SysAtomic.c",  # nothing here can come in between
     *(HERE / "bare").glob("*.c"),

@@ -7,7 +7,6 @@
 #include "Sim.h"
 
 #include <setjmp.h>
-#include <signal.h>
 #include <string.h>
 #include <time.h>
 
@@ -128,12 +127,8 @@ bool SimIsServing(void)
 bool SysMainWait(const RTS_UI32 *word, RTS_UI32 value)
 {
     jmp_buf before;
-#ifndef _WIN32
-    sigset_t all, signals;
 
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &signals);
-#endif
+    SimSignalsHold(true);
     RTS_UNUSED(word);
     RTS_UNUSED(value);
     SysAtomicStore(&serving, 1);
@@ -142,9 +137,7 @@ bool SysMainWait(const RTS_UI32 *word, RTS_UI32 value)
         AppCallsServe();
     memcpy(&sim.jump, &before, sizeof before);
     SysAtomicStore(&serving, 0);
-#ifndef _WIN32
-    pthread_sigmask(SIG_SETMASK, &signals, NULL);
-#endif
+    SimSignalsHold(false);
     return !sim.power_lost;
 }
 

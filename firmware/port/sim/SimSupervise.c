@@ -9,6 +9,7 @@
  */
 #define _GNU_SOURCE
 #include <pthread.h>
+#include <signal.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -99,6 +100,19 @@ void SimSuperviseStart(void)
         pthread_detach(thread);
         supervisor.process = getpid();
     }
+}
+
+void SimSignalsHold(bool hold)
+{
+#ifdef _WIN32
+    RTS_UNUSED(hold); /* there, SysExceptBreak() stops the thread instead */
+#else
+    static __thread sigset_t before;
+    sigset_t all;
+
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, hold ? &all : &before, hold ? &before : NULL);
+#endif
 }
 
 void SimSetCycleLimit(RTS_UI32 ms)

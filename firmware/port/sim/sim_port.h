@@ -26,6 +26,9 @@ bool SimMapTwice(RTS_UI32 size, RTS_UI8 **first, RTS_UI8 **second);
 /* Starts the thread that aborts endless loops, once per process. */
 void SimSuperviseStart(void);
 
+/* Keeps all signals from this thread, and lets those through again that it had before. */
+void SimSignalsHold(bool hold);
+
 /* A mutex as on Linux, for what it costs. */
 void SimMutexLock(void);
 void SimMutexUnlock(void);

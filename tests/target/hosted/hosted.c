@@ -57,6 +57,11 @@ void SysExceptShutdown(void)
 {
 }
 
+void SimSignalsHold(bool hold)
+{
+    RTS_UNUSED(hold);
+}
+
 void SimSuperviseStart(void)
 {
 }

@@ -100,6 +100,11 @@ void SimLinkReset(void)
 {
 }
 
+void SimSignalsHold(bool hold)
+{
+    RTS_UNUSED(hold);
+}
+
 void SimSuperviseStart(void)
 {
 }
