@@ -29,7 +29,7 @@ def errors(text: str) -> list[tuple[int, str]]:
 
 
 def programs(rng: random.Random) -> list[tuple[str, str]]:
-    """Returns names and texts of some programs without syntax errors."""
+    """Returns some programs without syntax errors, each with its name."""
     files = sorted((ROOT / "tests" / "st").rglob("*.st"))
     texts = [(file.name, file.read_bytes().decode("utf-8", "replace")) for file in rng.sample(files, 2 * FILES)]
     return [(name, text) for name, text in texts if not has_lists(text) and not errors(text)][:FILES]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from editor import Editor
+from random_edits import CHANGES
 
 from plctool.compiler import check_with_tests, program_files
 from plctool.lsp.checks import MAX_ERRORS, checked
@@ -112,24 +113,6 @@ def test_a_file_alone_is_checked_alone(tmp_path: Path) -> None:
         editor.open("../other.st")
         uri = (tmp_path / "open" / ".." / "other.st").as_uri()
         editor.wait(lambda: any(found for u, found in editor.diagnostics.items() if u.endswith("other.st")), uri)
-
-
-CHANGES = [
-    lambda line: "",
-    lambda line: line.replace("n", "q", 1),
-    lambda line: line.replace(":=", ":= TRUE +", 1),
-    lambda line: line.replace(";", "", 1),
-    lambda line: line.replace("(", "", 1),
-    lambda line: line + "\nRETURN;",
-    lambda line: line + "\nzz := 1;",
-    lambda line: line + "\nIF n > 2 THEN",
-    lambda line: line + "\npump.",
-    lambda line: line + " (* open",
-    lambda line: line.replace("Pump", "Pumpe"),
-    lambda line: line.replace("INT", "REAL"),
-    lambda line: line.replace("END_VAR", "", 1),
-    lambda line: line.upper(),
-]
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -252,7 +252,7 @@ def declare(
         parsed.library, parsed.libraries, parsed.diagnostics, IoChannels(io), parsed.information, parsed.previous
     )
     world = program.world
-    files: Files = [(source, _looked_at(source, text, world.diagnostics)) for source, text in parsed.texts]
+    files: Files = [(source, looked_at(source, text, world.diagnostics)) for source, text in parsed.texts]
     participants = [guest.begin(program) for guest in guests]
     for participant in participants:
         files = participant.after_parse(files)
@@ -272,8 +272,9 @@ def declare(
     return Declared(program, application, parsed.sources, participants)
 
 
-def _looked_at(source: Source, text: ParsedText, diagnostics: Diagnostics) -> list[ast.Declaration]:
-    """The declarations of a file of the program, when what stands with them has been looked at."""
+def looked_at(source: Source, text: ParsedText, diagnostics: Diagnostics) -> list[ast.Declaration]:
+    """The declarations of a file of the program, when what stands with them has been looked at: pragmas, attributes,
+    names."""
     diagnostics.mute(source)
     reports = diagnostics.at(source)
     check_pragmas(text.pragmas, reports)

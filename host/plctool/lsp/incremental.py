@@ -7,12 +7,13 @@ whole check hold for a new text. The result is shown at once; a whole check late
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from plctool.compiler.base.garbage import no_collection
 from plctool.compiler.base.nesting import NestingError, room_for_nesting
 from plctool.compiler.base.source import Source
+from plctool.compiler.front import looked_at
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.lints import LINTS
 from plctool.compiler.semantics.participants import Files, Participant
@@ -57,6 +58,7 @@ class Observer(Participant):
         self.program: Program | None = None
         self.bodies = _Recorded()
         self.keys: dict[int, _Key] = {}
+        self.used: set[int] = set()
 
     def begin(self, program: Program) -> Participant:
         """Takes part in the check of this program."""
@@ -69,6 +71,15 @@ class Observer(Participant):
         """Remembers which declaration is which."""
         self.keys = {id(decl): key for _, declarations in files for key, decl in _keyed(declarations).items()}
         return files
+
+    def after_declare(self) -> None:
+        """Remembers which variables declarations use."""
+        scopes = [scope for bodies in self.bodies.own.values() for scope, _ in bodies]
+        self.used = {id(symbol) for scope in scopes for symbol in _variables(scope) if symbol.used}
+
+
+def _variables(scope: Scope) -> Iterator[VarSymbol]:
+    return (symbol for symbol in scope.names.values() if isinstance(symbol, VarSymbol))
 
 
 def _keyed(declarations: Iterable[ast.Declaration]) -> dict[_Key, ast.PouDecl]:
@@ -89,9 +100,11 @@ class Kept:
         self._program = observer.program
         self._bodies = observer.bodies.own
         self._keys = observer.keys
+        self._used = observer.used
         self.sources = {source.path: source for source in sources}
         self._found: dict[str, list[Diagnostic]] = {}
         self._trees: dict[str, Tree] = {}
+        self._of_bodies: dict[str, frozenset[Diagnostic]] = {}
         for diagnostic in found:
             self._found.setdefault(diagnostic.file, []).append(diagnostic)
 
@@ -113,16 +126,21 @@ class Kept:
         before, after = self._tree(source.path), Tree(source)
         if after.has_errors:
             return self._broken(before.source, after)
-        if before.interface != after.interface or not (_is_plain(before) and _is_plain(after)):
+        if before.interface != after.interface or _attributes(before) != _attributes(after):
+            return None
+        if not (_is_plain(before) and _is_plain(after)):
             return None
         old = self._bodies.get(source.path, [])
+        if source.path not in self._of_bodies:  # what another check of the same text reports again
+            again = self._checked(old, before, _Moved(before.source, before.source))
+            self._of_bodies[source.path] = frozenset(again)
         decls = _keyed(after.declarations)
         bodies = [(scope, decls.get(self._keys.get(id(decl), ("", "")))) for scope, decl in old]
         if any(decl is None for _, decl in bodies):
             return None
         moved = _Moved(before.source, source)
         found = moved.all(d for d in self._found.get(source.path, ()) if not self._is_of_body(d, before))
-        found += self._checked([(scope, decl) for scope, decl in bodies if decl is not None], source, moved)
+        found += self._checked([(scope, decl) for scope, decl in bodies if decl is not None], after, moved)
         return _sorted(found)
 
     def _broken(self, before: Source, after: Tree) -> list[Diagnostic]:
@@ -139,19 +157,19 @@ class Kept:
         """True for what the check of the bodies of a file reports again."""
         if diagnostic.code == _UNUSED:
             return _unit_at(tree, diagnostic) is not None
-        return diagnostic.code not in _LINTS and _is_in_body(tree, diagnostic)
+        return diagnostic in self._of_bodies[tree.source.path]
 
-    def _checked(self, bodies: Sequence[tuple[Scope, ast.PouDecl]], source: Source, moved: _Moved) -> list[Diagnostic]:
-        world = self._program.world
+    def _checked(self, bodies: Sequence[tuple[Scope, ast.PouDecl]], tree: Tree, moved: _Moved) -> list[Diagnostic]:
+        world, source = self._program.world, tree.source
         diagnostics = world.diagnostics
         units = len(world.pous)
         for scope, _ in bodies:
             scope.source = source
-            for symbol in scope.names.values():
-                if isinstance(symbol, VarSymbol):
-                    symbol.used = False
+            for symbol in _variables(scope):
+                symbol.used = id(symbol) in self._used
         with no_collection(), room_for_nesting(), diagnostics.apart(source) as found:
             whole = []
+            looked_at(source, tree.parsed, diagnostics)
             for scope, decl in bodies:
                 errors = diagnostics.errors
                 try:
@@ -181,6 +199,11 @@ class Kept:
 
 def _sorted(found: Iterable[Diagnostic]) -> list[Diagnostic]:
     return sorted(dict.fromkeys(found), key=lambda d: (d.line, d.column, d.severity, d.message))
+
+
+def _attributes(tree: Tree) -> list[dict[str, str]]:
+    """The attributes in a text, which change declarations and are not among its tokens."""
+    return [*tree.parsed.attributes.values()]
 
 
 def _is_plain(tree: Tree) -> bool:

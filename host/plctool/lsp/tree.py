@@ -35,6 +35,7 @@ class Tree:
         parsed = parse_all(source, lambda *error: errors.append(error), tokens=tokens)
         self.errors = errors
         self.has_errors = bool(errors)
+        self.parsed = parsed
         self.declarations = parsed.declarations
         self.tokens = tokens if not errors else self._all_tokens(tokens)
         self.items = ItemsOf(source, parsed.declarations, library)
