@@ -15,7 +15,6 @@ from plctool.compiler.base.nesting import NestingError, room_for_nesting
 from plctool.compiler.base.source import Source
 from plctool.compiler.front import looked_at
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.lints import LINTS
 from plctool.compiler.semantics.participants import Files, Participant
 from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.rules.control import report_unused, write_body
@@ -28,7 +27,6 @@ from plctool.compiler.syntax.diagnostics import MAX_MESSAGE, Diagnostic
 from plctool.lsp.outline import UNITS
 from plctool.lsp.tree import Tree
 
-_LINTS = frozenset(lint.name for lint in LINTS)
 _UNUSED = "unused"
 
 _Key = tuple[str, str]
@@ -218,11 +216,6 @@ def _is_plain(tree: Tree) -> bool:
 def _offset(tree: Tree, diagnostic: Diagnostic) -> int:
     starts = tree.source.line_starts
     return starts[min(diagnostic.line, len(starts)) - 1] + diagnostic.column - 1
-
-
-def _is_in_body(tree: Tree, diagnostic: Diagnostic) -> bool:
-    token = bisect_right(tree.starts, _offset(tree, diagnostic)) - 1
-    return any(first <= token < last for first, last in tree.bodies)
 
 
 def _unit_at(tree: Tree, diagnostic: Diagnostic) -> object:
