@@ -134,8 +134,10 @@ class Kept:
             self._of_bodies[source.path] = frozenset(again)
         decls = _keyed(after.declarations)
         bodies = [(scope, decls.get(self._keys.get(id(decl), ("", "")))) for scope, decl in old]
-        if any(decl is None for _, decl in bodies):
-            return None
+        if any(
+            new is None or bool(new.body) != bool(decl.body) for (_, decl), (_, new) in zip(old, bodies, strict=True)
+        ):
+            return None  # whether a method has a body belongs to its declaration
         moved = _Moved(before.source, source)
         found = moved.all(d for d in self._found.get(source.path, ()) if not self._is_of_body(d, before))
         found += self._checked([(scope, decl) for scope, decl in bodies if decl is not None], after, moved)
