@@ -183,13 +183,33 @@ def test_each_view_shows_what_it_has(shown: Shown, view: str) -> None:
     shown.eventually(lambda: words[view] in shown.by_id(view).text)
 
 
-def test_nothing_is_wider_than_a_phone(shown: Shown) -> None:
-    phone = {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
-    shown.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
+PHONE = {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
+DESKTOP = {"width": 1280, "height": 800, "deviceScaleFactor": 1, "mobile": False}
+FAULTS = """
+const seen = [...document.querySelectorAll('button, h1, h2, .chip, .value, td.number')].filter((e) => e.offsetParent);
+const outside = seen.filter((e) => !e.closest('.scroll, #trend') && e.getBoundingClientRect().right > innerWidth);
+const broken = seen.filter((e) => e.matches('.chip, .value, td.number')).filter((e) => {
+  const text = document.createRange();
+  text.selectNodeContents(e);
+  return new Set([...text.getClientRects()].map((line) => Math.round(line.top))).size > 1;
+});
+const wide = document.documentElement.scrollWidth > innerWidth ? ['the page'] : [];
+return [...outside, ...broken].map((e) => `${e.id || e.className}: ${e.textContent}`).concat(wide);
+"""
+
+
+@pytest.mark.parametrize("screen", [PHONE, DESKTOP], ids=["phone", "desktop"])
+def test_nothing_is_outside_the_screen_or_broken_within_a_word(
+    shown: Shown, screen: dict[str, object], tmp_path: Path
+) -> None:
+    shown.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
     try:
-        for view in ("tasks", "log", "alarms", "io", "variables"):
+        for view in ("tasks", "log", "alarms", "io", "diagrams", "variables"):
             shown.by_id(f"tab-{view}").click()
-            shown.eventually(lambda: shown.driver.execute_script("return document.documentElement.scrollWidth <= 360"))
+            shown.eventually(lambda view=view: shown.by_id(view).text)
+            shown.driver.save_screenshot(str(tmp_path / f"{view}.png"))
+            shown.eventually(lambda: shown.driver.execute_script("return innerWidth") == screen["width"])
+            assert shown.driver.execute_script(FAULTS) == [], view
     finally:
         shown.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 

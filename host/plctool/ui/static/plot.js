@@ -135,6 +135,7 @@ export class Plot {
 function scale(low, high) {
   const least = Math.max(Math.abs(low), Math.abs(high)) / 100 || 1;
   if (high - low >= least) return [low, high];
+  if (low === high && (low === 0 || low === 1)) return [0, 1]; // as a BOOL is drawn when it changes
   const middle = (low + high) / 2;
   return [middle - least / 2, middle + least / 2];
 }

@@ -34,9 +34,9 @@ export function logView(entries) {
   const rows = [...entries].reverse().map((e) => {
     const kind = element("span", `chip ${e.class}`, e.class);
     const where = e.file ? ` (${e.pou}, ${e.file}:${e.line})` : "";
-    return [`${e.time_s.toFixed(3)} s`, kind, e.component, e.text + where];
+    return [`${e.time_s.toFixed(3)} s`, kind, e.text + where, e.component];
   });
-  return [table(["Time", "Kind", "Component", "Message"], rows)];
+  return [table(["Time", "Kind", "Message", "Component"], rows)];
 }
 
 const WORDS = { UNACKNOWLEDGED: "active, new", ACKNOWLEDGED: "active", RETURNED: "gone, new" };
@@ -75,9 +75,9 @@ export function ioView(io, value) {
   }
   if (io.channels.length) {
     const rows = io.channels.map((c) => [
-      `${c.device}.${c.channel}`, c.output ? "output" : "input", c.variable, value(c.variable), c.type, c.address,
+      `${c.device}.${c.channel}`, value(c.variable), c.output ? "output" : "input", c.variable, c.type, c.address,
     ]);
-    parts.push(element("h2", "", "Channels"), table(["Channel", "Direction", "Variable", "Value", "Type", "Address"], rows));
+    parts.push(element("h2", "", "Channels"), table(["Channel", "Value", "Direction", "Variable", "Type", "Address"], rows));
   }
   return parts.length ? parts : [note("The program has no inputs and outputs but memory.")];
 }
