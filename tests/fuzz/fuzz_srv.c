@@ -30,6 +30,20 @@ static size_t seed(uint8_t *data, uint8_t group, uint8_t service, const char *co
     return HEAD + size;
 }
 
+/* A service without content, in the order of those that components have registered; 0 after the last one. */
+static size_t seed_of_service(unsigned index, uint8_t *data)
+{
+    fakes_start();
+    for (const SRV_GROUP *group = srv_groups; group < srv_groups + srv_group_room; group++) {
+        if (index < group->count)
+            return seed(data, (uint8_t)group->group, (uint8_t)group->services[index].service, "", 0);
+        index -= (unsigned)group->count;
+    }
+    return 0;
+}
+
+enum { CONTENTS = 43 }; /* seeds with a content */
+
 /* clang-format off */
 #define SEED(group, service, content) seed(data, group, service, content, sizeof(content) - 1)
 #define APP "\x01\x14" "SSSS" "\x4F\x3E\x2D\x1C" "\0\0\0\0\0\0\0\0\0\0\0\0"
@@ -140,7 +154,7 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
     case 42:
         return SEED(0x12, 0x65, "\x06\x04\0\0\0\0");
     default:
-        return 0;
+        return seed_of_service(index - CONTENTS, data);
     }
 }
 /* clang-format on */
