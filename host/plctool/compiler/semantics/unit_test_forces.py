@@ -1,5 +1,5 @@
-"""FORCE and UNFORCE in unit tests: a forced variable gets its value again after each statement of the test, and so
-before and after each call, as on a controller before and after the code of a task.
+"""FORCE and UNFORCE in unit tests: a forced variable gets its value again after each statement of the test that may
+change it, and so before and after each call, as on a controller before and after the code of a task.
 
 The places are known when the test is compiled; hidden variables hold which of them are forced now, and to what.
 
@@ -8,7 +8,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 from plctool.compiler.semantics.assertions import Bench
@@ -19,10 +19,12 @@ from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed.nodes import (
     Assign,
+    Call,
     Case,
     Const,
     Continue,
     Exit,
+    FbCall,
     For,
     If,
     IndexPlace,
@@ -33,12 +35,14 @@ from plctool.compiler.typed.nodes import (
     Repeat,
     Return,
     Statement,
+    Storage,
     Try,
     Variable,
     VarPlace,
     While,
 )
-from plctool.compiler.typed.typed_nodes import walk
+from plctool.compiler.typed.typed_nodes import root_of, walk, written_places
+from plctool.iec.areas import Area
 from plctool.iec.types import BOOL
 
 
@@ -79,7 +83,7 @@ class Forces:
             forced = _Forced(place, *hidden)
             self._places.append(forced)
         pos = c.pos(offset)
-        return [Assign(VarPlace(forced.value, place.type, pos), e, pos), forced.switch(True, pos)]
+        return [Assign(VarPlace(forced.value, place.type, pos), e, pos), forced.switch(True, pos), forced.put(pos)]
 
     def unforce(self, c: Checker, target: ast.Expr, offset: int) -> list[Statement]:
         """UNFORCE(variable)"""
@@ -100,17 +104,36 @@ class Forces:
 
     def _held(self, body: list[Statement]) -> Iterator[Statement]:
         for statement in body:
+            changes = _Changes(statement)
+            changed = [forced for forced in self._places if changes.may_be(forced.place)]
             for inner in _bodies(statement):
-                inner[:] = [*self._put_all(statement.pos), *self._held(inner)]
+                inner[:] = [*(forced.put(statement.pos) for forced in changed), *self._held(inner)]
             yield statement
             if not isinstance(statement, Return | Exit | Continue | Jump):
-                yield from self._put_all(statement.pos)
-
-    def _put_all(self, pos: Pos) -> Iterable[Statement]:
-        return [forced.put(pos) for forced in self._places]
+                yield from (forced.put(statement.pos) for forced in changed)
 
     def _find(self, place: Place) -> _Forced | None:
         return next((forced for forced in self._places if _is_same(forced.place, place)), None)
+
+
+class _Changes:
+    """What a statement may change."""
+
+    def __init__(self, statement: Statement) -> None:
+        nodes = list(walk(statement))
+        self._all = any(isinstance(node, Call | FbCall) for node in nodes)
+        self._roots = [root_of(place) for node in nodes for place in written_places(node)]
+
+    def may_be(self, place: Place) -> bool:
+        """True if it may be a part of this place. What is at an address may overlap, and pointers lead anywhere."""
+        root = root_of(place)
+        if self._all or None in self._roots or (root is None and self._roots):
+            return True
+        return any(root is changed or _is_at_address(root, changed) for changed in self._roots)
+
+
+def _is_at_address(*variables: Variable | None) -> bool:
+    return all(v is not None and v.storage is Storage.AREA and v.area is not Area.DATA for v in variables)
 
 
 def _fixed_place(c: Checker, node: ast.Expr) -> Place | None:
