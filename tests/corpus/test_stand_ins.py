@@ -12,7 +12,10 @@ from plctool.compiler.syntax.library import standard_library
 
 FOLDER = Path(__file__).parent / "stand_ins"
 WORDS = words_of("\n".join(file.read_text() for file in FOLDER.glob("*.st")))
-FILES = [f"stdlib/{name}.st" for name in ("util", "caa_memory", "fastwel_utils", "tc2_system", "tc2_utilities")]
+FILES = [
+    f"stdlib/{name}.st"
+    for name in ("util", "caa_memory", "fastwel_utils", "oscat_strings", "string_utils", "tc2_system", "tc2_utilities")
+]
 NAMES = [entry.name for file in FILES for entry in standard_library().defined_in(file)]
 
 
