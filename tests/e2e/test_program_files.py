@@ -58,10 +58,12 @@ def test_functions_that_wait_do_all_of_it_in_one_cycle(plc: Plc, tool) -> None:
 LOGGING = """
 PROGRAM Main
 VAR
-    f : RTS_IEC_HANDLE; r : RTS_IEC_RESULT; text : STRING := 'line'; cycles, bad : UDINT; step : UDINT := 1;
+    f : RTS_IEC_HANDLE; r : RTS_IEC_RESULT; cycles : UDINT; step : UDINT := 1; i : INT;
 END_VAR
-f := SysFileOpen('log', AM_READ, ADR(r));
-SysFileClose(f);
+FOR i := 1 TO 300 DO // most of the time
+    f := SysFileOpen('log', AM_READ, ADR(r));
+    SysFileClose(f);
+END_FOR
 cycles := cycles + step;
 END_PROGRAM
 """
