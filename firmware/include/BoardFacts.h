@@ -17,9 +17,10 @@
 enum { BOARD_FACTS_MAGIC = 0x54434642, BOARD_NAME_SIZE = 32, BOARD_COMPONENTS_SIZE = 1024 };
 
 typedef struct {
-    RTS_UI32 magic; /* BOARD_FACTS_MAGIC */
-    RTS_UI32 size;  /* of this struct; another one is that of another version */
-    RTS_UI32 target_id;
+    RTS_UI32 magic;         /* BOARD_FACTS_MAGIC */
+    RTS_UI32 size;          /* of this struct; another one is that of another version */
+    RTS_UI32 target_id;     /* of the processor */
+    RTS_UI32 device_id;     /* what images are for: BOARD_DEVICE_ID */
     RTS_UI32 has_address;   /* whether the flash is memory of the processor */
     RTS_UI32 flash_address; /* where; else 0 */
     RTS_UI32 flash_size;    /* bytes, as all sizes here */

@@ -25,6 +25,7 @@ __attribute__((used, section("board_facts"), aligned(4))) static const BOARD_FAC
     .magic = BOARD_FACTS_MAGIC,
     .size = sizeof(BOARD_FACTS),
     .target_id = BOARD_TARGET_ID,
+    .device_id = BOARD_DEVICE_ID,
     .has_address = HAS_ADDRESS,
     .flash_address = ADDRESS,
     .flash_size = BOARD_FLASH_SIZE,

@@ -334,6 +334,15 @@
 #define IEC_LOG_REFILL_MS 1000
 #endif
 
+/* Vendor << 16 | device, both numbers of the vendor, and the name of the vendor, which scan shows. Images are for this
+ * number: those for another device are refused, and so are those for any with this processor (BOARD_TARGET_ID). */
+#ifndef BOARD_DEVICE_ID
+#define BOARD_DEVICE_ID BOARD_TARGET_ID
+#endif
+#ifndef BOARD_VENDOR_NAME
+#define BOARD_VENDOR_NAME "Open"
+#endif
+
 /* 1: events call functions of the program (IecEvents.h). It needs HAS_IecEvents in cmp_list.c, and one of
  * EVENT_MAX_CALLBACKS. 0: no flash for it, and a program that has such functions is refused. */
 #ifndef IEC_EVENTS

@@ -197,6 +197,50 @@ def test_a_driver_from_the_blank_one_has_a_device(product: Callable[[str], Path]
         assert plc.io_devices()[0].state == "ok"
 
 
+NUMBERS = 'vendor = "Acme"\ntarget = "cortex-m3"\nvendor_id = 0x1234\ndevice_id = 5\n'
+
+
+def test_a_device_with_numbers_of_its_vendor_takes_programs_for_it_alone(product: Callable[[str], Path]) -> None:
+    folder = product("full")
+    device = 'name = "MPS2 AN385"\n' + NUMBERS
+    (folder / "device.toml").write_text(device)
+    assert plctool(["export-itf", "--device", str(folder / "device.toml"), "-o", str(folder)]) == 0
+    port = folder / "rts_config_port.h"
+    port.write_text(re.sub("#define BOARD_DEVICE_NAME.*", '#include "MPS2_AN385Io.h"', port.read_text()))
+    elf = make(folder)
+    text = program("VAR n : DINT; END_VAR", "n := n + 1;")
+    (folder / "main.st").write_text(text)
+    (folder / "other.toml").write_text(device.replace("= 5", "= 6"))
+    for name in ("device", "other"):
+        (folder / f"{name}.io.toml").write_text(f'device = "{name}.toml"\n')
+    (folder / "plain").mkdir()
+    (folder / "plain/main.st").write_text(text)
+
+    def build(source: str, *options: str) -> Path:
+        image = folder / f"image{len(list(folder.glob('*.cdl')))}.cdl"
+        assert plctool(["build", str(folder / source), *options, "-o", str(image)]) == 0
+        return image
+
+    own = build("main.st", "--io", str(folder / "device.io.toml"))
+    by_firmware = build("plain/main.st", "--firmware", str(elf))
+    wrong = {
+        "1234:0006": build("main.st", "--io", str(folder / "other.io.toml")),
+        "cortex-m3": build("plain/main.st", "--target", TARGET),
+    }
+    with Board(MACHINE, elf, folder) as board:
+        (node,) = scan(f"serial:{board.port}", gateway=False)
+        assert (node.vendor_name, node.target_id) == ("Acme", 0x12340005)
+        with Plc(Connection(board.line())) as plc:
+            for name, image in wrong.items():
+                with pytest.raises(
+                    DeviceError, match=f"for {name}, this device is 1234:0005: build it with the device"
+                ):
+                    plc.flash(image)
+            for image in (own, by_firmware):
+                plc.flash(image, force=True)
+                eventually(lambda: plc.read("Main.n") > 0)
+
+
 SECOND_TABLE = """
 static const CMP_EXT_FUNCTION more[1];
 RTS_RESULT acme_Hook(CMP_HOOK hook)

@@ -25,10 +25,10 @@ static struct {
 
 static SYS_TARGET target = {
     .type = TARGET_TYPE_PROGRAMMABLE,
-    .id = BOARD_TARGET_ID,
+    .id = BOARD_DEVICE_ID,
     .version = 0x01000000,
     .device_name = BOARD_DEVICE_NAME,
-    .vendor_name = "Open PLC runtime",
+    .vendor_name = BOARD_VENDOR_NAME,
     .node_name = state.node_name,
     .serial_number = state.serial_number,
 };

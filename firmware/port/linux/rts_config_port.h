@@ -91,6 +91,9 @@
 #error "Give this architecture a target id in CompactDownload.h and in plctool."
 #endif
 #define BOARD_DEVICE_NAME "plcrt"
+#ifndef BOARD_VENDOR_NAME
+#define BOARD_VENDOR_NAME "Open PLC runtime"
+#endif
 
 /* The flash file [bytes]: 4 MiB for programs, as long as there was nothing else, then the files and the log that is kept. Geometry of a
  * common serial NOR flash, programmed in the units of an STM32's. */

@@ -80,6 +80,14 @@ def _check_device(board: Board | None, io: Description | None) -> None:
             "the two.",
             "bad-target",
         )
+    if board is not None and device is not None and not board.is_program and device.id not in (0, board.images_for):
+        from plctool.image.file import target_name
+
+        raise UsageError(
+            f"{device.path} describes the device {target_name(device.id)}, {board.title} is "
+            f"{target_name(board.images_for)}; build the firmware with the header that export-itf --device writes.",
+            "bad-target",
+        )
 
 
 def io_sources(io: Description | None) -> list[Source]:
@@ -161,6 +169,7 @@ def compile_sources(
     limits: bool = True,
     python: PythonFunctions | None = None,
     dialect: str | None = None,
+    device_id: int = 0,
 ) -> BuildResult:
     """Compiles a program as `build` does. `io`: its inputs and outputs; `libraries`: folders or .zips of those that it
     uses; both are in `ProgramFiles` already. Of a project its files are taken, not its options (`request_of`). The
@@ -180,6 +189,7 @@ def compile_sources(
         firmware=firmware,
         limits=limits,
         dialect=dialect,
+        device_id=device_id,
     )
     return build(request, python)
 
@@ -260,6 +270,8 @@ def _options(request: BuildRequest, board: Board | None, io: Description | None)
         stacks = FirmwareStacks(request.firmware, target.machine)
     number, size = (2, True) if request.level == "s" else (request.level, False)
     passes = parse_passes(request.no_pass, request.dump_after)
+    device = None if io is None or io.device is None or io.device.target != target.name else io.device
+    own = request.device_id or (board.images_for if board is not None else device.id if device is not None else 0)
     options = Options(
         target,
         number,
@@ -269,6 +281,7 @@ def _options(request: BuildRequest, board: Board | None, io: Description | None)
         stacks,
         passes,
         cache_of_user() if request.cache else None,
+        own,
     )
     if board is not None and board.target != target.name:
         raise UsageError(

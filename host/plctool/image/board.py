@@ -56,12 +56,14 @@ class Flash:
 
 @dataclass(frozen=True)
 class Board:
-    """`limits`: what a program may need at most, by the names of `limits.py`. `record`: bytes of a commit record.
+    """`device_id`: of the processor; `images_for`: what its images are for, another one if its vendor has numbers.
+    `limits`: what a program may need at most, by the names of `limits.py`. `record`: bytes of a commit record.
     `components`: of the runtime that its firmware has. `content`: the firmware, if its file was read."""
 
     name: str
     config: str
     device_id: int
+    images_for: int
     flash: Flash
     record: int
     limits: dict[str, int] = field(hash=False)
@@ -152,7 +154,8 @@ def _board(facts: Any) -> Board:
     name, config, components = (
         ffi.string(text).decode("ascii", "replace") for text in (facts.name, facts.config, facts.components)
     )
-    return Board(name, config, int(facts.target_id), flash, int(facts.record), limits, frozenset(components.split()))
+    ids = int(facts.target_id), int(facts.device_id)
+    return Board(name, config, *ids, flash, int(facts.record), limits, frozenset(components.split()))
 
 
 def find_board(text: str) -> Board:

@@ -646,13 +646,19 @@ def _parse_info(data: bytes) -> ApplicationInfo:
 
 
 def target_name(device_id: int) -> str:
-    """The name of the target with this TARGET_ID_*, or the number in hex."""
+    """The name of the target with this TARGET_ID_*, or the numbers of vendor and device in hex."""
     from plctool.image.targets import TARGETS
 
     for target in TARGETS.values():
         if getattr(lib, target.device_id) == device_id:
             return target.name
-    return f"0x{device_id:08X}"
+    return f"{device_id >> 16:04X}:{device_id & 0xFFFF:04X}"
+
+
+def built_for(device_id: int) -> str:
+    """How an image for this number is built, as the end of a sentence."""
+    name = target_name(device_id)
+    return "with the device.toml of its vendor, or --firmware" if ":" in name else f"with --target {name}"
 
 
 def _numbered(prefix: str) -> dict[int, str]:

@@ -24,7 +24,7 @@ from plctool.errors import UsageError
 from plctool.files import write_atomically
 from plctool.iec.types import align_up
 from plctool.image.board import COMMIT, RETAIN, SLOT_A, SLOT_B, Board, Firmware, Flash, Segment
-from plctool.image.file import TAG, describe_image, image_crc, parse_image, target_name
+from plctool.image.file import TAG, built_for, describe_image, image_crc, parse_image, target_name
 
 BIN, HEX = ".bin", ".hex"
 _HEX_TYPE, _HEX_END = slice(7, 9), "01"  # where a line of a .hex says what it is, and that it is the last one
@@ -47,10 +47,10 @@ def production_pieces(image: bytes, board: Board, firmware: Firmware | None) -> 
     when the image is for another processor, and when the firmware is where the programs are. Whether the image fits
     the board is for `io.fit`."""
     parsed = parse_image(image)
-    if parsed.device_id != board.device_id:
+    if parsed.device_id != board.images_for:
         raise UsageError(
-            f"The image is for {target_name(parsed.device_id)}, {board.title} needs {board.target}; build it with "
-            f"--target {board.target}.",
+            f"The image is for {target_name(parsed.device_id)}, {board.title} needs {target_name(board.images_for)}; "
+            f"build it {built_for(board.images_for)}.",
             "other-target",
         )
     pieces = list(_flash_pieces(image, board))

@@ -76,6 +76,12 @@ def _lines(device: DeviceFile) -> Iterator[_Line]:
         comment = "images with inputs and outputs of another board are refused"
         yield _Definition("BOARD_DEVICE_NAME", _string(device.name), Pos(device.path, 1, 1), comment)
         yield ""
+    if device.id:
+        comment = "images for another device are refused"
+        yield _Definition("BOARD_DEVICE_ID", f"0x{device.id:08X}", Pos(device.path, 1, 1), comment)
+        if device.vendor:
+            yield _Definition("BOARD_VENDOR_NAME", _string(device.vendor), Pos(device.path, 1, 1), "as scan shows it")
+        yield ""
     if device.lines:
         yield "/* Lines, by the names that SysGpio gets. */"
         for line in device.lines.values():

@@ -3,6 +3,8 @@
 name = "IO-16"                            # what its firmware calls itself
 vendor = "Acme"
 target = "cortex-m3"
+vendor_id = 0x1234                        # with device_id: images are for this device alone
+device_id = 0x0005
 
 [limits]                                  # what the firmware has room for
 inputs = 64                               # bytes
@@ -46,6 +48,7 @@ from plctool.io.positions import TomlText
 from plctool.io.tables import Entry, Table, each
 
 MAX_ID = 0x7FFF_FFFF
+_IDS = ("vendor_id", "device_id")
 IO_LIMITS = {"inputs": 1 << 16, "outputs": 1 << 16, "connectors": 0xFFFE, "channels": 0xFFFE}
 PROGRAM_LIMITS = dict.fromkeys(("tasks", "functions", "data", "retain", "memory", "code", "image", "stack"), MAX_ID)
 LIMITS = IO_LIMITS | PROGRAM_LIMITS
@@ -108,12 +111,13 @@ class Module:
 
 @dataclass
 class DeviceFile:
-    """A board. `target`: its processor, "" if not said."""
+    """A board. `target`: its processor, "" if not said. `id`: vendor << 16 | device, 0 if the vendor has no numbers."""
 
     path: str
     name: str = ""
     vendor: str = ""
     target: str = ""
+    id: int = 0
     limits: dict[str, int] = field(default_factory=dict)
     lines: dict[str, Line] = field(default_factory=dict)
     modules: dict[str, Module] = field(default_factory=dict)
@@ -129,6 +133,7 @@ def read_device_file(text: TomlText, mistakes: Mistakes) -> DeviceFile:
     root = Table(text, (), text.values, mistakes)
     device = DeviceFile(text.path, _device_name(root), _one_line(root, "vendor"))
     device.target = root.choice("target", {name: name for name in TARGETS}) or ""
+    device.id = _device_id(root, device)
     limits = root.table("limits")
     if limits is not None:
         for name, largest in LIMITS.items():
@@ -157,6 +162,21 @@ def _device_name(table: Table) -> str:
         table.error(f"name is what the firmware calls itself, at most {MAX_NAME} ASCII characters", "name")
         return ""
     return name
+
+
+def _device_id(table: Table, device: DeviceFile) -> int:
+    """The number that images are for; 0 without."""
+    vendor, number = (table.number(key, 1, 0x7FFF if key == "vendor_id" else 0xFFFF) for key in _IDS)
+    if vendor is None and number is None:
+        return 0
+    if vendor is None or number is None:
+        given, missing = _IDS if number is None else _IDS[::-1]
+        table.error(f"{given} belongs to {missing}; write both", given)
+        return 0
+    if not device.target or TARGETS[device.target].hosted:
+        table.error("vendor_id and device_id are of a board; name its processor in target, such as cortex-m3", _IDS[0])
+        return 0
+    return int(vendor) << 16 | int(number)
 
 
 def _one_line(table: Table, key: str) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from plctool.core import error_name, lib
 from plctool.errors import DeviceError, LinkError
-from plctool.image.file import target_name
+from plctool.image.file import built_for, target_name
 from plctool.link import bintag
 from plctool.link.wire import Layout
 
@@ -87,8 +87,8 @@ _WRONG_TARGET = re.compile(r"for device id 0x([0-9A-F]{1,8}), this device is 0x(
 
 def _named_targets(found: re.Match[str]) -> str:
     """A device knows its targets by number, users by name."""
-    image, device = (target_name(int(number, 16)) for number in found.groups())
-    return f"for {image}, this device is {device}: build it with --target {device}"
+    image, device = (int(number, 16) for number in found.groups())
+    return f"for {target_name(image)}, this device is {target_name(device)}: build it {built_for(device)}"
 
 
 def monitoring_error_name(error: int) -> str:

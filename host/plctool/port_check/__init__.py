@@ -49,7 +49,7 @@ def run_port_check(
                 f"There is an application on {identity.node_name} that the check would replace; say --yes.", "occupied"
             )
         with tempfile.TemporaryDirectory(prefix="port-check-") as folder:
-            bench = Bench(connect, plc, target_of(identity), Path(folder), link)
+            bench = Bench(connect, plc, target_of(identity, device), Path(folder), link, identity.target_id)
             checks = Checks(bench, power_cycle, max_drift, Wires(bench, wires, device).checks())
             outcomes = []
             for check in checks.all():

@@ -24,15 +24,22 @@ NO_SERVICE = ("l7-unknowncmdgroup", "l7-unknowncmd")  # codes of DeviceError: th
 _CYCLES = "Main.n"
 
 
-def target_of(identity: Identity) -> str:
-    """The target that plctool compiles for a controller. Raises UsageError when there is none."""
+def target_of(identity: Identity, device: Path | None = None) -> str:
+    """The target that plctool compiles for a controller. `device`: the device.toml of a device that takes programs
+    for itself alone. Raises UsageError when there is none."""
+    from plctool.image.file import target_name
     from plctool.image.targets import TARGETS
+    from plctool.io.description import load_device
 
     for target in TARGETS.values():
         if getattr(lib, target.device_id) == identity.target_id:
             return target.name
+    described = load_device(device)[0] if device is not None else None
+    if described is not None and described.id == identity.target_id:
+        return described.target
+    name = target_name(identity.target_id)
     raise UsageError(
-        f"plctool has no target for the device id 0x{identity.target_id:08X}; the check needs one to compile for.",
+        f"plctool does not know the processor of {name}; name the file that has these numbers by --device device.toml.",
         "unknown-target",
     )
 
@@ -58,14 +65,18 @@ END_CONFIGURATION
 
 
 class Bench:
-    """The controller under test, its target, and where programs for it are built."""
+    """The controller under test, its target, and where programs for it are built. `device_id`: what images for it are
+    for, 0 for any device with this processor."""
 
-    def __init__(self, connect: Callable[[], Plc], plc: Plc, target: str, folder: Path, link: Link) -> None:
+    def __init__(
+        self, connect: Callable[[], Plc], plc: Plc, target: str, folder: Path, link: Link, device_id: int = 0
+    ) -> None:
         self.plc = plc
         self.target = target
         self.link = link
         self._connect = connect
         self._folder = folder
+        self._device_id = device_id
         self._built: dict[tuple[str, str], Path] = {}
 
     def reconnect(self) -> None:
@@ -90,7 +101,7 @@ class Bench:
             if description:
                 described.write_text(description)
             io = IoFiles(described, device) if description else IoFiles(wanted=False)
-            built = compile_sources([source], target=self.target, limits=False, io=io)
+            built = compile_sources([source], target=self.target, limits=False, io=io, device_id=self._device_id)
             image = source.with_suffix(".cdl")
             image.write_bytes(built.image)
             built.symbols.save(symbol_path(image))

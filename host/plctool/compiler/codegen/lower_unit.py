@@ -62,7 +62,7 @@ def parse_checks(text: str) -> frozenset[Check]:
 class Options:
     """How to compile. `debug`: keep the program closer to its source (no inlining across POUs); `size`: rather small
     than fast; `firmware`: what is known of the C functions that it will call; `passes`: which of them run; `cache`:
-    where objects are kept."""
+    where objects are kept; `device_id`: what the image is for, 0 for any device with this processor."""
 
     target: Target
     opt_level: int = 2
@@ -72,6 +72,7 @@ class Options:
     firmware: FirmwareStacks | None = None
     passes: Passes = field(default_factory=Passes)
     cache: ObjectCache | None = field(default=None, compare=False)
+    device_id: int = 0
 
     @property
     def steps(self) -> bool:

@@ -110,7 +110,7 @@ def _build(
         code += configuration
         symbols.io = io_document(program, program.io)
     tasks = [_task(task, _entry(linked, name, target)) for task, name in zip(program.tasks, lowered.tasks, strict=True)]
-    device_id = int(getattr(lib, target.device_id))
+    device_id = options.device_id or int(getattr(lib, target.device_id))
     symbols.online = facts_of(tasks, device_id, devices)
     symbols.online["constants"] = constants_of(program.globals, program.defaults)
     areas = {area.value: size for area, size in program.area_sizes.items() if area is not Area.CODE}

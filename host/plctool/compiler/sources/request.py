@@ -23,7 +23,8 @@ class BuildRequest:
     than any device has. `dialect`: iec, codesys or twincat, where systems disagree about what a program means; None:
     that of the files. `no_pass`: passes of the code generator that are left out; `dump_after`: the pass whose result is
     kept. `base`: the program whose place it shall take while that runs. `cache`: code that has not changed comes from
-    the user's cache folder."""
+    the user's cache folder. `device_id`: the device that the image is for, 0 for that of the board or of the device of
+    a description."""
 
     files: ProgramFiles
     target: str | None = None
@@ -39,6 +40,7 @@ class BuildRequest:
     dump_after: str | None = None
     base: SymbolTable | None = None
     cache: bool = False
+    device_id: int = 0
 
 
 def request_of(files: ProgramFiles) -> BuildRequest:

@@ -140,10 +140,10 @@ const SYS_TARGET *SysTargetGet(void)
 {
     static const SYS_TARGET target = {
         .type = TARGET_TYPE_PROGRAMMABLE,
-        .id = BOARD_TARGET_ID,
+        .id = BOARD_DEVICE_ID,
         .version = 0x01000000,
         .device_name = BOARD_DEVICE_NAME,
-        .vendor_name = "Open",
+        .vendor_name = BOARD_VENDOR_NAME,
         .node_name = BOARD_NODE_NAME,
         .serial_number = "0",
     };
