@@ -65,6 +65,8 @@ typedef struct {
     IO_CONFIG_PLACE io;                  /* size 0: no blob */
     CDL_CHANGE change;                   /* base 0: no blob */
     const char *info[5];
+    const void *more_info; /* after the strings and the date */
+    RTS_UI32 more_info_size;
 } APP_SPEC;
 
 typedef struct {
@@ -324,6 +326,9 @@ static inline void append_info(APP_BYTES *image, const APP_SPEC *spec)
         pad(image, 4);
     }
     append(image, &date, sizeof date);
+    if (spec->more_info_size > 0)
+        append(image, spec->more_info, spec->more_info_size);
+    pad(image, 4);
 }
 
 static inline CDL_HEADER image_header(const APP_BYTES *image)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from plctool.compiler import compile_sources
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
 from plctool.image.file import (
@@ -168,3 +170,19 @@ def test_description_is_ready_for_json() -> None:
     assert described["tasks"][1]["kind"] == "event"
     assert described["externals"][1] == {"name": "sin", "signature": "00000001", "version": "2.3"}
     assert {a["name"]: a["size"] for a in described["areas"]} == {"data": 48, "retain": 12, "output": 4}
+
+
+def test_properties_follow_the_strings_as_the_device_reads_them(tmp_path: Path) -> None:
+    """The bytes are those of tests/c/test_app_properties.c."""
+    (tmp_path / "main.st").write_text("PROGRAM Main END_PROGRAM")
+    (tmp_path / "plc.toml").write_text(
+        "sources = 'main.st'\n[information]\ntitle = 'Pump station'\n[information.properties]\n"
+        "gain = 1.5\ntested = true\nhw = { version = '2.0.1' }\nlast = 'x'\n"
+    )
+    properties = (
+        b"TTitle\0\0Pump station\0\0\0\0Ngain\0\0\0\0\0\0\0\0\0\xf8\x3fBtested\0\1\0\0\0Vhw\0"
+        b"2.0.1.0\0Tlast\0\0\0x\0\0\0"
+    )
+    image = compile_sources([tmp_path]).image
+    assert properties in image
+    assert parse_image(image).info.description == ""

@@ -197,6 +197,26 @@ def test_a_driver_from_the_blank_one_has_a_device(product: Callable[[str], Path]
         assert plc.io_devices()[0].state == "ok"
 
 
+LABEL = "[information]\nname = 'P'\n[information.properties]\nserial = 'A-17'\n"
+
+
+def test_a_component_reads_a_property_of_the_project(product: Callable[[str], Path]) -> None:
+    folder = product("full")
+    (source,) = blocks("projects.md", "AcmeLabel.c")
+    (folder / "AcmeLabel.c").write_text(source)
+    hook = "enum { CMPID_AcmeLabel = 0x8005 };\nRTS_RESULT AcmeLabel_Hook(CMP_HOOK hook);"
+    (folder / "AcmeLabel.h").write_text(f'#include "CmpItf.h"\n{hook}\n')
+    merge(folder / "cmp_list.c", '#include "AcmeLabel.h"\n#define PORT_COMPONENTS(X) X(AcmeLabel)')
+    project = folder / "project"
+    project.mkdir()
+    (project / "main.st").write_text(program("VAR n : DINT; END_VAR", "n := n + 1;"))
+    (project / "plc.toml").write_text(f"sources = 'main.st'\ntarget = '{TARGET}'\n{LABEL}")
+    assert plctool(["build", str(project), "-o", str(folder / "main.cdl")]) == 0
+    with Board(MACHINE, make(folder), folder) as board, Plc(Connection(board.line())) as plc:
+        plc.flash(folder / "main.cdl")
+        eventually(lambda: "Serial number A-17" in [entry.text for entry in plc.log()])
+
+
 NUMBERS = 'vendor = "Acme"\ntarget = "cortex-m3"\nvendor_id = 0x1234\ndevice_id = 5\n'
 
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from plctool.compiler.sources.request import BuildRequest
     from plctool.compiler.syntax.warnings import WarningOptions
     from plctool.image.board import Board
+    from plctool.image.file import ImageProperty
     from plctool.io.model import Description
 
 __all__ = [
@@ -237,13 +238,23 @@ def build(request: BuildRequest, python: PythonFunctions | None = None, trees: T
     if checked.program is None:
         raise CompileError(checked.diagnostics, shown)
     # No time of build: the same sources give the same image, so that its symbols are found again anywhere.
-    info = replace(files.info, date=source_date())
+    info = replace(files.info, date=source_date(), properties=_properties_of(files.information))
     with bugs_reported():
         built = build_program(checked.program, options, info, change=checked.change)
     if request.limits:
         check_program_fits(built, options.target, board, device)
     found = checked.diagnostics
     return replace(built, warnings=found, rendered_warnings=render_all(found, shown), dumps=options.passes.dumps)
+
+
+def _properties_of(information: Information) -> dict[str, ImageProperty]:
+    """What components in C may ask for (AppProperties.h)."""
+    from plctool.image.file import ImageProperty
+
+    texts = {key.capitalize(): text for key, text in information.strings.items() if key in ("title", "company")}
+    return {key: ImageProperty("T", text) for key, text in texts.items()} | {
+        key: ImageProperty(found.kind.name[0], found.value) for key, found in information.properties.items()
+    }
 
 
 def _board(request: BuildRequest) -> Board | None:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import re
 import shlex
+import struct
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -46,8 +47,17 @@ _NO_INIT = int(lib.CDL_CHANGE_NO_INIT)
 
 
 @dataclass(frozen=True)
+class ImageProperty:
+    """A property of the project. `type`: T text, V version (a text), N number, B BOOL."""
+
+    type: str
+    value: str | float | bool
+
+
+@dataclass(frozen=True)
 class ApplicationInfo:
-    """Strings for users; `date` in seconds since 1970 (UTC), 0 when unknown."""
+    """Strings for users; `date` in seconds since 1970 (UTC), 0 when unknown; `properties`: for components in C, by key,
+    as AppProperties.c reads them."""
 
     project: str = ""
     author: str = ""
@@ -55,6 +65,7 @@ class ApplicationInfo:
     description: str = ""
     profile: str = ""
     date: int = 0
+    properties: Mapping[str, ImageProperty] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -239,7 +250,15 @@ def build_image(image: Image) -> bytes:
 
 def _info_segment(info: ApplicationInfo) -> bytes:
     texts = (info.project, info.author, info.version, info.description, info.profile)
-    return b"".join(map(_text, texts)) + info.date.to_bytes(4, "little")
+    properties = b"".join(_property(key, found) for key, found in info.properties.items())
+    return b"".join(map(_text, texts)) + info.date.to_bytes(4, "little") + properties
+
+
+def _property(key: str, found: ImageProperty) -> bytes:
+    head = _padded((found.type + key).encode("latin-1", "replace") + b"\0")
+    if isinstance(found.value, str):
+        return head + _padded(found.value.encode("latin-1", "replace") + b"\0")
+    return head + (struct.pack("<d", found.value) if found.type == "N" else struct.pack("<I", bool(found.value)))
 
 
 def _area_entries(image: Image) -> Iterator[bytes]:
