@@ -173,5 +173,6 @@ def test_block_that_only_the_device_has_raises_in_unit_tests_unless_mocked(tool:
     Path("acme.st").write_text(BLOCK + test, "utf-8")
     done = tool("test", "acme.st")
     assert (done.status == 0) == bool(mock), done.out
+    assert "never used" not in done.err
     if not mock:
         assert "UNRESOLVED_EXTREFS" in done.out or "C function" in done.out

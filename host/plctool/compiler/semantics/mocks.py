@@ -23,6 +23,7 @@ from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.core import lib
 
 MOCKED, CALLS = "__mocked", "__calls"
+IN_C = "__in_c"  # attribute of a block whose body in C is elsewhere, and uses its variables
 _RAISE = "__raise"
 
 
@@ -164,7 +165,8 @@ def _raising_body(decl: ast.PouDecl) -> list[ast.Stmt]:
 def _raising_block(decl: ast.PouDecl) -> ast.PouDecl:
     """A block in C whose calls raise an exception. Its instances can be made, so that they can be mocked."""
     members = [m if m.name.casefold() in INITIALISERS else replace(m, body=_raising_body(m)) for m in decl.members]
-    return replace(decl, body=_raising_body(decl), members=members, attributes=_without_external(decl.attributes))
+    attributes = _without_external(decl.attributes) | {IN_C: ""}
+    return replace(decl, body=_raising_body(decl), members=members, attributes=attributes)
 
 
 def _variable(pos: int, name: str, type_name: str) -> ast.VarDecl:

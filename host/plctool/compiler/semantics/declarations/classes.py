@@ -201,8 +201,6 @@ class Classes:
         """Makes a block whose variables are declared one whose body is implemented in C."""
         assert info.cls is not None
         decl = info.cls.symbol.decl
-        for symbol in info.members.values():
-            symbol.used = True  # in C
         self._functions.set_external(info.pou, _name_in_c(decl, "main"), decl.attributes, scope)
 
     def _see(self, cls: ClassInfo, key: str, symbol: VarSymbol) -> None:

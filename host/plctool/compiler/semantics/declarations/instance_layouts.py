@@ -21,6 +21,7 @@ from plctool.compiler.semantics.declarations.unit_variables import (
 from plctool.compiler.semantics.declarations.variables import Variables
 from plctool.compiler.semantics.generics import NAME, give_bounds, group_of, is_any
 from plctool.compiler.semantics.instances import require_instances
+from plctool.compiler.semantics.mocks import IN_C
 from plctool.compiler.semantics.names import PlannedInstance
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import (
@@ -102,6 +103,9 @@ class Blocks:
         info.members |= {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol) and s.role is not Role.TEMP}
         self._world.blocks[layout] = info
         self._classes.end_block(info, scope)
+        if "external" in decl.attributes or IN_C in decl.attributes:
+            for member in info.members.values():
+                member.used = True  # in C
         if "external" in decl.attributes:
             self._classes.in_c(info, scope)
         else:
