@@ -21,7 +21,7 @@ enum {
 enum {
     CANOPEN_IN_VALUES = 0, /* byte of the values; a text has a NUL after its `size` characters */
     CANOPEN_CONSTANT = 1,  /* the value */
-    CANOPEN_TEXT = 2,      /* byte of the texts, `size` characters */
+    CANOPEN_TEXT = 2,      /* byte of the strings, `size` characters */
     CANOPEN_OF_NODE = 3,   /* the value without the node number, which is added */
     CANOPEN_SETTING = 4,   /* of the firmware: byte of its settings */
     CANOPEN_LIVE = 5,      /* of the firmware */

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * From main; time is an argument. One client at a time: a request that begins a transfer ends the one before.
+ * From main; time is an argument. One client at a time: a request that begins a transfer ends the previous one.
  */
 #ifndef CANOPENSDOSERVER_H
 #define CANOPENSDOSERVER_H

@@ -17,6 +17,9 @@
 
 enum { CANOPEN_PART_SETTINGS = 1, CANOPEN_PART_VALUES = 2, CANOPEN_PARTS = 3 };
 
+/* Before all others, after SysFileFlash: there may be no component that has opened the store. */
+void CanopenStoreOpen(void);
+
 /* Stores the present settings, values or both; a part that is not named stays as it was stored. ERR_NOT_SUPPORTED,
  * ERR_INVALID_STATE: a tool is writing a file; errors of the store. */
 RTS_RESULT CanopenStoreSave(const CANOPEN_SLAVE *slave, RTS_UI32 parts);

@@ -97,16 +97,16 @@ static RTS_UI32 write_object(RTS_UI16 index, RTS_UI8 sub, const void *data, RTS_
 static void a_damaged_dictionary_is_refused(void)
 {
     static const CANOPEN_OBJECT damaged[] = {
-        {0x1018, 3, CANOPEN_UNSIGNED16, RW, CANOPEN_IN_VALUES, 2, 0},                          /* out of order */
-        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_IN_VALUES, 2, VALUES - 1},                 /* outside */
-        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_IN_VALUES, 2, 0xFFFFFFFF},                 /* wraps */
-        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_IN_VALUES, 0, 0},                          /* nothing */
-        {0x2000, 0, CANOPEN_VISIBLE_STRING, RW, CANOPEN_IN_VALUES, 60, VALUES - 60},           /* no room for the NUL */
-        {0x2000, 0, CANOPEN_VISIBLE_STRING, RO, CANOPEN_TEXT, 1, 0},                           /* there are no texts */
-        {0x2000, 0, CANOPEN_UNSIGNED32, RW, CANOPEN_CONSTANT, 4, 0},                           /* to be written */
-        {0x2000, 0, CANOPEN_UNSIGNED32, RO, CANOPEN_CONSTANT, 8, 0},                           /* too large */
-        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_SETTING, 2, 0},                            /* the firmware's */
-        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_LIVE, 2, 0},                               /* the firmware's */
+        {0x1018, 3, CANOPEN_UNSIGNED16, RW, CANOPEN_IN_VALUES, 2, 0},                /* out of order */
+        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_IN_VALUES, 2, VALUES - 1},       /* outside */
+        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_IN_VALUES, 2, 0xFFFFFFFF},       /* wraps */
+        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_IN_VALUES, 0, 0},                /* nothing */
+        {0x2000, 0, CANOPEN_VISIBLE_STRING, RW, CANOPEN_IN_VALUES, 60, VALUES - 60}, /* no room for the NUL */
+        {0x2000, 0, CANOPEN_VISIBLE_STRING, RO, CANOPEN_TEXT, 1, 0},                 /* there are no strings */
+        {0x2000, 0, CANOPEN_UNSIGNED32, RW, CANOPEN_CONSTANT, 4, 0},                 /* to be written */
+        {0x2000, 0, CANOPEN_UNSIGNED32, RO, CANOPEN_CONSTANT, 8, 0},                 /* too large */
+        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_SETTING, 2, 0},                  /* the firmware's */
+        {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_LIVE, 2, 0},                     /* the firmware's */
         {0x2000, 0, CANOPEN_VISIBLE_STRING, RW, CANOPEN_IN_VALUES, CANOPEN_DEVICE_SDO + 1, 0}, /* for the server */
     };
     const CANOPEN_OBJECT good = objects[4];

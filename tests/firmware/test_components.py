@@ -29,10 +29,13 @@ def _components(path: Path) -> list[str]:
     """The components of a list, as the compiler sees it."""
     compiler = shutil.which("cc")
     assert compiler, "this test needs a C compiler: install gcc or clang"
-    own = path.parent if (path.parent / "rts_config_port.h").exists() else FIRMWARE / "port/sim"
+    has_sizes = (path.parent / "rts_config_port.h").exists()
+    own = path.parent if has_sizes else FIRMWARE / "port/sim"
+    shared = "HAS_CmpCan" in path.read_text() and not has_sizes
+    sizes = ["-DCAN_MAX_USERS=2", "-DCANOPEN_DEVICE_DATA=256"] if shared else []
     include = [FIRMWARE / "include", FIRMWARE / "port/baremetal/common", own]
     done = subprocess.run(
-        [compiler, "-E", "-P", "-std=c99", "-DCOMM_ENDPOINTS=1", *(f"-I{folder}" for folder in include), path],
+        [compiler, "-E", "-P", "-std=c99", "-DCOMM_ENDPOINTS=1", *sizes, *(f"-I{folder}" for folder in include), path],
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     return re.findall(r'"(\w+)"', done.stdout[done.stdout.index("cmp_names[] =") :])
@@ -67,4 +70,4 @@ def test_what_a_port_chooses_exists(path: Path) -> None:
 
 
 def test_there_is_a_list_for_every_configuration() -> None:
-    assert len(LISTS) == 11
+    assert len(LISTS) == 12

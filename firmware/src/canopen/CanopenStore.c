@@ -30,6 +30,11 @@ typedef struct {
     RTS_UI32 node;
 } STORED_NODE;
 
+void CanopenStoreOpen(void)
+{
+    FileStoreOpen();
+}
+
 static RTS_UI32 get_dictionary_crc(const CANOPEN_SLAVE *slave)
 {
     RTS_UI32 crc = CRC32Update(0, slave->objects, slave->object_count * sizeof(*slave->objects));
@@ -244,6 +249,10 @@ RTS_UI8 CanopenStoredNode(void)
 }
 
 #else
+
+void CanopenStoreOpen(void)
+{
+}
 
 RTS_RESULT CanopenStoreSave(const CANOPEN_SLAVE *slave, RTS_UI32 parts)
 {

@@ -14,6 +14,7 @@
 #include "CanopenDevice.h"
 #include "CanopenDeviceDriver.h"
 #include "CanopenDevicePdo.h"
+#include "CanopenStore.h"
 #include "CmpBytes.h"
 #include "CmpCan.h"
 #include "CmpChecksum.h"
@@ -453,8 +454,10 @@ static const ICmpIoDrv functions = {
 
 RTS_RESULT IoDrvCanopenDevice_Hook(CMP_HOOK hook)
 {
-    if (hook == CH_INIT2)
+    if (hook == CH_INIT2) {
+        CanopenStoreOpen();
         return IoMgrRegisterInstance(&driver);
+    }
     if (hook == CH_COMM_CYCLE && device.is_running)
         cycle();
     else if (hook == CH_EXIT3)

@@ -1,0 +1,21 @@
+/*
+ * cmp_list.c - the components of the configuration with CANopen: those of the configuration with CAN, inputs and outputs,
+ * and the controller as a CANopen device.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpCompilerCalls.h"
+
+#define HAS_CmpLog 1
+#define HAS_SysWatchdog 1
+#define HAS_CmpRetain 1
+#define HAS_COMMUNICATION 1
+#define HAS_CmpLogSrv 1
+#define HAS_CmpMonitor2 1
+#define HAS_CmpBlkDrvSimpleCom 1
+#define HAS_CmpBlkDrvCan 1
+#define HAS_CmpCan 1
+#define HAS_CmpIoMgrEmbedded 1
+#define HAS_IoDrvCanopenDevice 1
+#define PORT_COMPONENTS(X) X(CmpIntCalls) X(CmpRealCalls)
+#include "CmpList.h"
