@@ -10,7 +10,7 @@ PROGRAM Main
 VAR
     count : UDINT; batch : STRING(20) := 'none'; temps : ARRAY[1..3] OF INT := [10, -20, 30];
     setpoint : UINT := 700; run, running : BOOL; level : REAL; error : WORD; recipe : STRING(100) := 'first';
-    echo : UINT; long : LINT; small : USINT; ok : BOOL;
+    echo : UINT; long : LINT; small : USINT; angle : INT(-90..90); ok : BOOL;
 END_VAR
 count := count + 1;
 echo := setpoint;
@@ -41,6 +41,7 @@ WRITE = """
 "2201:02" = "Main.level"
 "2202" = { var = "Main.recipe", store = true }
 "2203" = "Main.long"
+"2205" = "Main.angle"
 "2204" = { var = "Main.small", on_error = 7 }
 """
 

@@ -121,6 +121,8 @@ typedef struct {
     PF_CANOPEN_DEVICE_SEND send;
     const CANOPEN_OBJECT *objects;
     RTS_UI32 object_count;
+    const CANOPEN_LIMIT *limits;
+    RTS_UI32 limit_count;
     const RTS_UI8 *texts;
     RTS_UI32 texts_size;
     RTS_UI8 *values; /* under SysLock */

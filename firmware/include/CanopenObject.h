@@ -14,7 +14,8 @@ enum {
     CANOPEN_ACCESS_WRITE = 2,
     CANOPEN_ACCESS_TPDO = 4,
     CANOPEN_ACCESS_RPDO = 8,
-    CANOPEN_ACCESS_STORED = 16, /* 1010h stores its value */
+    CANOPEN_ACCESS_STORED = 16,  /* 1010h stores its value */
+    CANOPEN_ACCESS_LIMITED = 32, /* there is a CANOPEN_LIMIT of it */
 };
 
 /* where of CANOPEN_OBJECT: what `place` is */
@@ -37,6 +38,15 @@ typedef struct {
     RTS_UI16 size; /* bytes; of a text the most characters */
     RTS_UI32 place;
 } CANOPEN_OBJECT;
+
+/* The least and the greatest value that SDO can write, of up to 32 bits. */
+typedef struct {
+    RTS_UI16 index;
+    RTS_UI8 sub;
+    RTS_UI8 is_signed;
+    RTS_UI32 low;
+    RTS_UI32 high;
+} CANOPEN_LIMIT;
 
 enum { CANOPEN_MAPPINGS = 8 }; /* objects in a PDO */
 
@@ -62,6 +72,7 @@ bool CanopenDictGetFixed(RTS_UI32 number, CANOPEN_OBJECT *object);
 
 #ifndef RTS_CFFI
 RTS_STATIC_ASSERT(sizeof(CANOPEN_OBJECT) == 12, canopen_object_is_12_bytes);
+RTS_STATIC_ASSERT(sizeof(CANOPEN_LIMIT) == 12, canopen_limit_is_12_bytes);
 RTS_STATIC_ASSERT(sizeof(CANOPEN_PDO_SETTING) == 44, canopen_pdo_setting_is_44_bytes);
 #endif
 

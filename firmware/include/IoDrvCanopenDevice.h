@@ -22,6 +22,7 @@ enum {
     CANOPEN_DEVICE_RPDOS = 7,   /* CANOPEN_PDO_SETTING, as bytes */
     CANOPEN_DEVICE_TPDOS = 8,
     CANOPEN_DEVICE_VALUES = 9,         /* bytes of all values */
+    CANOPEN_DEVICE_LIMITS = 10,        /* CANOPEN_LIMIT, as bytes */
     CANOPEN_DEVICE_VALUE = 0x1000,     /* of channels: the values */
     CANOPEN_DEVICE_EMERGENCY = 0x1001, /* of a channel: the code of the program's emergency, 0: none */
     /* To be read only, u32 each: */

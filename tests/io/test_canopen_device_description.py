@@ -74,6 +74,11 @@ def test_eds_is_the_same_for_the_same_image_and_has_no_doubts(tmp_path: Path) ->
     assert not eds.findings.found
     assert eds.device.vendor == 0x319
     assert (eds.device.rx_pdos, eds.device.tx_pdos) == (4, 4)
+    angle = eds.entry(0x2205)
+    assert angle is not None
+    assert angle.low is not None
+    assert angle.high is not None
+    assert (angle.low.value, angle.high.value) == (-90, 90)
     cob = eds.entry(0x1800, 1)
     assert cob is not None
     assert cob.default is not None

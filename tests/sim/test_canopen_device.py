@@ -247,6 +247,19 @@ def test_device_without_a_number_gets_one_by_fastscan(tmp_path: Path, monkeypatc
         assert frames(plc, 0x700 + 23) == [b"\0"], "the stored number"
 
 
+def test_subrange_is_a_limit_for_sdo(plc: Simulator) -> None:
+    client = client_of(SimNetwork(plc))
+    for number, code in ((-90, 0), (90, 0), (-91, 0x06090032), (91, 0x06090031), (-32768, 0x06090032), (-1, 0)):
+        try:
+            client.download(0x2205, 0, number.to_bytes(2, "little", signed=True))
+            assert code == 0, number
+        except SdoAbortedError as refused:
+            assert refused.code == code, number
+    nmt(plc, START)
+    plc.run_for(20)
+    assert plc.read("Main.angle") == -1
+
+
 def test_inputs_and_outputs_are_objects_of_the_device(plc: Simulator) -> None:
     plc.set_input("Main.setpoint", 321)
     plc.run_for(50)

@@ -89,12 +89,40 @@ RTS_UI32 CanopenAccessCheck(const CANOPEN_OBJECT *object, RTS_UI32 size)
     return size < object->size && object->type != CANOPEN_VISIBLE_STRING ? SDO_ABORT_TOO_SHORT : 0;
 }
 
+static RTS_UI32 check_limit(const CANOPEN_LIMIT *limit, RTS_UI32 size, RTS_UI32 value)
+{
+    const RTS_UI32 sign = 0x80000000; /* turned round: signed numbers are in the order of unsigned ones */
+    RTS_UI32 turned = limit->is_signed ? sign : 0;
+
+    if (limit->is_signed && size < sizeof(value) && (value >> (8 * size - 1) & 1) != 0)
+        value |= ~(RTS_UI32)0 << 8 * size;
+    if ((value ^ turned) > (limit->high ^ turned))
+        return SDO_ABORT_TOO_HIGH;
+    return (value ^ turned) < (limit->low ^ turned) ? SDO_ABORT_TOO_LOW : 0;
+}
+
+static RTS_UI32 check_limits(const CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object, const RTS_UI8 *data)
+{
+    RTS_UI8 number[sizeof(RTS_UI32)] = {0};
+
+    if ((object->access & CANOPEN_ACCESS_LIMITED) == 0 || object->size > sizeof(number))
+        return 0;
+    memcpy(number, data, object->size);
+    for (RTS_UI32 i = 0; i < slave->limit_count; i++)
+        if (slave->limits[i].index == object->index && slave->limits[i].sub == object->sub)
+            return check_limit(&slave->limits[i], object->size, BytesGet32(number));
+    return 0;
+}
+
 static RTS_UI32 write_values(CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object, const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI8 *to = slave->values + object->place;
 
     if (object->type == CANOPEN_BOOLEAN && data[0] > 1)
         return SDO_ABORT_TOO_HIGH;
+    RTS_UI32 abort = check_limits(slave, object, data);
+    if (abort != 0)
+        return abort;
     RTS_UI32 lock = SysLockEnter();
     CanopenPdoUnpack(slave); /* what came before is older */
     memcpy(to, data, size);

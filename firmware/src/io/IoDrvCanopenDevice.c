@@ -106,14 +106,16 @@ static RTS_UI32 number(RTS_UI32 id)
     return IoMgrConfigGetParameterValueDword(IoMgrConfigGetParameter(device.connector, id), NULL);
 }
 
-/* The bytes of a parameter, which start at a multiple of 4; NULL: it is missing. */
+/* The bytes of a parameter, which start at a multiple of 4; NULL and 0: it is missing. */
 static const void *bytes(RTS_UI32 id, RTS_UI32 *size)
 {
     const IoConfigParameter *parameter = IoMgrConfigGetParameter(device.connector, id);
 
     *size = parameter != NULL ? parameter->bits / 8 : 0;
-    return *size != 0 && (parameter->flags & PVF_POINTER) != 0 ? IoMgrConfigGetParameterValuePointer(parameter, NULL)
-                                                               : NULL;
+    if (*size != 0 && (parameter->flags & PVF_POINTER) != 0)
+        return IoMgrConfigGetParameterValuePointer(parameter, NULL);
+    *size = 0;
+    return NULL;
 }
 
 /* A table of entries; NULL and 0: it is missing, or not whole. */
@@ -146,6 +148,7 @@ static RTS_RESULT describe(CANOPEN_SLAVE *slave)
     slave->values = device.values;
     slave->values_size = number(CANOPEN_DEVICE_VALUES);
     slave->objects = table(CANOPEN_DEVICE_OBJECTS, sizeof(*slave->objects), &slave->object_count);
+    slave->limits = table(CANOPEN_DEVICE_LIMITS, sizeof(*slave->limits), &slave->limit_count);
     slave->texts = bytes(CANOPEN_DEVICE_TEXTS, &slave->texts_size);
     slave->defaults[CANOPEN_RPDOS] =
         table(CANOPEN_DEVICE_RPDOS, sizeof(CANOPEN_PDO_SETTING), &slave->pdo_count[CANOPEN_RPDOS]);

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 
 from plctool.core import ffi, lib
 from plctool.files import Pos
-from plctool.iec.types import BYTE, UDINT, ArrayType, Elementary, StringType, Type, base_of
+from plctool.iec.types import BYTE, UDINT, ArrayType, Elementary, StringType, SubrangeType, Type, base_of
 from plctool.io.canopen.data_types import DATA_TYPES, UNSIGNED8, UNSIGNED32, VISIBLE_STRING, DataType, type_named
 from plctool.io.canopen.eds import MAX_PDO_BITS
 from plctool.io.canopen.manager import MAX_NODE
@@ -39,6 +39,7 @@ MAX_PDOS = 64
 MAX_MAPPINGS = int(lib.CANOPEN_MAPPINGS)
 MAX_TEXT = 63
 MAX_ELEMENTS = 254
+_MOST_LIMITED = 4  # bytes of a value with limits
 INVALID, NO_REMOTE = 0x8000_0000, 0x4000_0000
 FIRST_RPDO, FIRST_TPDO = 0x200, 0x180
 PDO_STEP = 0x100
@@ -91,6 +92,7 @@ class CanopenSlave(Connector):
     pdos: dict[bool, list[Pdo]] = field(default_factory=dict)  # by "it is a TPDO"
     objects: dict[tuple[int, int], dict[str, int]] = field(default_factory=dict)
     texts: bytearray = field(default_factory=bytearray)
+    limits: dict[tuple[int, int], SubrangeType] = field(default_factory=dict)
 
     def add(self, number: int, value: int, name: str = "") -> None:
         """A parameter of 32 bits."""
@@ -113,6 +115,7 @@ class CanopenSlave(Connector):
             self.add_bytes(int(number), b"".join(self._settings(is_tpdo, mistakes)))
         self.add_bytes(int(lib.CANOPEN_DEVICE_OBJECTS), b"".join(self._packed()))
         self.add_bytes(int(lib.CANOPEN_DEVICE_TEXTS), bytes(self.texts))
+        self.add_bytes(int(lib.CANOPEN_DEVICE_LIMITS), b"".join(self._packed_limits()))
         self.add(int(lib.CANOPEN_DEVICE_VALUES), size)
         self.parameters.sort(key=lambda p: p.id)
 
@@ -162,6 +165,9 @@ class CanopenSlave(Connector):
                 value.index, sub, kind, self._access(value, kind), where=int(lib.CANOPEN_IN_VALUES),
                 size=kind.size or base.size - 1, place=place + number * base.size,
             )  # fmt: skip
+        if isinstance(t, SubrangeType) and value.writable and kind.size <= _MOST_LIMITED:
+            self.objects[value.index, first]["access"] |= int(lib.CANOPEN_ACCESS_LIMITED)
+            self.limits[value.index, first] = t
         value.channel.parameter, value.channel.parameter_bit = int(lib.CANOPEN_DEVICE_VALUE), 8 * place
         return place + elements * base.size
 
@@ -188,6 +194,14 @@ class CanopenSlave(Connector):
     def _packed(self) -> Iterator[bytes]:
         for key in sorted(self.objects):
             yield bytes(ffi.buffer(ffi.new("CANOPEN_OBJECT *", self.objects[key])))
+
+    def _packed_limits(self) -> Iterator[bytes]:
+        mask = (1 << 8 * _MOST_LIMITED) - 1
+        for (index, sub), t in sorted(self.limits.items()):
+            limit = {
+                "index": index, "sub": sub, "is_signed": int(t.base.signed), "low": t.low & mask, "high": t.high & mask,
+            }  # fmt: skip
+            yield bytes(ffi.buffer(ffi.new("CANOPEN_LIMIT *", limit)))
 
     # ---- PDOs ----
 

@@ -50,6 +50,7 @@ class Row:
     access: str
     default: str = ""
     mappable: bool = False
+    limits: tuple[int, int] | None = None
 
 
 @dataclass
@@ -83,6 +84,10 @@ class _Writer:
             if c["parameter"] == lib.CANOPEN_DEVICE_VALUE
         }
         self._objects: dict[int, Object] = {}
+        self._limits = {
+            (int(limit.index), int(limit.sub)): (_signed(limit, limit.low), _signed(limit, limit.high))
+            for limit in self._table("CANOPEN_LIMIT", int(lib.CANOPEN_DEVICE_LIMITS))
+        }
         self._texts = self._values.get(int(lib.CANOPEN_DEVICE_TEXTS), b"")
 
     def _number(self, parameter: int) -> int:
@@ -130,6 +135,7 @@ class _Writer:
             Row(
                 sub, self._row_name(entry), int(entry.type), self._access(entry), self._default(entry),
                 bool(entry.access & (lib.CANOPEN_ACCESS_TPDO | lib.CANOPEN_ACCESS_RPDO)),
+                self._limits.get((index, sub)),
             )
         )  # fmt: skip
 
@@ -243,9 +249,15 @@ class _Writer:
             yield f"{name}sub{row.sub:X}", _lines(row, row.name)
 
 
+def _signed(limit: Any, value: int) -> int:
+    """A limit, which the table has without its sign."""
+    return value - (1 << 32) if limit.is_signed and value >> 31 else value
+
+
 def _lines(row: Row, name: str) -> list[str]:
     default = [f"DefaultValue={row.default}"] if row.default else []
+    limits = [] if row.limits is None else [f"LowLimit={row.limits[0]}", f"HighLimit={row.limits[1]}"]
     return [
         f"ParameterName={name}", f"ObjectType=0x{TYPE_VAR:X}", f"DataType=0x{DATA_TYPES[row.type].code:04X}",
-        f"AccessType={row.access}", *default, f"PDOMapping={int(row.mappable)}",
+        f"AccessType={row.access}", *limits, *default, f"PDOMapping={int(row.mappable)}",
     ]  # fmt: skip
