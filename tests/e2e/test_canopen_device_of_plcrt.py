@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import canopen
 import pytest
@@ -16,6 +15,8 @@ sys.path.append(str(Path(__file__).parents[1]))
 from canopen_device_programs import NODE, write_device
 
 from plctool import connect
+from plctool.cli.commands.canopen.eds import write_eds
+from plctool.compiler import compile_sources
 from plctool.device import Plc
 from plctool.io.canopen.eds import Eds, load_eds
 from plctool.link.canbus import open_bus
@@ -55,22 +56,15 @@ class Manager:
 
 @pytest.fixture
 def hub() -> Iterator[CanHub]:
-    with CanHub(3) as hub:
+    with CanHub(2) as hub:
         yield hub
 
 
 @pytest.fixture
-def device() -> str:
-    return f"node = {NODE}"
-
-
-@pytest.fixture
-def image(tmp_path: Path, tool: Any, device: str) -> Path:
+def image(tmp_path: Path) -> Path:
     image = tmp_path / "app.cdl"
-    built = tool("build", str(write_device(tmp_path / "program", device=device)), "-o", str(image))
-    assert built.status == 0, built.err
-    made = tool("canopen", "eds", str(image))
-    assert made.status == 0, made.err
+    compile_sources([write_device(tmp_path / "program")]).write(image)
+    assert write_eds(image, None) == {"eds": str(image.with_suffix(".eds"))}
     return image
 
 
@@ -81,8 +75,8 @@ def plcrt(hub: CanHub, tmp_path: Path) -> Iterator[Plcrt]:
 
 
 @pytest.fixture
-def plc(hub: CanHub, plcrt: Plcrt, image: Path) -> Iterator[Plc]:
-    with connect(f"can:slcan:{hub.paths[1]}?node=5") as plc:
+def plc(plcrt: Plcrt, image: Path) -> Iterator[Plc]:
+    with connect(f"serial:{plcrt.port}") as plc:
         plc.flash(image)
         yield plc
 
@@ -94,7 +88,7 @@ def eds(image: Path) -> Eds:
 
 @pytest.fixture
 def manager(hub: CanHub, plc: Plc, image: Path) -> Iterator[Manager]:
-    manager = Manager(hub.paths[2], image.with_suffix(".eds"))
+    manager = Manager(hub.paths[1], image.with_suffix(".eds"))
     manager.node.nmt.wait_for_heartbeat(TIMEOUT_S)
     yield manager
     manager.network.disconnect()
@@ -203,7 +197,7 @@ def test_emergency_of_the_program_and_of_a_lost_manager(manager: Manager, plc: P
     assert manager.node.sdo.upload(0x1003, 0) == b"\0"
 
 
-def test_settings_are_stored_and_restored(manager: Manager, plc: Plc, plcrt: Plcrt, hub: CanHub) -> None:
+def test_settings_are_stored_and_restored(manager: Manager, plc: Plc, plcrt: Plcrt) -> None:
     sdo = manager.node.sdo
     sdo.download(0x1017, 0, (350).to_bytes(2, "little"))
     sdo.download(0x2200, 0, (4321).to_bytes(2, "little"))
@@ -222,3 +216,41 @@ def test_settings_are_stored_and_restored(manager: Manager, plc: Plc, plcrt: Plc
     eventually(lambda: heartbeats.count(b"\0") > before + 1)
     assert sdo.upload(0x1017, 0) == (200).to_bytes(2, "little")
     assert sdo.upload(0x2200, 0) == (4321).to_bytes(2, "little"), "still there: of the application"
+
+
+MANAGER = """
+PROGRAM Main
+VAR echo, setpoint : UINT; running, run : BOOL; END_VAR
+setpoint := 41 + SEL(Mixer.ok, 0, 1);
+run := TRUE;
+END_PROGRAM
+"""
+MANAGED = """
+[[canopen]]
+name = "Bus"
+node = 127
+[[canopen.device]]
+name = "Mixer"
+node = 9
+eds = "app.eds"
+heartbeat = "T#200ms"
+set = { "2202" = "a text that the manager writes in segments" }
+in = { "2104" = "Main.echo", "2103:01" = "Main.running" }
+out = { "2200" = "Main.setpoint", "2201:01" = "Main.run" }
+"""
+
+
+def test_controller_of_ours_manages_another_by_its_eds(hub: CanHub, plc: Plc, image: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "manager"
+    folder.mkdir()
+    (folder / "app.eds").write_bytes(image.with_suffix(".eds").read_bytes())
+    (folder / "manager.io.toml").write_text(MANAGED)
+    (folder / "manager.st").write_text(MANAGER)
+    compile_sources([folder / "manager.st"]).write(folder / "manager.cdl")
+    with Plcrt(tmp_path / "second", "--can", f"slcan:{hub.paths[1]}", "--node", "6") as second:
+        with connect(f"serial:{second.port}") as manager:
+            manager.flash(folder / "manager.cdl")
+            eventually(lambda: manager.read("Mixer.ok") and manager.read("Main.echo") == 42)
+            eventually(lambda: manager.read("Main.running"))
+        assert plc.read("Main.ok")
+        assert plc.read("Main.recipe") == "a text that the manager writes in segments"
