@@ -268,6 +268,24 @@ static void a_file_of_garbage_is_void(void)
     }
 }
 
+/* ---- errors ---- */
+
+static void error_of_the_program_lasts_over_a_reset_of_communication(void)
+{
+    const CAN_FRAME reset = {.id = 0, .size = 2, .data = {NMT_RESET_COMMUNICATION, 0}};
+
+    CHECK(begin(NODE));
+    CanopenDeviceReport(&slave, CANOPEN_ERROR_PROGRAM, 0x3100);
+    CanopenDeviceReport(&slave, CANOPEN_ERROR_LATE, 0x8250);
+    CHECK_EQUAL(slave.error_register, 0x15);
+    CanopenDeviceTake(&slave, &reset, 500, now_ms);
+    CanopenDevicePoll(&slave, now_ms);
+    CHECK(slave.error_register != 0);
+    CanopenDeviceReport(&slave, CANOPEN_ERROR_PROGRAM, 0);
+    CHECK_EQUAL(slave.error_register, 0);
+    CHECK_EQUAL(slave.history_count, 2);
+}
+
 /* ---- time ---- */
 
 static void every_event_time_is_kept(void)
@@ -297,6 +315,7 @@ int main(void)
     RUN(a_power_cut_while_it_stores_leaves_the_previous_or_the_new_values);
     RUN(what_is_stored_is_void_for_another_dictionary);
     RUN(a_file_of_garbage_is_void);
+    RUN(error_of_the_program_lasts_over_a_reset_of_communication);
     RUN(every_event_time_is_kept);
     return test_result();
 }

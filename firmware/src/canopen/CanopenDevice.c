@@ -149,8 +149,9 @@ static void reset(CANOPEN_SLAVE *slave, RTS_UI8 command, RTS_UI32 now_ms)
     slave->wanted_reset = 0;
     slave->lss.is_configuring = false;
     slave->emergency_count = 0;
-    slave->errors = 0;
-    slave->error_register = 0;
+    slave->errors &= CANOPEN_ERROR_PROGRAM; /* which lasts */
+    if (slave->errors == 0)
+        slave->error_register = 0;
     slave->is_watching = false;
     take_node(slave);
     set_defaults(slave);
