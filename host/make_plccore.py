@@ -34,6 +34,7 @@ SHARED = [
     "CmpTraceMgr.h",
     "CmpAppBP.h",
     "CmpIecTask.h",
+    "CmpTaskLoad.h",
     "CmpItf.h",
     "CmpLog.h",
     "CmpLogKeep.h",

@@ -16,15 +16,29 @@ VAR_GLOBAL
     info : ARRAY[0..1] OF Task_Info2;
     outside : UDINT := IecTaskGetCurrent(0);
     zero : DINT;
-    long, long_after, free, trip : BOOL;
+    long, long_after, free, trip, always : BOOL;
+    decides, keeps_failing, ends_task, begins_task, go : BOOL;
+    caught, caught_in, failures : UDINT;
     loops : DINT;
     load, last : UDINT;
+    status : ARRAY[0..3] OF DWORD;
+    mine, missing : DWORD;
+    finfo : F_TASK_INFO;
 END_VAR
 FUNCTION Spend
 VAR n : DINT; END_VAR
 FOR n := 1 TO loops DO
     state := (state * 1103515245) XOR SHR(state, 3) XOR 12345;
 END_FOR
+END_FUNCTION
+{attribute 'call_on' := 'EVT_TaskException'}
+FUNCTION OnException : BOOL
+caught := IecGetLastException();
+caught_in := IecTaskGetCurrent(0);
+failures := failures + 1;
+trip := trip AND NOT decides OR keeps_failing;
+IF ends_task THEN IecTaskDisableScheduling(caught_in); END_IF
+OnException := decides;
 END_FUNCTION
 PROGRAM Fast
 VAR n : DINT; own : UDINT; failed : UDINT; END_VAR
@@ -38,12 +52,19 @@ VAR n : DINT; own : UDINT; END_VAR
 own := IecTaskGetCurrent(0);
 results[0] := IecTaskGetFirst(ADR(results[1]));
 results[2] := IecTaskGetNext(results[0], 0);
-results[3] := IecTaskGetNext(results[2], ADR(results[4]));
+results[3] := IecTaskGetNext(results[2] + 1, ADR(results[4]));
+IF begins_task THEN IecTaskEnableScheduling(1); END_IF
 IecTaskGetInfo(1, info[0]);
 results[5] := IecTaskGetInfo(own, info[1]);
 results[6] := IecTaskGetInfo(0, info[1]);
 results[7] := IecTaskDisableWatchdog(1);
 load := SchedGetProcessorLoad(0);
+status[0] := Tasks1_16();
+status[1] := Tasks17_32();
+status[2] := CyclesCounter();
+status[3] := OverrunsCounter();
+missing := F_IecTasks_getInfo(ADR(finfo), UDINT_TO_WORD(DWORD_TO_UDINT(F_IecTasks_getCount())));
+mine := F_IecTasks_getInfo(ADR(finfo), 16#FFFF);
 IF long THEN
     long := FALSE;
     IF free THEN
@@ -55,13 +76,21 @@ IF long THEN
         Spend();
     END_IF
 END_IF
+IF always THEN Spend(); END_IF
 n := n + 1;
+END_PROGRAM
+PROGRAM Level
+VAR n : DINT; END_VAR
+n := n + 1;
+go := n MOD 5 <> 0;
 END_PROGRAM
 CONFIGURATION C
     RESOURCE R ON PLC
         TASK TheFast(INTERVAL := T#10ms, PRIORITY := 3);
         TASK TheSlow(INTERVAL := T#50ms, PRIORITY := 7, WATCHDOG := T#40ms);
+        TASK TheLevel(LEVEL := go, PRIORITY := 5);
         PROGRAM Fast WITH TheFast : Fast;
+        PROGRAM Level WITH TheLevel : Level;
         PROGRAM Slow WITH TheSlow : Slow;
     END_RESOURCE
 END_CONFIGURATION
@@ -104,6 +133,63 @@ class TaskCalls:
         assert fast["dwMinCycleTime"] <= fast["dwAverageCycleTime"] <= fast["dwMaxCycleTime"]
         assert plc.read("load") <= 100
 
+    def test_status_words_and_counters_are_those_of_mk905(self, plc: Controller) -> None:
+        self.wait(plc, lambda: plc.read("status[0]") != 0)
+        self.run(plc)
+        assert plc.read("status[1]") == 0
+        assert plc.read("status[0]") & ~0b1111 == 0  # the tasks 1 and 2 only
+        cycles, overruns = plc.read("status[2]"), plc.read("status[3]")
+        assert 0 < cycles <= sum(task.cycles for task in plc.tasks())
+        assert overruns <= sum(task.overruns for task in plc.tasks())
+        info = plc.read("finfo")
+        assert (info["name"], info["period_us"]) == ("TheSlow", 50_000)
+        assert plc.read("mine", "missing") == {"mine": 1, "missing": 0}
+
+    def test_level_task_runs_as_long_as_its_variable_is_true(self, plc: Controller) -> None:
+        for expected in (5, 10):
+            plc.write({"go": True})
+            self.wait(plc, lambda: not plc.read("go"))
+            self.run(plc)
+            assert plc.read("Level.n") == expected
+
+    def fail(self, plc: Controller, **options: bool) -> None:
+        self.run(plc)
+        plc.write({**options, "trip": True})
+        self.wait(plc, lambda: plc.read("failures") > 0)
+
+    def test_program_goes_on_after_an_exception_that_its_function_takes(self, plc: Controller) -> None:
+        self.fail(plc, decides=True)
+        self.run(plc)
+        n = plc.read("Fast.n")
+        self.wait(plc, lambda: plc.read("Fast.n") > n + 1)
+        assert plc.read("caught", "caught_in", "failures") == {
+            "caught": lib.RTSEXCPT_DIVIDEBYZERO,
+            "caught_in": 1,
+            "failures": 1,
+        }
+        assert plc.status().exception is None
+        assert any("TheFast: division by zero; the program goes on" in entry.text for entry in plc.log())
+
+    def test_function_stops_the_task_that_failed_and_another_starts_it(self, plc: Controller) -> None:
+        self.fail(plc, decides=True, ends_task=True)
+        n = plc.read("Fast.n")
+        self.run(plc)
+        assert plc.read("Fast.n") == n
+        plc.write({"begins_task": True})
+        self.wait(plc, lambda: plc.read("Fast.n") > n)
+
+    def test_function_that_takes_no_exception_lets_the_program_stop(self, plc: Controller) -> None:
+        self.fail(plc)
+        self.wait(plc, lambda: str(plc.status().state) == "exception")
+        exception = plc.status().exception
+        assert exception is not None
+        assert (exception.name, exception.task) == ("DIVIDEBYZERO", "TheFast")
+
+    def test_task_that_fails_all_the_time_stops_the_program(self, plc: Controller) -> None:
+        self.fail(plc, decides=True, keeps_failing=True)
+        self.wait(plc, lambda: str(plc.status().state) == "exception")
+        assert plc.read("failures") == 10  # IEC_TASK_MAX_FAILURES
+
     def test_last_exception_outlives_a_reset(self, plc: Controller) -> None:
         assert plc.read("last") == 0
         plc.write({"trip": True})
@@ -120,6 +206,15 @@ class TaskWatchdogs(TaskCalls):
         self.run(plc)
         plc.write({"loops": self.LOOPS, **options, "long": True})
         self.wait(plc, lambda: not plc.read("long") or str(plc.status().state) == "exception")
+
+    def test_load_of_each_task_is_that_of_the_tool(self, plc: Controller) -> None:
+        plc.write({"loops": self.LOOPS // 100, "always": True})
+        self.wait(plc, lambda: (plc.tasks()[1].load_percent or 0) > 0)
+        self.run(plc)
+        assert plc.read("info[1].dwLoad") > 0
+        assert plc.read("load") > 0
+        plc.stop()
+        assert {task.load_percent for task in plc.tasks()} == {0}
 
     def test_cycle_without_its_watchdog_may_take_longer(self, plc: Controller) -> None:
         self.spend(plc, free=True)

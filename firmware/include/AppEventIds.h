@@ -38,6 +38,7 @@ enum {
     EVT_DenyStop = 0x10018,              /* of one that runs: also for a reset and a download */
     EVT_AllBootprojectsLoaded = 0x10019, /* of a start-up, also without a boot project; slot SLOT_NONE then */
     EVT_CmpApp_Exception = 0x8001C,
+    EVT_TaskException = 0x800C8, /* of a task that failed; only functions of the program are called, in the task */
 };
 
 enum { EVTPARAMID_CmpApp = 1 };

@@ -114,6 +114,8 @@ enum {
     CMPID_CmpLogKeep = 0x00AC,
     CMPID_IecSocket = 0x0073,
     CMPID_IecCom = 0x0074,
+    CMPID_CmpTaskLoad = 0x00C8,
+    CMPID_IecTaskHandler = 0x00C9,
 };
 
 /* Name of a component, "" when unknown. */

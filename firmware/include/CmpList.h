@@ -167,6 +167,9 @@ enum {
 #if HAS_IecTaskCalls
     CMP_ONE(IecTaskCalls)
 #endif
+#if HAS_IecTaskHandler
+    CMP_ONE(IecTaskHandler)
+#endif
 #if HAS_IoDrvCanopen
     CMP_ONE(IoDrvCanopen)
 #endif

@@ -30,6 +30,9 @@ X(CmpCan)
 #endif
 X(CmpScheduleTimer)
 X(CmpIecTask)
+#if HAS_CmpTaskLoad
+X(CmpTaskLoad)
+#endif
 #if HAS_SysWatchdog
 X(SysWatchdog)
 #endif
@@ -89,6 +92,9 @@ X(IecClock)
 #endif
 #if HAS_IecTaskCalls
 X(IecTaskCalls)
+#endif
+#if HAS_IecTaskHandler
+X(IecTaskHandler)
 #endif
 #if HAS_CmpTraceMgr
 X(CmpTraceMgr)

@@ -47,6 +47,10 @@ void SchedRequestEnd(void);
  * because too many waited. From main. */
 RTS_UI32 SchedGetOverruns(RTS_UI32 task);
 
+/* With SCHED_PROCESSOR_TIME: how long a task had the processor since it was started [ns]; 0 while it is stopped. From
+ * main. */
+RTS_I64 SchedGetUsedNs(RTS_UI32 task);
+
 /* One pass over the tasks that run in main; part of CH_COMM_CYCLE. */
 void SchedBackgroundCycle(void);
 /* Whether there are such tasks. */
@@ -60,6 +64,10 @@ bool SchedHasBackgroundTasks(void);
  * SCHED_PROCESSOR_TIME only for the time it had a processor.
  */
 void SchedWatchdogCheck(RTS_I64 now_ns);
+
+/* With TASK_LOAD on one core: SchedWatchdogCheck calls `sampler` in the end. There is one. From main. */
+typedef void (*SCHED_SAMPLER)(RTS_I64 now_ns);
+void SchedSetSampler(SCHED_SAMPLER sampler);
 
 RTS_RESULT CmpScheduleTimer_Hook(CMP_HOOK hook);
 

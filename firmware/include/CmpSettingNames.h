@@ -15,6 +15,8 @@ SETTING_CHOICE(BootStart, "CmpApp", "Bootproject.Start", "always|never|clean",
                "whether the program starts at power-up; clean: not after an exception or crash, until a user starts it")
 SETTING_NUMBER(Watchdog, "CmpIecTask", "Watchdog", 0, 0, 5000,
                "longest cycle of a task that has no watchdog [ms]; 0: as built, 5000 on plcrt and 2000 on boards")
+SETTING_NUMBER(MaxLoad, "CmpSchedule", "MaxProcessorLoad", 0, 0, 6400,
+               "what all tasks may take for two seconds [% of one processor], else the program stops; 0: no limit")
 SETTING_NUMBER(LogFilter, "CmpLog", "Logger.0.Filter", 0x1F, 0, 0x1F,
                "sum of what is logged: 1 info, 2 warnings, 4 errors, 16 debug; exceptions and kept entries always")
 SETTING_NUMBER(RetainSave, "CmpRetain", "SavePeriod", APP_RETAIN_SAVE_US / 1000, 100, 3600000,

@@ -252,7 +252,11 @@ enum {
 };
 
 /* Task information (own). */
-enum { TAG_TASK_INFO = 0x42, TAG_TASK_LATENESS = 0x43 };
+enum {
+    TAG_TASK_INFO = 0x42,
+    TAG_TASK_LATENESS = 0x43,
+    TAG_TASK_LOAD = 0x44, /* after the TAG_TASK_INFO of the task: u32 percent of one processor (CmpTaskLoad.h) */
+};
 
 /* Settings (4.11). */
 enum {

@@ -169,10 +169,11 @@ typedef struct {
 
 enum { CDL_TASK_NAME_SIZE = 32, CDL_PRIORITY_LOWEST = 31 };
 
-enum { KIND_CYCLIC = 0, KIND_EVENT = 1, KIND_EXTERNAL = 2, KIND_FREEWHEELING = 3 };
+/* A runtime refuses an image with a kind that it does not know: KIND_LEVEL is newer than the others. */
+enum { KIND_CYCLIC = 0, KIND_EVENT = 1, KIND_EXTERNAL = 2, KIND_FREEWHEELING = 3, KIND_LEVEL = 4 };
 
 /* A task. `kind` is KIND_*. A KIND_EVENT task runs when the byte at `event_offset` of `event_area`, without
- * the bits `event_ignored`, was 0 and is so no more; a KIND_EXTERNAL task on the external event whose
+ * the bits `event_ignored`, was 0 and is so no more, a KIND_LEVEL task as long as it is not 0; a KIND_EXTERNAL task on the external event whose
  * name has the CRC-32 `event_offset`. */
 typedef struct {
     RTS_UI32 interval_us; /* cyclic tasks */

@@ -143,6 +143,21 @@ void IecCycleResume(RTS_UI32 task);
 #endif
 #endif
 
+#if TASK_LOAD
+/* ---- for CmpTaskLoad ---- */
+
+/* How often tasks were started. From any context. */
+RTS_UI32 IecCycleGetStarts(void);
+/* Ends the program at the end of the next cycle of the task, because of its load. From any context. */
+void IecCycleBlame(RTS_UI32 task);
+
+/* Of a task that exists: its cycles, those that took longer than its interval, and how long all took together [ns]; each
+ * wraps. From any context. */
+RTS_UI32 IecCycleGetCycles(RTS_UI32 task);
+RTS_UI32 IecCycleGetLongCycles(RTS_UI32 task);
+RTS_UI32 IecCycleGetUsedNs(RTS_UI32 task);
+#endif
+
 #if IEC_TASK_CALLS
 /* ---- for IecTaskCalls ---- */
 
@@ -151,6 +166,26 @@ RTS_UI32 IecCycleGetWatchdog(RTS_UI32 task);
 /* Disables the watchdog of the task that calls it, or enables it again: only for this cycle, which may take as long as
  * one without watchdog. What was disabled does not count. False when there is no such task. */
 bool IecCycleLiftWatchdog(RTS_UI32 task, bool lift);
+#endif
+
+#if IEC_TASK_CALLS
+/* False: no cycle of the task begins until it is called with true, or the program gets its initial values again. Returns
+ * false when there is no such task. From any context. */
+bool IecCycleSetScheduled(RTS_UI32 task, bool on);
+bool IecCycleIsScheduled(RTS_UI32 task);
+#endif
+
+#if IEC_TASK_HANDLER
+/* ---- for IecTaskHandler ---- */
+
+/* Called in the context of a task that failed, before its exception ends the program. */
+typedef struct {
+    uintptr_t (*begin)(RTS_UI32 task, const IEC_CONTEXT *context, RTS_UI32 code); /* what to run; 0: nothing */
+    bool (*end)(RTS_UI32 task, RTS_UI32 code); /* after it returned: whether the program goes on */
+} IEC_CYCLE_HANDLER;
+
+/* There is one. From main, before tasks are started. */
+void IecCycleSetHandler(const IEC_CYCLE_HANDLER *handler);
 #endif
 
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the

@@ -9,6 +9,9 @@
 #include "CmpErrors.h"
 #include "CmpStd.h"
 
+/* Whether a task of this kind waits for a variable. */
+#define SCHED_WAITS_FOR_VARIABLE(kind) ((kind) == KIND_EVENT || (SCHED_LEVEL_EVENTS && (kind) == KIND_LEVEL))
+
 /* Looks at the variables of event tasks. From any context, when they may have changed: the cycle (IecCycle.c) calls it at the end
  * of each cycle; code that copies inputs calls it afterwards. */
 void SchedNoteEvents(void);

@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * A port offers at least APP_MAX_TASKS timers. On bare metal a timer is a timer interrupt at its own NVIC priority, on
- * Linux a SCHED_FIFO thread, in the simulator an entry of the virtual clock's queue.
+ * Linux a thread, in the simulator an entry of the virtual clock's queue.
  *
  * A timer is periodic and runs a cyclic task. With SCHED_EVENTS_IN_TIMERS (rts_config.h) there are also timers without
  * an interval, which call when they are triggered: they run the tasks that wait for an event.
@@ -51,5 +51,9 @@ RTS_RESULT SysTimerDelete(RTS_HANDLE timer);
 
 /* How many due times were skipped since the timer was created; 0 when there is no such timer. From main. */
 RTS_UI32 SysTimerGetOverruns(RTS_HANDLE timer);
+
+/* Processor time that the context of a timer has used since it was started [ns]; 0 while it is stopped. From main. Only of
+ * ports with SCHED_PROCESSOR_TIME. */
+RTS_I64 SysTimerGetUsedNs(RTS_HANDLE timer);
 
 #endif

@@ -204,6 +204,12 @@
 #define SCHED_FREEWHEELING_PAUSE_US 1000
 #endif
 
+/* 1: a task may run as long as a variable is TRUE (KIND_LEVEL). 0: no flash for it, and a program with such a task is
+ * refused. */
+#ifndef SCHED_LEVEL_EVENTS
+#define SCHED_LEVEL_EVENTS 0
+#endif
+
 /* Events of a task that may wait while it runs, or cannot run; further ones are lost, and counted as its overruns. After
  * a delay the task runs so often in a row. Takes no RAM. */
 #ifndef SCHED_MAX_WAITING_EVENTS
@@ -387,6 +393,25 @@
  * refused. */
 #ifndef IEC_TASK_CALLS
 #define IEC_TASK_CALLS 0
+#endif
+
+/* 1: the load of each task, its limit and the status of cyclic tasks (CmpTaskLoad.h); 28 bytes of RAM for each task, and on
+ * one core 4 more, and some 100 clocks of the processor for each cycle. It needs HAS_CmpTaskLoad in cmp_list.c. 0: no flash
+ * for it; tools show no load. */
+#ifndef TASK_LOAD
+#define TASK_LOAD 0
+#endif
+
+/* 1: a function of the program decides what follows an exception of a task (IecTaskHandler.h). It needs IEC_TASK_CALLS,
+ * HAS_IecTaskHandler in cmp_list.c, and one of EVENT_MAX_CALLBACKS. 0: no flash for it, and a program that has one is
+ * refused. */
+#ifndef IEC_TASK_HANDLER
+#define IEC_TASK_HANDLER 0
+#endif
+
+/* A task whose cycles fail so often in a row ends the program, whatever its function answers: the device stays reachable. */
+#ifndef IEC_TASK_MAX_FAILURES
+#define IEC_TASK_MAX_FAILURES 10
 #endif
 
 /* Bytes for what is traced (CmpTraceMgr.h): each packet takes some 150, 28 for each record, and its samples. 0: none, and

@@ -61,7 +61,9 @@ def alarms(plc: Controller, *, all: bool = False) -> Document:
 
 def tasks(plc: Controller) -> Document:
     """Statistics of the tasks."""
-    return {"tasks": [vars(task) for task in plc.tasks()]}
+    found = plc.tasks()
+    loads = [task.load_percent for task in found if task.load_percent is not None]
+    return {"tasks": [vars(task) for task in found], "load_percent": sum(loads) if loads else None}
 
 
 LOG_CLASSES = ("debug", "info", "warning", "error", "exception")

@@ -355,7 +355,7 @@ class Simulator(Controller):
             infos.append(
                 TaskInfo(
                     name, c.kind, c.priority, c.interval_us, c.cycles, c.last_us, c.avg_us, c.min_us, c.max_us,
-                    c.jitter_us, c.overruns,
+                    c.jitter_us, c.overruns, self._lib.TaskLoadGet(index),
                 )
             )  # fmt: skip
         return infos

@@ -525,6 +525,11 @@ RTS_RESULT IecCycleGetLateness(RTS_UI32 task, RTS_UI32 number, IEC_LATENESS_COUN
 }
 #endif
 
+RTS_UI32 TaskLoadGet(RTS_UI32 task)
+{
+    return fakes.task_load + task;
+}
+
 RTS_UI32 IecTaskGetLoad(void)
 {
     return fakes.task_load;

@@ -547,8 +547,8 @@ static void a_task_without_a_good_name(void)
 static void a_task_with_wrong_values(void)
 {
     begin();
-    spec.tasks[0].kind = 4;
-    check_spec_refused(ERR_NOT_SUPPORTED, "Task Main has the unknown kind 4");
+    spec.tasks[0].kind = KIND_LEVEL + 1;
+    check_spec_refused(ERR_NOT_SUPPORTED, "Task Main has the unknown kind 5");
     spec.tasks[0].kind = KIND_CYCLIC;
     spec.tasks[0].priority = 32;
     check_spec_refused(ERR_OUT_OF_LIMITS, "Task Main has priority 32");

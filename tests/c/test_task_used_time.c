@@ -71,6 +71,11 @@ RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 int
     return callback != NULL && interval_us + priority < 0xFFFFFFFF ? ERR_OK : ERR_PARAMETER;
 }
 
+RTS_I64 SysTimerGetUsedNs(RTS_HANDLE timer)
+{
+    return timer;
+}
+
 RTS_RESULT SysTimerStart(RTS_HANDLE timer)
 {
     RTS_UNUSED(timer);

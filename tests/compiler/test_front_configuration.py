@@ -188,7 +188,7 @@ def test_globals_of_a_configuration_are_known_everywhere() -> None:
         ),
         (
             "TASK t(SPEED := 5);",
-            "2:8: a TASK has INTERVAL, PRIORITY, SINGLE, EVENT, WATCHDOG and SENSITIVITY, not SPEED",
+            "2:8: a TASK has INTERVAL, PRIORITY, SINGLE, LEVEL, EVENT, WATCHDOG and SENSITIVITY, not SPEED",
         ),
         ("TASK t(WATCHDOG := 5);", "2:20: WATCHDOG is a duration such as T#10ms, not integer constant"),
         ("TASK t(WATCHDOG := T#2h);", "2:20: WATCHDOG must be between 0 and 35 minutes"),

@@ -353,7 +353,7 @@ def configured(*lines: str) -> list[str]:
 
 def test_a_task_without_time_and_event() -> None:
     assert configured("TASK t(PRIORITY := 1);", "PROGRAM a WITH t : A;") == [
-        "the task t has no INTERVAL, SINGLE or EVENT, so it runs whenever there is time; "
+        "the task t has no INTERVAL, SINGLE, LEVEL or EVENT, so it runs whenever there is time; "
         "write INTERVAL := T#10ms, or T#0s if that is meant"
     ]
     assert not configured("TASK t(INTERVAL := T#0s);", "PROGRAM a WITH t : A;")

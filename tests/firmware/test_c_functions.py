@@ -25,6 +25,7 @@ COMPONENTS = {
     "IecClock.functions": "IecClock",
     "IecLog.functions": "IecLog",
     "IecTaskCalls.functions": "IecTaskCalls",
+    "IecTaskHandler.functions": "IecTaskHandler",
     "CmpOperationControl.functions": "CmpOperationControl",
     "CmpRetain.externals": "CmpRetain",
     "ModbusCalls.functions": "IoDrvModbus",

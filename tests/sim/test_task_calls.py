@@ -36,4 +36,4 @@ class TestSimulator(TaskCalls):
     def wait(self, plc: Controller, condition: Callable[[], Any]) -> None:
         assert isinstance(plc, Simulator)
         while not condition():
-            plc.run_cycles(1, check=False)
+            plc.run_for(10, check=False)

@@ -1,5 +1,5 @@
 /*
- * SysTimer.c - timers of the Linux port: one SCHED_FIFO thread each.
+ * SysTimer.c - timers of the Linux port: one thread each, SCHED_RR: those of one priority take turns.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -48,7 +48,7 @@ typedef struct {
 static struct {
     TIMER timer[MAX_TIMERS];
     char *stacks;
-    bool realtime; /* false after the system has refused SCHED_FIFO */
+    bool realtime; /* false after the system has refused SCHED_RR */
 } state;
 
 /* ---- in the thread ---- */
@@ -106,7 +106,7 @@ static void *run(void *param)
     RTS_I64 due_ns;
     RTS_EXCEPTION none;
     (void)SysExceptTry(do_nothing, NULL, &none); /* takes what catching needs now, not in the first cycle */
-    prctl(PR_SET_TIMERSLACK, 1UL);               /* matters without SCHED_FIFO only: else 50 us late */
+    prctl(PR_SET_TIMERSLACK, 1UL);               /* matters without SCHED_RR only: else 50 us late */
     while (wait_until_due(timer, &due_ns)) {
         timer->callback(timer->param, due_ns);
         if (timer->interval_ns != 0) {
@@ -135,7 +135,7 @@ static int create_thread(TIMER *timer, bool realtime)
                           PORT_STACK_SIZE);
     if (realtime) {
         pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-        pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
+        pthread_attr_setschedpolicy(&attributes, SCHED_RR);
         pthread_attr_setschedparam(&attributes, &parameters);
     }
     pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -252,6 +252,18 @@ RTS_UI32 SysTimerGetOverruns(RTS_HANDLE handle)
 {
     const TIMER *timer = get_timer(handle);
     return timer != NULL ? SysAtomicLoad(&timer->overruns) : 0;
+}
+
+RTS_I64 SysTimerGetUsedNs(RTS_HANDLE handle)
+{
+    const TIMER *timer = get_timer(handle);
+    clockid_t clock;
+    struct timespec used;
+    if (timer == NULL || !timer->started || pthread_getcpuclockid(timer->thread, &clock) != 0 ||
+        clock_gettime(clock, &used) != 0) {
+        return 0;
+    }
+    return (RTS_I64)used.tv_sec * 1000000000 + used.tv_nsec;
 }
 
 /* ---- the component ---- */

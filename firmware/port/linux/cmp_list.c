@@ -33,6 +33,8 @@
 #define HAS_IecCan 1
 #define HAS_IecClock 1
 #define HAS_IecTaskCalls 1
+#define HAS_CmpTaskLoad 1
+#define HAS_IecTaskHandler 1
 #define HAS_CmpTraceMgr 1
 #define HAS_CmpAppBP 1
 #define HAS_CmpIoMgrSrv 1

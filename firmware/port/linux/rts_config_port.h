@@ -46,6 +46,9 @@
 #define IEC_COMS 8
 #define APP_POWER_FAIL 1
 #define IEC_TASK_CALLS 1
+#define TASK_LOAD 1
+#define SCHED_LEVEL_EVENTS 1
+#define IEC_TASK_HANDLER 1
 #define TRACE_BUFFER (4 * 1024 * 1024)
 #define BP_MAX 128
 #define IEC_LATENESS 1

@@ -23,6 +23,8 @@
 #define HAS_IecCom 1
 #define HAS_IecClock 1
 #define HAS_IecTaskCalls 1
+#define HAS_CmpTaskLoad 1
+#define HAS_IecTaskHandler 1
 #define HAS_CmpTraceMgr 1
 #define HAS_CmpAppBP (BP_MAX > 0)
 #define HAS_CmpIoMgrSrv 1

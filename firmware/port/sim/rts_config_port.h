@@ -46,6 +46,9 @@
 #define APP_POWER_FAIL 1
 #define APP_RETAIN_SRAM 1
 #define IEC_TASK_CALLS 1
+#define TASK_LOAD 1
+#define SCHED_LEVEL_EVENTS 1
+#define IEC_TASK_HANDLER 1
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */
 #define TRACE_BUFFER (1024 * 1024)
 #endif

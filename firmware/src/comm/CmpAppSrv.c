@@ -11,6 +11,7 @@
 #include "CmpBytes.h"
 #include "CmpForce.h"
 #include "CmpIecTask.h"
+#include "CmpTaskLoad.h"
 #include "CmpOperationControl.h"
 #include "CmpPackets.h"
 #include "CmpSrv.h"
@@ -371,14 +372,25 @@ static void write_task(BTAG_WRITER *reply, const IEC_TASK_INFO *info)
     BTagClose(reply);
 }
 
+#if TASK_LOAD
+static void write_load(BTAG_WRITER *reply, RTS_UI32 task)
+{
+    BTagWrite32(reply, TAG_TASK_LOAD, TaskLoadGet(task));
+}
+#else
+#define write_load(reply, task) ((void)0)
+#endif
+
 static RTS_RESULT read_task_info(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     IEC_TASK_INFO info;
 
     RTS_UNUSED(request);
     for (RTS_UI32 i = 0; i < IecTaskGetCount(); i++)
-        if (IecTaskGetInfo(i, &info) == ERR_OK)
+        if (IecTaskGetInfo(i, &info) == ERR_OK) {
             write_task(reply, &info);
+            write_load(reply, i);
+        }
     return ERR_OK;
 }
 #endif

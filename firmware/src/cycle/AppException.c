@@ -38,6 +38,9 @@ const char *AppExceptionName(RTS_UI32 code)
         {RTSEXCPT_MISALIGNMENT, "misaligned access"},
         {RTSEXCPT_OVERFLOW, "overflow"},
         {RTSEXCPT_FPU_ERROR, "floating point error"},
+#if TASK_LOAD
+        {RTSEXCPT_PROCESSORLOAD_WATCHDOG, "processor load above MaxProcessorLoad"},
+#endif
     };
     RTS_SIZE i;
 

@@ -7,6 +7,7 @@
 
 #include "CmpScheduleTimer.h"
 #include "IecCycle.h"
+#include "SchedEvents.h"
 #include "SysExcept.h"
 #include "SysTime.h"
 #include "TaskTrigger.h"
@@ -110,7 +111,7 @@ static void run_each_once(RTS_UI32 priority, bool by_event)
 
     for (i = 0; i < IecTaskGetCount(); i++) {
         const CDL_TASK *task = TriggerGetTask(i);
-        bool waits = task->kind == KIND_EVENT || task->kind == KIND_EXTERNAL;
+        bool waits = SCHED_WAITS_FOR_VARIABLE(task->kind) || task->kind == KIND_EXTERNAL;
         if (task->priority == priority && waits == by_event && (!waits || TriggerTake(i)))
             (void)IecTaskCycle(i, SysTimeGetNs());
     }

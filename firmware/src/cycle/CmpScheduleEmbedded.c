@@ -146,6 +146,15 @@ void SchedRequestEnd(void)
 {
 }
 
+#if TASK_LOAD && RTS_ONE_CORE
+static SCHED_SAMPLER sampler;
+
+void SchedSetSampler(SCHED_SAMPLER of)
+{
+    sampler = of;
+}
+#endif
+
 /* One cycle runs at a time, or none. */
 void SchedWatchdogCheck(RTS_I64 now_ns)
 {
@@ -156,6 +165,10 @@ void SchedWatchdogCheck(RTS_I64 now_ns)
         if (IecTaskReadGuard(i, &guard) && now_ns - guard.start_ns > guard.limit_ns)
             SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
     }
+#if TASK_LOAD && RTS_ONE_CORE
+    if (sampler != NULL)
+        sampler(now_ns);
+#endif
 }
 
 RTS_RESULT CmpScheduleTimer_Hook(CMP_HOOK hook)

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "IecCycle.h"
+#include "SettingValues.h"
 #include "SysAtomic.h"
 #include "SysExcept.h"
 #include "SysTime.h"
@@ -50,22 +51,46 @@ static void run_events(void *param, RTS_I64 due_ns)
         ;
 }
 
-/* Manual 3.5: after its cycle it leaves the processor to others. */
+/* Manual 3.5: after its cycle a freewheeling task leaves the processor to others, a fifth of the time that it took, or as
+ * long as keeps it below MaxProcessorLoad. */
+static RTS_I64 pause_after(RTS_I64 cycle_ns)
+{
+    enum { PAUSE_DIVISOR = 5, WHOLE = 100 /* percent */ };
+    const RTS_I64 shortest_ns = (RTS_I64)SCHED_FREEWHEELING_PAUSE_US * NS_PER_US;
+    RTS_I64 pause_ns = cycle_ns / PAUSE_DIVISOR;
+
+#if TASK_LOAD && SETTINGS
+    if (SETTING(MaxLoad) > 0 && SETTING(MaxLoad) < WHOLE)
+        pause_ns = cycle_ns * (WHOLE - SETTING(MaxLoad)) / SETTING(MaxLoad);
+#endif
+    return pause_ns > shortest_ns ? pause_ns : shortest_ns;
+}
+
 static void run_freewheeling(void *param, RTS_I64 due_ns)
 {
-    enum { PAUSE_DIVISOR = 5 };
-    const RTS_I64 shortest_ns = (RTS_I64)SCHED_FREEWHEELING_PAUSE_US * NS_PER_US;
     RTS_UI32 task = (RTS_UI32)(uintptr_t)param;
     RTS_I64 start_ns = SysTimeGetNs();
     RTS_I64 end_ns;
-    RTS_I64 pause_ns;
 
     RTS_UNUSED(due_ns);
     if (!IecTaskCycle(task, start_ns))
         return;
     end_ns = SysTimeGetNs();
-    pause_ns = (end_ns - start_ns) / PAUSE_DIVISOR;
-    SysTimerTrigger(schedule.timer[task], end_ns + (pause_ns > shortest_ns ? pause_ns : shortest_ns));
+    SysTimerTrigger(schedule.timer[task], end_ns + pause_after(end_ns - start_ns));
+}
+
+#if SCHED_PROCESSOR_TIME
+RTS_I64 SchedGetUsedNs(RTS_UI32 task)
+{
+    return SysTimerGetUsedNs(schedule.timer[task]);
+}
+#endif
+
+/* As long as its variable is TRUE; what wakes it is that it rises. */
+static void run_level(void *param, RTS_I64 due_ns)
+{
+    if (TriggerTake((RTS_UI32)(uintptr_t)param))
+        run_freewheeling(param, due_ns);
 }
 
 /* What the timer of a task calls; NULL when it runs in main. */
@@ -75,6 +100,8 @@ static SYS_TIMER_CALLBACK callback_of(RTS_UI32 kind)
         return run_cyclic;
     if (kind == KIND_FREEWHEELING)
         return SCHED_FREEWHEELING_IN_TIMERS ? run_freewheeling : NULL;
+    if (SCHED_LEVEL_EVENTS && kind == KIND_LEVEL)
+        return SCHED_FREEWHEELING_IN_TIMERS && SCHED_EVENTS_IN_TIMERS ? run_level : NULL;
     return SCHED_EVENTS_IN_TIMERS ? run_events : NULL;
 }
 
@@ -367,12 +394,25 @@ static void check_each(RTS_I64 now_ns)
     }
 }
 
+#if TASK_LOAD && RTS_ONE_CORE
+static SCHED_SAMPLER sampler;
+
+void SchedSetSampler(SCHED_SAMPLER of)
+{
+    sampler = of;
+}
+#endif
+
 void SchedWatchdogCheck(RTS_I64 now_ns)
 {
     if (!RTS_ONE_CORE)
         check_each(now_ns);
     if (!SCHED_PROCESSOR_TIME)
         check_time(now_ns);
+#if TASK_LOAD && RTS_ONE_CORE
+    if (sampler != NULL)
+        sampler(now_ns);
+#endif
 }
 
 RTS_RESULT CmpScheduleTimer_Hook(CMP_HOOK hook)

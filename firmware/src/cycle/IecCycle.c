@@ -20,6 +20,7 @@
 #include "SysDebug.h"
 #include "SysLock.h"
 #include "SysTime.h"
+#include "TaskTime.h"
 #include "rts_config.h"
 
 /* IEC code that may be running. `phase` is odd while it does, and the other fields do not change then. */
@@ -61,6 +62,16 @@ typedef struct {
 #if IEC_TASK_CALLS
     RTS_I64 lifted_ns; /* when its watchdog was lifted */
 #endif
+#if IEC_TASK_CALLS
+    RTS_UI32 is_off; /* no cycle begins */
+#endif
+#if IEC_TASK_HANDLER
+    RTS_UI32 failures; /* cycles in a row that ended with an exception */
+    uintptr_t handler; /* what runs after it */
+#endif
+#if TASK_LOAD
+    RTS_UI32 long_cycles; /* longer than the interval */
+#endif
 #if IEC_LATENESS
     RTS_UI32 late[IEC_LATENESS_CLASSES];
 #endif
@@ -75,6 +86,10 @@ static struct {
     RTS_UI32 not_held; /* the one task, while the others are held */
 #endif
     RTS_UI32 count;
+#if TASK_LOAD
+    RTS_UI32 starts;
+    RTS_UI32 blamed; /* the task that ends because of the load, from 1; 0: none */
+#endif
     bool time_started;
     RTS_I64 time_zero; /* SysTimeGetNs at which the time of the application is 0 */
     GUARD init_guard;
@@ -269,6 +284,10 @@ static RTS_INLINE void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
     if (late > task->jitter_ns)
         task->jitter_ns = late;
     count_lateness(task, late);
+#if TASK_LOAD
+    if (elapsed_ns > (RTS_I64)task->record->interval_us * NS_PER_US)
+        task->long_cycles++;
+#endif
     SysAtomicStore(&task->cycles, cycles + 1);
 }
 
@@ -296,10 +315,51 @@ static RTS_INLINE bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
     return task->exceeded >= task->sensitivity || elapsed_ns > task->guard.limit_ns;
 }
 
+#if IEC_TASK_HANDLER
+static const IEC_CYCLE_HANDLER *exception_handler;
+
+void IecCycleSetHandler(const IEC_CYCLE_HANDLER *handler)
+{
+    exception_handler = handler;
+}
+
+static void run_handler(void *arg)
+{
+    TASK *task = arg;
+
+    APP_CALL_ENTRY((IEC_ENTRY)(task->handler | APP_ENTRY_MODE_BIT), &task->context);
+}
+
+/* One that fails itself, or does not end, decides nothing. */
+static bool goes_on_after(TASK *task, RTS_UI32 code)
+{
+    RTS_EXCEPTION exception;
+
+    if (exception_handler == NULL || !SysAtomicLoad(&tasks.running) || code == RTSEXCPT_STOP_TIMEOUT ||
+        code == RTSEXCPT_PROCESSORLOAD_WATCHDOG || task->failures >= IEC_TASK_MAX_FAILURES)
+        return false;
+    task->failures++;
+    task->handler = exception_handler->begin(index_of(task), &task->context, code);
+    if (task->handler == 0)
+        return false;
+    guard_end(&task->guard);
+    guard_begin(&task->guard, SysTimeGetNs());
+    return SysExceptTry(run_handler, task, &exception) && exception_handler->end(index_of(task), code) &&
+           SysAtomicLoad(&tasks.running);
+}
+#endif
+
 /* No other cycle starts, which is settled before the guard says that this one is over. Main completes the stop of the
  * application. */
 static bool end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
+#if IEC_TASK_HANDLER
+    if (goes_on_after(task, code)) {
+        task->exceeded = 0;
+        guard_end(&task->guard);
+        return true;
+    }
+#endif
     SysAtomicStore(&tasks.running, TASKS_STOP);
 #if BP_MAX > 0
     SysDebugWake(&tasks.running);
@@ -360,6 +420,13 @@ static RTS_INLINE bool finish_cycle(TASK *task, RTS_I64 start_ns, RTS_I64 due_ns
     account(task, start_ns - due_ns, elapsed_ns);
     if (watchdog_expired(task, SCHED_PROCESSOR_TIME ? used_ns(task) - used_before_ns : elapsed_ns))
         return end_with_exception(task, RTSEXCPT_WATCHDOG, 0);
+#if TASK_LOAD
+    if (SysAtomicLoad(&tasks.blamed) == index_of(task) + 1)
+        return end_with_exception(task, RTSEXCPT_PROCESSORLOAD_WATCHDOG, 0);
+#endif
+#if IEC_TASK_HANDLER
+    task->failures = 0;
+#endif
     guard_end(&task->guard);
     SchedNoteEvents();
     return true;
@@ -563,16 +630,36 @@ void IecCycleResume(RTS_UI32 index)
 RTS_STATIC_ASSERT(BP_MAX > 0, set_BP_MAX_or_no_ONLINE_CHANGE_where_tasks_run_beside_main);
 #endif
 
-bool IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
+static RTS_INLINE bool cycle_of(RTS_UI32 index, RTS_I64 due_ns)
 {
     TASK *task = &tasks.list[index];
 
+#if IEC_TASK_CALLS
+    if (SysAtomicLoad(&task->is_off))
+        return true;
+#endif
     if (!RTS_ONE_CORE && APP_RETAIN_SIZE > 0 && is_wanted())
         make_moment(task);
     if (BP_MAX > 0)
         return SysAtomicLoad(&tasks.running) == TASKS_RUN ? run_cycle(task, due_ns) : run_if_not_stopped(task, due_ns);
     return SysAtomicLoad(&tasks.running) ? run_cycle(task, due_ns) : false;
 }
+
+#if TASK_LOAD && RTS_ONE_CORE
+bool IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
+{
+    RTS_UI32 before = TaskTimeSwitch(index);
+    bool runs_again = cycle_of(index, due_ns);
+
+    (void)TaskTimeSwitch(before);
+    return runs_again;
+}
+#else
+bool IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
+{
+    return cycle_of(index, due_ns);
+}
+#endif
 
 /* ---- an online change ---- */
 
@@ -750,6 +837,10 @@ void IecCycleStart(void)
     if (!tasks.time_started)
         tasks.time_zero = SysTimeGetNs();
     tasks.time_started = true;
+#if TASK_LOAD
+    SysAtomicStore(&tasks.blamed, 0);
+    SysAtomicStore(&tasks.starts, tasks.starts + 1);
+#endif
     SysAtomicStore(&tasks.running, TASKS_RUN);
 }
 
@@ -783,6 +874,9 @@ void IecCycleForget(void)
     if (!RTS_ONE_CORE)
         CMP_CLEAR(moment);
     CyclePhasesForget();
+#if TASK_LOAD && RTS_ONE_CORE
+    TaskTimeForget();
+#endif
     tasks.init_guard.limit_ns = (RTS_I64)APP_INIT_WATCHDOG_US * NS_PER_US;
 }
 
@@ -825,6 +919,33 @@ RTS_UI32 IecTaskGetLoad(void)
         busy_ns += read_sum_ns(&tasks.list[i], &cycles);
     return time_ns < 100 ? 0 : (RTS_UI32)(busy_ns / ((RTS_UI64)time_ns / 100));
 }
+
+#if TASK_LOAD
+RTS_UI32 IecCycleGetStarts(void)
+{
+    return SysAtomicLoad(&tasks.starts);
+}
+
+void IecCycleBlame(RTS_UI32 index)
+{
+    SysAtomicStore(&tasks.blamed, index + 1);
+}
+
+RTS_UI32 IecCycleGetCycles(RTS_UI32 index)
+{
+    return SysAtomicLoad(&tasks.list[index].cycles);
+}
+
+RTS_UI32 IecCycleGetLongCycles(RTS_UI32 index)
+{
+    return tasks.list[index].long_cycles;
+}
+
+RTS_UI32 IecCycleGetUsedNs(RTS_UI32 index)
+{
+    return (RTS_UI32)tasks.list[index].sum_ns;
+}
+#endif
 
 RTS_RESULT IecCycleGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)
 {
@@ -882,6 +1003,20 @@ bool IecCycleLiftWatchdog(RTS_UI32 index, bool lift)
         SysAtomicStore(&guard->is_lifted, false);
     }
     return true;
+}
+#endif
+
+#if IEC_TASK_CALLS
+bool IecCycleSetScheduled(RTS_UI32 index, bool on)
+{
+    if (index < tasks.count)
+        SysAtomicStore(&tasks.list[index].is_off, !on);
+    return index < tasks.count;
+}
+
+bool IecCycleIsScheduled(RTS_UI32 index)
+{
+    return !SysAtomicLoad(&tasks.list[index].is_off);
 }
 #endif
 

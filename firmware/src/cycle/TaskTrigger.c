@@ -79,7 +79,7 @@ static RTS_NOINLINE void note_all(void)
     RTS_UI32 i;
 
     for (i = 0; i < triggers.watched; i++) {
-        if (triggers.tasks[i].kind == KIND_EVENT)
+        if (SCHED_WAITS_FOR_VARIABLE(triggers.tasks[i].kind))
             note(i);
     }
 }
@@ -97,12 +97,26 @@ static RTS_UI32 count_events(const TRIGGER *trigger)
     return (SysAtomicLoad(&trigger->changes) + 1) / 2;
 }
 
+bool TriggerIsLevel(RTS_UI32 task)
+{
+    return SCHED_LEVEL_EVENTS && triggers.tasks[task].kind == KIND_LEVEL;
+}
+
+/* What it finds counts as noted, so the next rise wakes the task. */
+static bool take_level(RTS_UI32 task)
+{
+    note(task);
+    return (SysAtomicLoad(&triggers.list[task].changes) & 1) != 0;
+}
+
 bool TriggerTake(RTS_UI32 task)
 {
     TRIGGER *trigger = &triggers.list[task];
     RTS_UI32 waiting = (RTS_UI16)(count_events(trigger) - trigger->answered);
     RTS_UI32 lost = waiting > SCHED_MAX_WAITING_EVENTS ? waiting - SCHED_MAX_WAITING_EVENTS : 0;
 
+    if (TriggerIsLevel(task))
+        return take_level(task);
     if (waiting == 0)
         return false;
     trigger->answered = (RTS_UI16)(trigger->answered + 1 + lost);
@@ -139,9 +153,9 @@ static RTS_INLINE void forget(RTS_UI32 task)
 {
     RTS_UI32 changes = 0;
 
-    if (triggers.tasks[task].kind == KIND_EVENT) {
+    if (SCHED_WAITS_FOR_VARIABLE(triggers.tasks[task].kind)) {
         triggers.watched = task + 1;
-        changes = is_true(&triggers.tasks[task]);
+        changes = TriggerIsLevel(task) ? 0 : is_true(&triggers.tasks[task]);
     }
     SysAtomicStore(&triggers.list[task].changes, changes);
     triggers.list[task].answered = (RTS_UI16)changes; /* as many rises */
@@ -166,7 +180,7 @@ void TriggerChange(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI32 kept)
         if ((kept >> i & 1) == 0) {
             triggers.list[i].lost = 0;
             forget(i);
-        } else if (tasks[i].kind == KIND_EVENT) {
+        } else if (SCHED_WAITS_FOR_VARIABLE(tasks[i].kind)) {
             triggers.watched = i + 1;
         }
     }

@@ -24,11 +24,14 @@ void TriggerChange(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI32 kept);
 
 const CDL_TASK *TriggerGetTask(RTS_UI32 task);
 
-/* Events that happened before the start do not count, nor does a BOOL that is TRUE already. From main, while no task
+/* Whether a task runs as long as its variable is TRUE. */
+bool TriggerIsLevel(RTS_UI32 task);
+
+/* Events that happened before the start do not count, nor does a BOOL that is TRUE already, but for a level. From main, while no task
  * runs. */
 void TriggerForget(void);
 
-/* Takes one of the events that wait for a task; false when none does. From where the task runs. */
+/* Takes one of the events that wait for a task; false when none does. Of a level: whether the variable is TRUE. From where the task runs. */
 bool TriggerTake(RTS_UI32 task);
 
 /* Events that were lost since TriggerCreate, because SCHED_MAX_WAITING_EVENTS waited already. */

@@ -42,7 +42,7 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
 
     if (name[0] == '\0' || memchr(name, '\0', sizeof task->name) == NULL)
         return refuse(l, ERR_PARAMETER, "Task %u has no name.", U(l->image->task_count));
-    if (task->kind > KIND_FREEWHEELING)
+    if (task->kind > (SCHED_LEVEL_EVENTS ? KIND_LEVEL : KIND_FREEWHEELING))
         return refuse(l, ERR_NOT_SUPPORTED, "Task %s has the unknown kind %u.", name, U(task->kind));
     if (task->priority > CDL_PRIORITY_LOWEST)
         return refuse(l, ERR_OUT_OF_LIMITS, "Task %s has priority %u, above 31.", name, U(task->priority));
@@ -50,7 +50,7 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
         return refuse(l, ERR_PARAMETER, "Cyclic task %s has no interval.", name);
     if (task->entry_offset >= l->image->code.size)
         return refuse(l, ERR_INVALID_REFERENCE, "Task %s is outside the code.", name);
-    if (task->kind == KIND_EVENT &&
+    if (SCHED_WAITS_FOR_VARIABLE(task->kind) &&
         (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
         return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s is outside its area.", name);
     /* A driver may post the event: it is known when the driver has its configuration. */

@@ -67,7 +67,10 @@ _FUNCTIONS = {
     "IecTaskCalls": """
         task_value(UDINT,UDINT):UDINT                      224   240
         task_name(UDINT,UDINT):LWORD                       192   192
-        task_watchdog(UDINT,BOOL):BOOL                      64    64""",
+        task_watchdog(UDINT,BOOL):BOOL                      64    64
+        task_schedule(UDINT,BOOL):BOOL                      64    64""",
+    "IecTaskHandler": """
+        task_answer(UDINT,BOOL):BOOL                        64    64""",
     "CmpMath": """
         sin(LREAL):LREAL                                  1008  1856
         cos(LREAL):LREAL                                  1008  1856

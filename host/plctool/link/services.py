@@ -7,7 +7,7 @@ Every function takes a `Session`; requests that were lost with their channel are
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
 
@@ -118,6 +118,8 @@ class TaskInfo:
     max_us: int
     jitter_us: int
     overruns: int
+    load_percent: int | None = None
+    """Of one processor, in the last half second; None if the device does not know it."""
 
 
 @dataclass(frozen=True)
@@ -373,6 +375,8 @@ def read_tasks(session: Session) -> list[TaskInfo]:
         if tag == lib.TAG_TASK_INFO and isinstance(content, bytes) and len(content) >= _TASK.size:
             name = content[_TASK.size :].split(b"\0", 1)[0].decode(errors="replace")
             tasks.append(TaskInfo(name, *_TASK.unpack(content)))
+        elif tag == lib.TAG_TASK_LOAD and isinstance(content, bytes) and len(content) == 4 and tasks:
+            tasks[-1] = replace(tasks[-1], load_percent=int.from_bytes(content, "little"))
     return tasks
 
 

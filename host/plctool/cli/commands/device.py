@@ -173,9 +173,12 @@ def _tasks(args: argparse.Namespace) -> int:
 
 
 def tasks_text(document: dict[str, Any]) -> str:
-    """A line for each task."""
-    columns = ("name", "cycles", "last_us", "avg_us", "min_us", "max_us", "jitter_us", "overruns")
-    return table(document["tasks"], columns)
+    """A line for each task, and the load of all."""
+    columns = ["name", "cycles", "last_us", "avg_us", "min_us", "max_us", "jitter_us", "overruns"]
+    load = document["load_percent"]
+    if load is None:
+        return table(document["tasks"], columns)
+    return f"{table(document['tasks'], [*columns, 'load_percent'])}\nload of all tasks: {load} %"
 
 
 def _log(args: argparse.Namespace) -> int:

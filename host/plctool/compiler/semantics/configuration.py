@@ -51,7 +51,7 @@ def background(name: str) -> Task:
 
 
 def read_task(world: World, decl: ast.TaskDecl, scope: Scope) -> Task:
-    """The task that is declared; without INTERVAL, SINGLE and EVENT it runs when there is time."""
+    """The task that is declared; without INTERVAL, SINGLE, LEVEL and EVENT it runs when there is time."""
     return _Reader(world, decl, scope).task
 
 
@@ -140,11 +140,17 @@ class _Reader:
             self._checker.error(node.pos, "range", f"SENSITIVITY is 1 to {MAX_SENSITIVITY}, not {number}")
 
     def _single(self, node: ast.Expr) -> None:
+        self._variable(node, "SINGLE", TaskKind.EVENT)
+
+    def _level(self, node: ast.Expr) -> None:
+        self._variable(node, "LEVEL", TaskKind.LEVEL)
+
+    def _variable(self, node: ast.Expr, name: str, kind: TaskKind) -> None:
         e = self._checker.expr(node)
         event = _event_at(e.place) if e.type is BOOL and isinstance(e, Load) else None
         if event is None and e.type is not ERROR:
-            self._checker.error(node.pos, "type", "SINGLE is a global BOOL variable or a bit such as %IX0.3")
-        elif event is not None and self._run_by("SINGLE", TaskKind.EVENT, node):
+            self._checker.error(node.pos, "type", f"{name} is a global BOOL variable or a bit such as %IX0.3")
+        elif event is not None and self._run_by(name, kind, node):
             self.task.event = event
 
     def _event(self, node: ast.Expr) -> None:
@@ -168,6 +174,7 @@ class _Reader:
         "INTERVAL": _interval,
         "PRIORITY": _priority,
         "SINGLE": _single,
+        "LEVEL": _level,
         "EVENT": _event,
         "WATCHDOG": _watchdog,
         "SENSITIVITY": _sensitivity,
@@ -281,8 +288,10 @@ class _Builder:
     ) -> None:
         """Warns of what was probably forgotten."""
         for task, written in zip(tasks, decl.tasks, strict=False):
-            if not any(name.upper() in ("INTERVAL", "SINGLE", "EVENT") for _, name, _ in written.properties):
-                message = f"the task {task.name} has no INTERVAL, SINGLE or EVENT, so it runs whenever there is time"
+            if not any(name.upper() in ("INTERVAL", "SINGLE", "LEVEL", "EVENT") for _, name, _ in written.properties):
+                message = (
+                    f"the task {task.name} has no INTERVAL, SINGLE, LEVEL or EVENT, so it runs whenever there is time"
+                )
                 advice = "write INTERVAL := T#10ms, or T#0s if that is meant"
                 scope.warning(written.pos, "configuration", f"{message}; {advice}")
             if not task.programs:

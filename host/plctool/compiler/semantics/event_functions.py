@@ -18,6 +18,7 @@ EVENTS = (
     "EVT_PrepareStart", "EVT_StartDone", "EVT_PrepareStop", "EVT_StopDone", "EVT_PrepareReset", "EVT_ResetDone",
     "EVT_PrepareDownload", "EVT_DownloadDone", "EVT_CreateBootprojectDone", "EVT_DenyStartBootproject",
     "EVT_PrepareStartBootproject", "EVT_StartBootprojectDone", "EVT_DenyStart", "EVT_DenyStop",
+    "EVT_TaskException",
 )  # fmt: skip
 """Those of AppEventIds.h that happen while the program has its values."""
 
@@ -42,7 +43,7 @@ NOT_CALLED = {
     "EVT_PrepareOnlineChange": _NO_ONLINE_CHANGE,
     "EVT_OnlineChangeDone": _NO_ONLINE_CHANGE,
     "EVT_PrepareExit": "write FB_Exit",
-    "EVT_CmpApp_Exception": "a program that has failed is not called",
+    "EVT_CmpApp_Exception": "a program that has failed is not called; write EVT_TaskException",
     "OnInit": "write FB_Init, or EVT_PrepareStart",
     "OnTimer": "write a TASK with an INTERVAL",
     "OnLogin": _NO_LOGIN,
@@ -111,7 +112,8 @@ def _events(world: World, symbol: PouSymbol, names: str) -> Iterator[str]:
 def _caller(world: World, event: str, info: FunctionInfo) -> Pou:
     """The function that the runtime calls: it hands over the answer of the one in the program."""
     pos = info.pou.pos
-    answer = world.names.unit("event_answer__", library=True)
+    unit = "task_answer__" if event == "EVT_TaskException" else "event_answer__"
+    answer = world.names.unit(unit, library=True)
     assert isinstance(answer, PouSymbol)
     answers = world.declared.function(answer, {})
     assert answers is not None

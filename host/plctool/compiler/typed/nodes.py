@@ -648,6 +648,7 @@ class TaskKind(Enum):
     EVENT = 1
     EXTERNAL = 2
     FREEWHEELING = 3
+    LEVEL = 4
 
 
 @dataclass(frozen=True)
@@ -679,7 +680,7 @@ class Task:
     priority: int  # 0 highest .. 31
     interval_us: int
     programs: list[Pou]
-    event: TaskEvent | None = None  # TASK(SINGLE := place)
+    event: TaskEvent | None = None  # TASK(SINGLE := place), TASK(LEVEL := place)
     external: str = ""  # TASK(EVENT := 'name')
     watchdog_us: int = 0
     watchdog_sensitivity: int = 1

@@ -16,6 +16,9 @@
 #define TRACE_BUFFER 0
 #define BP_MAX 0
 #define IEC_TASK_CALLS 0
+#define TASK_LOAD 0
+#define SCHED_LEVEL_EVENTS 0
+#define IEC_TASK_HANDLER 0
 #define LOG_KEEP 0
 
 /* A second connection has no room in its 64 KiB. */

@@ -25,6 +25,8 @@
 #define HAS_CmpAppBP (BP_MAX > 0)
 #define HAS_IecClock (APP_CALLS > 0)
 #define HAS_IecTaskCalls IEC_TASK_CALLS
+#define HAS_CmpTaskLoad TASK_LOAD
+#define HAS_IecTaskHandler IEC_TASK_HANDLER
 #define HAS_CmpTraceMgr (TRACE_BUFFER > 0)
 #define HAS_CmpIoMgrSrv 1
 #define HAS_COMMUNICATION 1

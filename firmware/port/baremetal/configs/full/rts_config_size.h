@@ -34,6 +34,15 @@
 #ifndef IEC_TASK_CALLS
 #define IEC_TASK_CALLS 1
 #endif
+#ifndef TASK_LOAD
+#define TASK_LOAD 1
+#endif
+#ifndef SCHED_LEVEL_EVENTS
+#define SCHED_LEVEL_EVENTS 1
+#endif
+#ifndef IEC_TASK_HANDLER
+#define IEC_TASK_HANDLER 1
+#endif
 #ifndef IEC_EVENTS
 #define IEC_EVENTS 1
 #endif
@@ -60,7 +69,7 @@
 #endif
 #define CM_OWN_EXT_TABLES 2
 #define CYCLE_OWN_PHASES 6
-#define EVENT_MAX_CALLBACKS (14 + (APP_CALLS > 0) + (IEC_FILES > 0))
+#define EVENT_MAX_CALLBACKS (14 + (APP_CALLS > 0) + (IEC_FILES > 0) + IEC_TASK_HANDLER)
 #define COM_MAX_LINES 2
 #define LOG_MAX_ENTRIES 32
 #ifndef LOG_KEEP

@@ -14,6 +14,8 @@
 #define HAS_IecLog 1
 #define HAS_IecEvents 1
 #define HAS_IecTaskCalls 1
+#define HAS_CmpTaskLoad 1
+#define HAS_IecTaskHandler 1
 #define HAS_COMMUNICATION 1
 #define HAS_CmpLogSrv 1
 #define HAS_CmpMonitor2 1

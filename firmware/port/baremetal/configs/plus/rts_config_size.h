@@ -11,12 +11,15 @@
 #define APP_CRASH_TEXT_SIZE 1
 #define APP_MAX_TASKS 3
 #define NETSERVER_MESSAGE_SIZE 944 /* two full blocks */
-#define EVENT_MAX_CALLBACKS 8      /* three of the runtime's own, five for components */
+#define EVENT_MAX_CALLBACKS 9      /* four of the runtime's own, five for components */
 #define SCHED_MAX_EXTERNAL_EVENTS 2
 #define OPERATION_CONTROL 1
 #define IEC_LOG_BURST 4
 #define IEC_EVENTS 1
 #define IEC_TASK_CALLS 1
+#define TASK_LOAD 1
+#define SCHED_LEVEL_EVENTS 1
+#define IEC_TASK_HANDLER 1
 #define APP_REFUSAL_TEXT_SIZE 96
 #define COM_QUEUE_SIZE 540
 #define LOG_MAX_ENTRIES 8
