@@ -36,3 +36,23 @@ def test_a_firmware_that_does_not_tell_refuses_the_program(make_board, build):
         pytest.raises(DeviceError, match="task_value"),
     ):
         plc.flash(build(PROGRAM).path)
+
+
+LEVEL = """
+VAR_GLOBAL go : BOOL; END_VAR
+PROGRAM Main
+END_PROGRAM
+CONFIGURATION C
+    TASK Level(LEVEL := go);
+    PROGRAM One WITH Level : Main;
+END_CONFIGURATION
+"""
+
+
+def test_a_firmware_without_level_tasks_refuses_them_instead_of_running_them_at_edges(make_board, build):
+    with (
+        make_board("standard") as board,
+        Plc(Connection(board.line())) as plc,
+        pytest.raises(DeviceError, match="Task Level has the unknown kind 4"),
+    ):
+        plc.flash(build(LEVEL).path)
