@@ -403,6 +403,7 @@ static void tasks_are_reported_with_their_times(void)
     CHECK(call(SRV_APP_READ_TASK_INFO));
     CHECK_EQUAL(reply.size, 20);
     fakes.task_count = 2;
+    fakes.task_load = 30;
     memset(fakes.tasks[1].name, 'x', sizeof(fakes.tasks[1].name)); /* without NUL */
     strcpy(fakes.tasks[0].name, "Main");
     fakes.tasks[0].kind = 0x100;
@@ -416,7 +417,11 @@ static void tasks_are_reported_with_their_times(void)
     CHECK(BytesGet32(tag.data) == 0x100 && BytesGet32(tag.data + 8) == 0x102 && BytesGet32(tag.data + 36) == 0x109);
     CHECK(strcmp((const char *)tag.data + 40, "Main") == 0);
     CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_OK);
+    CHECK(tag.id == TAG_TASK_LOAD && tag.size == 4 && BytesGet32(tag.data) == 30);
+    CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_OK);
     CHECK(tag.size == 72 && strlen((const char *)tag.data + 40) == 31);
+    CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_OK);
+    CHECK(tag.id == TAG_TASK_LOAD && BytesGet32(tag.data) == 31);
     CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_END_OF_OBJECT);
 }
 

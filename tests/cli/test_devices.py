@@ -201,7 +201,7 @@ def test_tasks_have_their_times(tool: Any, running: FakePlc) -> None:
 
 
 def test_tasks_of_an_empty_device_are_none(tool: Any, plc: FakePlc) -> None:
-    assert tool("tasks", *PORT, "--json").json == {"tasks": []}
+    assert tool("tasks", *PORT, "--json").json == {"tasks": [], "load_percent": None}
     assert tool("tasks", *PORT).status == 0
 
 
