@@ -26,6 +26,22 @@ receiver(net := net, uiList := 7, uiItems := 4, pData := ADR(in), szData := SIZE
 END_PROGRAM
 """
 
+OVER_CAN = """
+TYPE
+    {attribute 'pack_mode' := '1'}
+    Line : STRUCT running : BOOL; speed : REAL; name : STRING(10); count : DINT; END_STRUCT;
+END_TYPE
+PROGRAM Main
+VAR
+    out, in : Line; sends, onChange, event : BOOL; interval : TIME; id : DWORD := 16#300; size : UDINT := 20;
+    sender : NETVAR_CAN_SENDER; receiver : NETVAR_CAN_RECEIVER;
+END_VAR
+sender(xEnable := sends, dwCobId := id, pData := ADR(out), szData := size, tInterval := interval,
+    xOnChange := onChange, xEvent := event);
+receiver(dwCobId := 16#340, pData := ADR(in), szData := SIZEOF(in), tTimeOut := T#1s);
+END_PROGRAM
+"""
+
 _HEAD = struct.Struct("<4sIHHHHHBB")
 _DATA = struct.Struct("<?f11si")
 SIZE = _HEAD.size + _DATA.size
