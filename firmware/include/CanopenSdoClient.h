@@ -45,7 +45,8 @@ void SdoClientRead(SDO_CLIENT *client, RTS_UI8 node, RTS_UI16 index, RTS_UI8 sub
 void SdoClientWrite(SDO_CLIENT *client, RTS_UI8 node, RTS_UI16 index, RTS_UI8 sub, const RTS_UI8 *data, RTS_UI32 size,
                     RTS_UI32 now_ms);
 
-/* A reply (580h + node). A reply to another request is ignored, also to one that still waits to be sent. */
+/* A reply (580h + node). A reply to another request is ignored, also to one that still waits to be sent; an abort of a
+ * transfer in segments ends it at any time. */
 void SdoClientTake(SDO_CLIENT *client, const CAN_FRAME *frame, RTS_UI32 now_ms);
 
 /* Ends a transfer whose reply is late, by an abort. */

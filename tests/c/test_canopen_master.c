@@ -140,6 +140,20 @@ static void a_reply_to_a_request_that_was_not_sent_is_ignored(void)
     CHECK_EQUAL(node.sdo.done, 7);
 }
 
+/* The node has refused the previous segment, sent twice, while the next one waits for room. */
+static void an_abort_ends_a_transfer_whose_next_request_waits(void)
+{
+    begin();
+    reply(0x41, OBJECT_TYPE, 0, 14);
+    poll();
+    is_full = true;
+    segment(0);
+    CHECK(node.sdo.has_request);
+    reply(SDO_ABORT, OBJECT_TYPE, 0, SDO_ABORT_TOGGLE);
+    CHECK_EQUAL(node.sdo.state, SDO_ABORTED);
+    CHECK(!node.sdo.has_request);
+}
+
 int main(void)
 {
     RUN(a_node_that_replies_comes_into_operation);
@@ -147,5 +161,6 @@ int main(void)
     RUN(an_object_of_endless_empty_segments_is_refused);
     RUN(an_object_that_is_too_long_is_refused);
     RUN(a_reply_to_a_request_that_was_not_sent_is_ignored);
+    RUN(an_abort_ends_a_transfer_whose_next_request_waits);
     return test_result();
 }

@@ -169,16 +169,25 @@ static void take_of_read(SDO_CLIENT *client, const RTS_UI8 *data, bool is_of_obj
 
 /* ---- both ---- */
 
+/* True if the node has replied to the beginning of a transfer in segments, which it may abort at any time. */
+static bool has_begun(const SDO_CLIENT *client)
+{
+    return client->segmented && (!client->writes || client->done != 0);
+}
+
 /* Only a reply that moves the transfer on begins a new wait. */
 void SdoClientTake(SDO_CLIENT *client, const CAN_FRAME *frame, RTS_UI32 now_ms)
 {
     const RTS_UI8 *data = frame->data;
 
-    if (client->state != SDO_BUSY || client->has_request || frame->size != FRAME ||
-        frame->id != CANOPEN_SDO_REPLY + (RTS_UI32)client->node)
+    if (client->state != SDO_BUSY || frame->size != FRAME || frame->id != CANOPEN_SDO_REPLY + (RTS_UI32)client->node)
         return;
     bool is_of_object = BytesGet16(data + 1) == client->index && data[3] == client->sub;
-    if (data[0] == SDO_ABORT && is_of_object)
+    bool is_abort = data[0] == SDO_ABORT && is_of_object;
+    if (client->has_request && !(is_abort && has_begun(client)))
+        return;
+    client->has_request = false;
+    if (is_abort)
         end(client, SDO_ABORTED, BytesGet32(data + 4));
     else if (client->writes)
         take_of_write(client, data, is_of_object);
