@@ -467,3 +467,35 @@ def test_outputs_of_the_others_are_safe_while_a_node_is_lost(tmp_path: Path) -> 
         plc.fault("Valves", "absent", 0)
         plc.run_for(10_000)
         assert plc.output("Main.coils2") == 0x55
+
+
+# ---- scale -----------------------------------------------------------------------------------------------------------
+
+EVERY_NODE = 126  # and ours
+
+
+def of_all_nodes(folder: Path) -> Path:
+    """A program with a node of each number but ours, each with an output of its own."""
+    names = [f"N{n}" for n in range(1, EVERY_NODE + 1)]
+    path = write_program(
+        folder, source=f"PROGRAM Main VAR {', '.join(n + 'out' for n in names)} : BYTE; END_VAR END_PROGRAM"
+    )
+    nodes = "".join(
+        f'[[canopen.device]]\nname = "{name}"\nnode = {number}\neds = "valves.eds"\nheartbeat = "T#1s"\n'
+        f'out = {{ "6200:01" = "Main.{name}out" }}\n'
+        for number, name in enumerate(names, 1)
+    )
+    (folder / "app.io.toml").write_text('[[canopen]]\nname = "Bus"\nnode = 127\n' + nodes)
+    return path
+
+
+def test_all_127_nodes_of_a_network_run_and_one_is_lost_alone(tmp_path: Path) -> None:
+    with Simulator.from_sources(of_all_nodes(tmp_path)) as plc:
+        plc.run_for(5000)
+        assert [n for n in range(1, EVERY_NODE + 1) if not plc.read(f"N{n}.ok")] == []
+        plc.fault("N77", "absent")
+        plc.run_for(3000)
+        assert [n for n in range(1, EVERY_NODE + 1) if not plc.read(f"N{n}.ok")] == [77]
+        plc.fault("N77", "absent", 0)
+        plc.run_for(3000)
+        assert plc.read("N77.ok")
