@@ -24,6 +24,7 @@ OBJECT = 0x2000
 BOOT_MS = 400
 NO_OBJECT, GENERAL = 0x06020000, 0x08000000
 OTHER_ERROR, OVERFLOW, TIMEOUT, BUS_OFF, NO_NETWORK = 0x01, 0x02, 0x03, 0x10, 0x21
+ERROR_PASSIVE = 0x11
 
 
 @pytest.fixture(scope="module")
@@ -191,6 +192,24 @@ def test_states_are_those_of_heartbeats(plc: Simulator) -> None:  # C405-24
     plc.fault("Valves", "absent")
     plc.run_for(600)
     assert state(plc, NODE) == "NOT_AVAIL"
+
+
+@pytest.mark.parametrize(("destroyed", "state"), [(0, 0), (20, ERROR_PASSIVE), (40, BUS_OFF)])
+def test_kernel_state_follows_the_error_counters(plc: Simulator, destroyed: int, state: int) -> None:  # C405-25
+    plc.fault("Bus", "cut", destroyed)
+    plc.run_for(120)  # our heartbeat is among them
+    give(plc, "kernel", ENABLE=True)
+    assert outputs(plc, "kernel", "CONFIRM", "STATE") == (True, state)
+
+
+def test_nodes_are_regained_after_bus_off(plc: Simulator) -> None:
+    plc.fault("Bus", "cut", 40)
+    plc.run_for(120)
+    assert not plc.read("Valves.ok")
+    plc.run_for(5000)
+    assert plc.read("Valves.ok")
+    give(plc, "kernel", ENABLE=True)
+    assert outputs(plc, "kernel", "CONFIRM", "STATE") == (True, 0)
 
 
 def test_kernel_state_is_that_of_the_network(plc: Simulator) -> None:  # C405-25

@@ -457,10 +457,22 @@ RTS_RESULT SimCanopenGet(const IoConfigConnector *connector, const SIM_IO_PLACE 
     return result;
 }
 
+static bool is_line(const IoConfigConnector *connector)
+{
+    for (RTS_UI32 i = 0; i < CAN_CONTROLLERS; i++)
+        if (setup()->lines[i].connector == connector)
+            return true;
+    return false;
+}
+
 RTS_RESULT SimCanopenFail(const IoConfigConnector *connector, RTS_UI32 fault, RTS_UI32 value)
 {
     const CANOPEN_DEVICE *device = CanopenFindDevice(setup(), connector);
 
+    if (device == NULL && fault == IO_SIM_CUT && is_line(connector)) {
+        SimCanDestroy(SIM_CAN_DEVICE, value);
+        return ERR_OK;
+    }
     if (device == NULL)
         return ERR_NOT_SUPPORTED;
     if (fault - IO_SIM_ABSENT >= IO_SIM_FAULTS || fault == IO_SIM_CUT)

@@ -17,7 +17,8 @@ FAULTS = {
 }
 """absent: 1, it is not there; late: its data is as old as this [ms], on Modbus it replies so much later; type: 1, it is
 another device than the description says; answers: so many next replies are bad, on Modbus with a wrong CRC, on TCP
-without their end; cut: of so many next replies only the first half arrives."""
+without their end; cut: of so many next replies only the first half arrives; of a CANopen
+network: so many next frames of this controller are destroyed on the bus, which drives it into bus off."""
 _MOST = 0xFFFF_FFFF  # of a value
 
 

@@ -60,7 +60,7 @@ _ON_LOST = {
 class CanopenLine(Connector):
     """A network."""
 
-    faults = ()
+    faults = ("cut",)
     node: int = 0
     sync: bool = False
     nodes: dict[int, str] = field(default_factory=dict)
