@@ -14,6 +14,8 @@
 #include "app_image.h"
 #include "test.h"
 
+#include <stdlib.h>
+
 enum {
     NEW_OFFSET = 32,
     NEW_VALUE = 0x1234,
@@ -21,6 +23,10 @@ enum {
     OLD_PLACE = 16,
     NEW_PLACE = 48,
     MOVED_VALUE = 77,
+    TO_OBJECT_OFFSET = 24, /* leads to the instance that begins at the same place */
+    OBJECT_PLACE = 52,     /* that of the instance, which is not that of its first member */
+    PASSED_OFFSET = 40,    /* leads to what is gone */
+    GONE_PLACE = 56,
 };
 
 static APP_BYTES images[4]; /* [step]; 0 unused */
@@ -40,36 +46,70 @@ static void emit_move(APP_SPEC *spec, RTS_UI8 kind, RTS_UI32 from, RTS_UI32 to, 
     emit(spec, (const char *)&step, sizeof step);
 }
 
-/* The counter that counts by `step`, in place of another one; a new variable gets NEW_VALUE. */
+/* A step of what leads to instances. */
+static void emit_object(APP_SPEC *spec, RTS_UI8 kind, RTS_UI32 from, RTS_UI32 to, RTS_UI32 size)
+{
+    RTS_UI8 objects = CDL_CHANGE_OBJECTS | APP_AREA_DATA;
+    RTS_UI8 area = kind == CDL_CHANGE_LEAD ? CDL_CHANGE_OBJECTS : APP_AREA_DATA;
+    CDL_CHANGE_STEP step = {to, size, from, kind, area, kind == CDL_CHANGE_LEAD ? APP_AREA_DATA : objects, 0};
+
+    emit(spec, (const char *)&step, sizeof step);
+}
+
+/* The counter that counts by `step`, in place of another one; a new variable gets NEW_VALUE, and a second task does
+ * nothing. */
 static void spec_change(APP_SPEC *spec, RTS_UI32 step, const APP_BYTES *base)
 {
     spec_counter(spec, step);
+    add_task(spec, "Second", KIND_CYCLIC, 20000, here(spec));
+    emit_ret(spec);
     while (spec->code_size % 4 != 0)
         emit_ret(spec);
     spec->change = (CDL_CHANGE){image_crc(base), CDL_CHANGE_NO_INIT, here(spec), 0};
     emit_move(spec, CDL_CHANGE_MOVE, OLD_PLACE, NEW_PLACE, 8);
+    emit_move(spec, CDL_CHANGE_GONE, GONE_PLACE, 0, 4);
+    emit_object(spec, CDL_CHANGE_FOLLOW, OLD_PLACE, OBJECT_PLACE, 1);
     emit_move(spec, CDL_CHANGE_LEAD, POINTER_OFFSET, 8, APP_POINTER_SIZE);
+    emit_object(spec, CDL_CHANGE_LEAD, TO_OBJECT_OFFSET, 8, APP_POINTER_SIZE);
+    emit_move(spec, CDL_CHANGE_FORGET, PASSED_OFFSET, 8, APP_POINTER_SIZE);
     emit_step(spec, CDL_CHANGE_CLEAR, APP_AREA_DATA, NEW_OFFSET, 8);
     emit_step(spec, CDL_CHANGE_PUT, APP_AREA_DATA, NEW_OFFSET, 2);
     emit_u32(spec, NEW_VALUE);
     spec->change.size = here(spec) - spec->change.offset;
 }
 
-/* The program would have set its pointer. */
-static void set_pointer(RTS_UI32 offset)
+static void set_one(RTS_UI32 at, RTS_UI32 offset)
 {
     uintptr_t pointer = (uintptr_t)AppGetAreaAddress(APP_AREA_DATA, 0, 64) + offset;
 
-    memcpy(AppGetAreaAddress(APP_AREA_DATA, 0, 64) + POINTER_OFFSET, &pointer, sizeof pointer);
+    memcpy(AppGetAreaAddress(APP_AREA_DATA, 0, 64) + at, &pointer, sizeof pointer);
+}
+
+/* The program would have set its pointers. */
+static void set_pointer(RTS_UI32 offset)
+{
+    set_one(POINTER_OFFSET, offset);
+    set_one(TO_OBJECT_OFFSET, OLD_PLACE);
+    set_one(PASSED_OFFSET, GONE_PLACE);
     AppGetAreaAddress(APP_AREA_DATA, 0, 64)[offset] = MOVED_VALUE;
+}
+
+static uintptr_t get_pointer(RTS_UI32 at)
+{
+    uintptr_t pointer;
+
+    memcpy(&pointer, AppGetAreaAddress(APP_AREA_DATA, 0, 64) + at, sizeof pointer);
+    return pointer;
+}
+
+static RTS_UI32 leads_to(RTS_UI32 at)
+{
+    return (RTS_UI32)(get_pointer(at) - (uintptr_t)AppGetAreaAddress(APP_AREA_DATA, 0, 64));
 }
 
 static RTS_UI32 pointer_leads_to(void)
 {
-    uintptr_t pointer;
-
-    memcpy(&pointer, AppGetAreaAddress(APP_AREA_DATA, 0, 64) + POINTER_OFFSET, sizeof pointer);
-    return (RTS_UI32)(pointer - (uintptr_t)AppGetAreaAddress(APP_AREA_DATA, 0, 64));
+    return leads_to(POINTER_OFFSET);
 }
 
 static RTS_RESULT change_to(const APP_BYTES *image)
@@ -102,8 +142,10 @@ static RTS_RESULT story_result;
 
 static RTS_RESULT try_story(void)
 {
-    RTS_RESULT result = change_to(&images[2]);
+    RTS_RESULT result;
 
+    set_pointer(OLD_PLACE);
+    result = change_to(&images[2]);
     if (result == ERR_OK)
         result = SimAdvance(ms(8000));
     if (result == ERR_OK)
@@ -127,6 +169,8 @@ static void variables_go_on_in_the_new_code(void)
     set_pointer(OLD_PLACE + 4);
     CHECK_EQUAL(change_to(&images[2]), ERR_OK);
     CHECK_EQUAL(pointer_leads_to(), NEW_PLACE + 4);
+    CHECK_EQUAL(leads_to(TO_OBJECT_OFFSET), OBJECT_PLACE);
+    CHECK(get_pointer(PASSED_OFFSET) == 0);
     CHECK_EQUAL(AppGetAreaAddress(APP_AREA_DATA, 0, 64)[NEW_PLACE + 4], MOVED_VALUE);
     CHECK_EQUAL(app_state(), AS_RUN);
     CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), counter);
@@ -205,6 +249,9 @@ static void a_fault_at_any_operation_leaves_one_of_both_running(void)
         SimFlashCut(k, SIM_FAULT);
         result = change_to(&images[2]);
         CHECK_EQUAL(pointer_leads_to(), (result == ERR_OK ? NEW_PLACE : OLD_PLACE));
+        CHECK_EQUAL(leads_to(TO_OBJECT_OFFSET), (result == ERR_OK ? OBJECT_PLACE : OLD_PLACE));
+        CHECK(get_pointer(PASSED_OFFSET) == 0 || leads_to(PASSED_OFFSET) == GONE_PLACE);
+        CHECK_EQUAL(IecTaskGetCount(), (result == ERR_OK ? 2u : 1u));
         CHECK_EQUAL(app_state(), AS_RUN);
         CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), counter);
         SimFlashCut(0, 0);
@@ -329,6 +376,60 @@ static void each_number_of_the_list_is_checked(void)
     CHECK_EQUAL(check_whole(), 1);
 }
 
+/* In the list of spec_change. */
+enum { AT_GONE = 1, AT_OBJECT, AT_LEAD, AT_LEAD_OBJECT, AT_FORGET };
+
+/* The list with another number in one step is refused. */
+static void check_field(const APP_SPEC *good, RTS_UI32 at, RTS_SIZE offset, RTS_SIZE size, RTS_UI32 value)
+{
+    APP_SPEC spec = *good;
+    CDL_CHANGE_STEP *steps = (CDL_CHANGE_STEP *)(void *)(spec.code + spec.change.offset);
+
+    memcpy((RTS_UI8 *)&steps[at] + offset, &value, size);
+    CHECK_EQUAL(try_spec(&spec), ERR_OUT_OF_LIMITS);
+}
+
+#define CHECK_FIELD(at, field, value) \
+    check_field(&good, at, offsetof(CDL_CHANGE_STEP, field), sizeof(((CDL_CHANGE_STEP *)0)->field), (RTS_UI32)(value))
+
+static void each_bound_of_pointers_and_objects_is_checked(void)
+{
+    APP_SPEC good;
+    RTS_UI32 at;
+    RTS_UI32 distance;
+
+    prepare(8, 0xFF, 512);
+    spec_change(&good, 2, &images[1]);
+    for (at = AT_GONE; at <= AT_FORGET; at++) {
+        CHECK_FIELD(at, from, 0xFFFFFFFC);
+        CHECK_FIELD(at, from, good.areas[APP_AREA_DATA] + 1);
+        CHECK_FIELD(at, size, 0xFFFFFFFC);
+        CHECK_FIELD(at, size, good.areas[APP_AREA_DATA] + 1);
+        CHECK_FIELD(at, from_area, at == AT_OBJECT ? CDL_CHANGE_OBJECTS | APP_AREA_CODE : APP_AREA_CODE);
+        CHECK_FIELD(at, from_area, 0xFF);
+        CHECK_FIELD(at, kind, CDL_CHANGE_SIGN + 1);
+    }
+    for (at = AT_LEAD; at <= AT_FORGET; at++) {
+        for (distance = 0; distance < APP_POINTER_SIZE; distance++)
+            CHECK_FIELD(at, to, distance);
+        CHECK_FIELD(at, area, 1);
+        CHECK_FIELD(at, area, 0x7F);
+        CHECK_FIELD(at, area, 0x81);
+        CHECK_FIELD(at, from_area, CDL_CHANGE_OBJECTS | APP_AREA_DATA);
+        CHECK_FIELD(at, kind, CDL_CHANGE_GONE); /* not among those that come first */
+        CHECK_FIELD(at, kind, CDL_CHANGE_FOLLOW);
+    }
+    CHECK_FIELD(AT_OBJECT, to, good.areas[APP_AREA_DATA]);
+    CHECK_FIELD(AT_OBJECT, to, 0xFFFFFFFF);
+    CHECK_FIELD(AT_OBJECT, area, APP_AREA_CODE);
+    CHECK_FIELD(AT_OBJECT, area, CDL_CHANGE_OBJECTS | APP_AREA_DATA);
+    CHECK_FIELD(AT_OBJECT, from_area, APP_AREA_DATA); /* before the one in front of it */
+    CHECK_FIELD(AT_GONE, from, OLD_PLACE + 4);
+    CHECK_FIELD(AT_GONE, from_area, CDL_CHANGE_OBJECTS | APP_AREA_DATA);
+    CHECK_EQUAL(check_whole(), 1);
+    CHECK_EQUAL(try_spec(&good), ERR_OK);
+}
+
 static void without_a_program_that_runs_there_is_no_change(void)
 {
     CHECK_EQUAL(SimFlashConfigure(32 * 1024, 512, 8, 0xFF), ERR_OK);
@@ -360,6 +461,8 @@ static void a_program_that_fails_when_it_is_asked_stays_and_is_not_changed(void)
 /* It goes to the slot of the one before the last, like a download. */
 static void many_changes_in_a_row_go_on(void)
 {
+    const char *asked = getenv("CHANGES"); /* 10 000: make changes */
+    RTS_UI32 rounds = asked != NULL ? (RTS_UI32)strtoul(asked, NULL, 10) : 200;
     APP_BYTES next[2];
     APP_SPEC spec;
     RTS_UI32 round;
@@ -368,7 +471,7 @@ static void many_changes_in_a_row_go_on(void)
     prepare(8, 0xFF, 512);
     start_again();
     next[1] = images[1];
-    for (round = 0; round < 200; round++) {
+    for (round = 0; round < rounds; round++) {
         spec_change(&spec, 1 + round % 3, &next[(round + 1) % 2]);
         build_image(&next[round % 2], &spec);
         counter = read_u32(APP_AREA_DATA, COUNTER_OFFSET);
@@ -394,6 +497,7 @@ int main(void)
     RUN(failure_just_before_the_exchange_is_that_of_the_previous_program);
     RUN(tasks_may_change_and_their_number_too);
     RUN(each_number_of_the_list_is_checked);
+    RUN(each_bound_of_pointers_and_objects_is_checked);
     RUN(without_a_program_that_runs_there_is_no_change);
     RUN(a_program_that_fails_when_it_is_asked_stays_and_is_not_changed);
     RUN(many_changes_in_a_row_go_on);

@@ -12,6 +12,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
+import many_changes
 from changing import Changing, program
 from online_programs import built, carried, edited, random_source
 
@@ -103,6 +104,12 @@ def test_ten_changes_in_a_row_lose_no_cycle(tmp_path: Path) -> None:
         plc.run_for(20)
         assert plc.read("Main.n") == plc.tasks()[0].cycles == 11 * 4
         assert plc.tasks()[0].overruns == 0
+
+
+def test_many_changes_in_a_row_lose_nothing(tmp_path: Path) -> None:
+    """10 000 of them: make changes."""
+    summary = many_changes.run(tmp_path, 12, 5)
+    assert summary.changes == 12 and summary.room < 3
 
 
 TASKS = """PROGRAM Main VAR n : DINT; go : BOOL; END_VAR n := n + 1; END_PROGRAM
