@@ -20,8 +20,10 @@ from conftest import Tool
 from online_programs import built
 
 from plctool import connect
+from plctool.debug.symbols import SymbolTable
 from plctool.device import Plc
 from plctool.errors import EXIT_INTERRUPTED, DeviceError
+from plctool.link.tcp import TcpTransport
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.waiting import eventually
 
@@ -60,6 +62,61 @@ def test_changed_program_is_what_runs_after_power_off_and_has_its_retain_values(
         assert again.status().image_crc == result.crc
         assert again.read("Main.kept") == 123
         eventually(lambda: again.read("Main.n") < 0)
+
+
+def killed_at(step: int, plcrt: Plcrt, symbols: list[SymbolTable], image: bytes) -> bool:
+    """A process makes a change and is killed when it sends packet number `step`; False if it has made it before."""
+    pid = os.fork()
+    if pid == 0:
+        sent = 0
+        send = TcpTransport.send
+
+        def counted(transport: TcpTransport, *packets: bytes) -> None:
+            nonlocal sent
+            sent += 1
+            send(transport, *packets)
+            if sent == step:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        TcpTransport.send = counted  # type: ignore[method-assign]
+        try:
+            with connect(f"tcp:{plcrt.tcp}") as plc:
+                for table in symbols:
+                    plc.add_symbols(table)
+                plc.change(image)
+        finally:
+            os._exit(0)
+    return os.WIFSIGNALED(os.waitpid(pid, 0)[1])
+
+
+def test_tool_that_is_killed_at_any_packet_leaves_the_old_or_the_new_program(plcrt: Plcrt, tmp_path: Path) -> None:
+    """Whole, running, with all values; and the next change finds a device that takes it."""
+    plcrt.stop()
+    plcrt.options = ("--tcp", "0")
+    plcrt.start()
+    tables = [built(tmp_path, program())]
+    with connect(f"tcp:{plcrt.tcp}") as plc:
+        plc.flash(tables[0].image)
+        plc.add_symbols(tables[0].symbols)
+        plc.write({"Main.fixed": 70})
+    step = 0
+    while True:
+        step += 1
+        tables.append(built(tmp_path, program(BODY.replace("n + 1", f"n + {step + 1}")), tables[-1].symbols))
+        killed = killed_at(step, plcrt, [table.symbols for table in tables[-2:]], tables[-1].image)
+        with connect(f"tcp:{plcrt.tcp}") as plc:
+            eventually(lambda: str(plc.status().state) == "run")
+            crc = plc.status().image_crc
+            assert crc in [table.crc for table in tables[-2:]]
+            if crc != tables[-1].crc:
+                tables.pop()
+            plc.add_symbols(tables[-1].symbols)
+            n = plc.read("Main.n")
+            eventually(lambda: plc.read("Main.n") > n)  # noqa: B023
+            assert plc.read("Main.fixed") == 70
+        if not killed:
+            break
+    assert step > 8 and tables[-1].crc == crc
 
 
 PROJECT = 'sources = ["main.st"]\n'
