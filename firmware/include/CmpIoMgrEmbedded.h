@@ -19,6 +19,7 @@
 #include "IoDrv.h"
 #include "IoMgrConfig.h"
 #include "IoMgrDevices.h"
+#include "IoMgrFollow.h"
 #include "IoMgrRequests.h"
 
 /* ---- drivers (8.4) ---- */

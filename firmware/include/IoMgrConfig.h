@@ -11,7 +11,6 @@
 #include "CmpErrors.h"
 #include "CmpStd.h"
 #include "IoConfig.h"
-#include "rts_config.h"
 
 /* ---- the configuration (8.5). From any context while the application is loaded; a few instructions, but for lists. ---- */
 
@@ -48,12 +47,6 @@ const char *IoMgrConfigGetParameterValueText(const IoConfigParameter *parameter)
 /* The entries of a map. */
 const IoConfigConnectorMap *IoMgrConfigGetConnectorMaps(const IoConfigTaskMap *map);
 const IoConfigChannelMap *IoMgrConfigGetChannelMaps(const IoConfigConnectorMap *map);
-
-#if ONLINE_CHANGE
-/* In IoDrvFollowConfiguration: returns where the connector, parameter, text or value now is that was at `place` before the
- * change. NULL, and a pointer to something else, is returned as it is. */
-const void *IoMgrConfigFollow(const void *place);
-#endif
 
 /* ---- copies (8.12.2). In IoDrvReadInputs and IoDrvWriteOutputs, within SysLock. ---- */
 

@@ -14,6 +14,7 @@
 #include "CmpLog.h"
 #include "IoCycle.h"
 #include "IoDevices.h"
+#include "IoFollow.h"
 #include "IoTables.h"
 #include "SysTime.h"
 

@@ -7,12 +7,13 @@
  * connectors with the same parameters. Which task uses which channels may differ, and so may the bus cycle tasks and the
  * places of the variables that follow devices.
  */
-#include "IoMgrConfig.h"
+#include "IoMgrFollow.h"
 
 #if ONLINE_CHANGE
 
 #include <string.h>
 
+#include "IoFollow.h"
 #include "IoTables.h"
 
 /* What drivers have pointers into. */

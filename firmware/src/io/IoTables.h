@@ -54,15 +54,6 @@ RTS_UI32 IoTablesCountConnectors(void);
 RTS_UI32 IoTablesCountTaskMaps(void);
 const IoConfigTaskMap *IoTablesGetTaskMaps(void);
 
-#if ONLINE_CHANGE
-/* True if drivers can go on with a checked configuration in place of the loaded one: connectors and parameters are the
- * same, and channels are at the same places. */
-bool IoTablesCanFollow(const IO_CONFIG *config);
-
-/* As IoTablesSet, for such a configuration; IoMgrConfigFollow leads to it from now on. */
-void IoTablesFollow(const IO_CONFIG *config, const IEC_CONTEXT *context);
-#endif
-
 /* Where an IO_DEVICE_STATE of the program is. */
 IO_DEVICE_STATE *IoTablesGetState(RTS_UI32 offset);
 
