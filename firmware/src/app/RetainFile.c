@@ -81,26 +81,9 @@ RTS_RESULT RetainFileMayPut(void)
     return find(&head) != NULL ? (RTS_RESULT)ERR_OK : ERR_APP_NOT_LOADED;
 }
 
-static RTS_RESULT check(const FILE_ENTRY *file, HEAD *head)
-{
-    if (file->size < sizeof *head || FileStoreRead(file, 0, head, sizeof *head) != ERR_OK || head->magic != MAGIC ||
-        head->size != file->size - sizeof *head)
-        return ERR_CRC_FAILED;
-    return ERR_OK;
-}
-
-/* Reads the values of a file. */
-static bool read_values(const FILE_ENTRY *file, const HEAD *head)
-{
-    RTS_UI8 *room = RetainGetRoom();
-
-    return FileStoreRead(file, sizeof *head, room, head->size) == ERR_OK &&
-           CRC32Update(0, room, head->size) == head->crc;
-}
-
 #if ONLINE_CHANGE
-/* Finds the program that the loaded one has replaced in an online change, if a file is of that. Not inlined: an image and
- * what checks it are large on the stack. */
+/* Finds the table of the program that the loaded one has replaced in an online change, if a file is of that. Not inlined:
+ * an image and what checks it are large on the stack. */
 static RTS_NOINLINE bool find_replaced(const HEAD *head, RETAIN_TABLE *table)
 {
     RTS_UI32 other = AppCommitOtherSlot(AppGetSlot());
@@ -116,44 +99,44 @@ static RTS_NOINLINE bool find_replaced(const HEAD *head, RETAIN_TABLE *table)
 }
 
 /* Variables that both programs have get the values of the file, the others stay as they are. */
-static RTS_RESULT restore(const FILE_ENTRY *file, const HEAD *own, const HEAD *head, bool *valid)
+static RTS_RESULT restore(bool valid, const RETAIN_TABLE *replaced)
 {
-    RETAIN_TABLE table;
-    bool is_older = head->tag != own->tag;
-
-    if (is_older && !find_replaced(head, &table))
-        return ERR_VERSION_MISMATCH;
-    if (!is_older && head->size != own->size)
-        return ERR_VERSION_MISMATCH;
-    *valid = read_values(file, head);
-    return is_older && *valid ? RetainRestoreFrom(&table) : RetainRestore(*valid);
+    return valid && replaced->size != 0 ? RetainRestoreFrom(replaced) : RetainRestore(valid);
 }
 #else
-static RTS_RESULT restore(const FILE_ENTRY *file, const HEAD *own, const HEAD *head, bool *valid)
-{
-    if (head->tag != own->tag || head->size != own->size)
-        return ERR_VERSION_MISMATCH;
-    *valid = read_values(file, head);
-    return RetainRestore(*valid);
-}
+#define find_replaced(head, table) false
+#define restore(valid, replaced) RetainRestore(valid)
 #endif
+
+/* *replaced: the table of the program that saved the file; left as it is if that is the loaded one. */
+static RTS_RESULT check(const FILE_ENTRY *file, const HEAD *own, HEAD *head, RETAIN_TABLE *replaced)
+{
+    RTS_UNUSED(replaced);
+    if (file->size < sizeof *head || FileStoreRead(file, 0, head, sizeof *head) != ERR_OK || head->magic != MAGIC ||
+        head->size != file->size - sizeof *head)
+        return ERR_CRC_FAILED;
+    return (head->tag == own->tag && head->size == own->size) || find_replaced(head, replaced) ? (RTS_RESULT)ERR_OK
+                                                                                               : ERR_VERSION_MISMATCH;
+}
 
 RTS_RESULT RetainFilePut(const FILE_ENTRY *file)
 {
     RTS_RESULT result = RetainFileMayPut();
-    bool valid = false;
+    RETAIN_TABLE replaced = {0};
+    RTS_UI8 *room;
     HEAD own;
     HEAD head;
+    bool valid;
 
     if (result != ERR_OK)
         return result;
     (void)find(&own);
-    result = check(file, &head);
+    result = check(file, &own, &head, &replaced);
     if (result != ERR_OK)
         return result;
-    result = restore(file, &own, &head, &valid);
-    if (result == ERR_VERSION_MISMATCH)
-        return result;
+    room = RetainGetRoom();
+    valid = FileStoreRead(file, sizeof head, room, head.size) == ERR_OK && CRC32Update(0, room, head.size) == head.crc;
+    result = restore(valid, &replaced);
     LogAdd(CMPID_CmpRetain, LOG_INFO, result, "Retain variables %s", valid ? "restored from a file" : "not restored");
     return valid ? result : (RTS_RESULT)ERR_CRC_FAILED;
 }

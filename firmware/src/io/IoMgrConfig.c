@@ -17,8 +17,7 @@ static IO_TABLES tables;
 
 /* ---- for the manager ---- */
 
-/* Not inlined: it is called from many places. */
-static RTS_NOINLINE const IoConfigParameter *get_parameters(void)
+static const IoConfigParameter *get_parameters(void)
 {
     return IoTablesParametersOf(&tables);
 }
@@ -35,7 +34,7 @@ const IO_TABLES *IoTablesGet(void)
 
 void IoTablesSet(const IO_CONFIG *config, const IEC_CONTEXT *context)
 {
-    IoTablesFind(&tables, config != NULL ? config : &no_config);
+    IO_TABLES_FIND(tables, config != NULL ? config : &no_config, IoTablesGetTaskMaps());
     tables.areas = context != NULL ? context->area : NULL;
 }
 

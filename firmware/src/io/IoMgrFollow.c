@@ -142,7 +142,7 @@ bool IoTablesCanFollow(const IO_CONFIG *config)
     const IO_TABLES *loaded = IoTablesGet();
     IO_TABLES other;
 
-    IoTablesFind(&other, config);
+    IO_TABLES_FIND(other, config, IoTablesTaskMapsOf(&other));
     return is_same(loaded, &other) || (has_same_devices(loaded, &other) && has_all_channels(loaded, &other));
 }
 

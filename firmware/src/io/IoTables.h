@@ -29,19 +29,16 @@ static inline const IoConfigTaskMap *IoTablesTaskMapsOf(const IO_TABLES *tables)
     return (const IoConfigTaskMap *)(IoTablesParametersOf(tables) + tables->head->parameters);
 }
 
-/* Finds the tables of a checked configuration; `areas` stay. */
-static inline void IoTablesFind(IO_TABLES *tables, const IO_CONFIG *config)
-{
-    const IoConfigConnector *connectors = (const IoConfigConnector *)(config + 1);
-    const IoConfigParameter *parameters = (const IoConfigParameter *)(connectors + config->connectors);
-    const IoConfigTaskMap *task_maps = (const IoConfigTaskMap *)(parameters + config->parameters);
-
-    tables->head = config;
-    tables->connectors = connectors;
-    tables->connector_maps = (const IoConfigConnectorMap *)(task_maps + config->task_maps);
-    tables->channel_maps = (const IoConfigChannelMap *)(tables->connector_maps + config->connector_maps);
-    tables->data = (const RTS_UI8 *)(tables->channel_maps + config->channel_maps);
-}
+/* Finds the tables of a checked configuration; `areas` stay. `task_maps` is evaluated when the head and connectors are known.
+ * A macro: as a function it costs more flash where it is used once. */
+#define IO_TABLES_FIND(tables, config, task_maps_of)                                                                   \
+    do {                                                                                                               \
+        (tables).head = (config);                                                                                      \
+        (tables).connectors = (const IoConfigConnector *)((tables).head + 1);                                          \
+        (tables).connector_maps = (const IoConfigConnectorMap *)((task_maps_of) + (tables).head->task_maps);           \
+        (tables).channel_maps = (const IoConfigChannelMap *)((tables).connector_maps + (tables).head->connector_maps); \
+        (tables).data = (const RTS_UI8 *)((tables).channel_maps + (tables).head->channel_maps);                        \
+    } while (0)
 
 /* `config` as checked, and the areas; NULL: there is none. From main, while no task runs. */
 void IoTablesSet(const IO_CONFIG *config, const IEC_CONTEXT *context);
