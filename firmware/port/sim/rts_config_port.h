@@ -46,7 +46,9 @@
 #define APP_POWER_FAIL 1
 #define APP_RETAIN_SRAM 1
 #define IEC_TASK_CALLS 1
+#ifndef TASK_LOAD
 #define TASK_LOAD 1
+#endif
 #define SCHED_LEVEL_EVENTS 1
 #define IEC_TASK_HANDLER 1
 #ifndef TRACE_BUFFER /* less for the C tests in QEMU */

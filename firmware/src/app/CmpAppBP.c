@@ -704,8 +704,7 @@ static bool waits_for_event(RTS_UI32 task)
 {
     IEC_TASK_INFO info;
 
-    return IecCycleGetInfo(task, &info) == ERR_OK && info.kind != KIND_CYCLIC &&
-           info.kind != KIND_FREEWHEELING;
+    return IecCycleGetInfo(task, &info) == ERR_OK && info.kind != KIND_CYCLIC && info.kind != KIND_FREEWHEELING;
 }
 
 RTS_RESULT AppBpGo(RTS_UI32 how)
