@@ -146,7 +146,7 @@ void IecCycleResume(RTS_UI32 task);
 #if TASK_LOAD
 /* ---- for CmpTaskLoad ---- */
 
-/* How often tasks were started. From any context. */
+/* How often tasks were started or exchanged. From any context. */
 RTS_UI32 IecCycleGetStarts(void);
 /* Ends the program at the end of the next cycle of the task, because of its load. From any context. */
 void IecCycleBlame(RTS_UI32 task);

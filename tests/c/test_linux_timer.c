@@ -162,7 +162,7 @@ static void a_timer_starts_again_after_a_stop(void)
 
 static void there_is_a_timer_for_every_task_and_then_no_more(void)
 {
-    RTS_HANDLE timers[APP_MAX_TASKS + 2];
+    RTS_HANDLE timers[2 * APP_MAX_TASKS];
     RTS_UI32 count = 0;
     while (count < RTS_COUNT(timers) && SysTimerCreate(note, &record, 1000, 0, &timers[count]) == ERR_OK) {
         count++;

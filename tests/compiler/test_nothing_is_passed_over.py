@@ -424,6 +424,7 @@ PROPERTIES = {
     "INTERVAL": "T#5ms",
     "PRIORITY": "3",
     "SINGLE": "g",
+    "LEVEL": "g",
     "EVENT": "'door'",
     "WATCHDOG": "T#7ms",
     "SENSITIVITY": "4",
@@ -443,7 +444,7 @@ def test_every_property_of_a_task_changes_it() -> None:
     assert before is not None
     for name, value in PROPERTIES.items():
         rest = {"INTERVAL": "T#9ms", "WATCHDOG": "T#9ms"} | {name: value}
-        if name in ("SINGLE", "EVENT"):
+        if name in ("SINGLE", "LEVEL", "EVENT"):
             del rest["INTERVAL"]
         after = check(task(", ".join(f"{k} := {v}" for k, v in rest.items()))).program
         assert after is not None

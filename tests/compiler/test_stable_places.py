@@ -71,10 +71,6 @@ def change_of(tmp_path: Path, before: str, after: str) -> list[str]:
 
 MAIN = "PROGRAM Main VAR {} END_VAR ; END_PROGRAM"
 BLOCK = "FUNCTION_BLOCK B VAR_INPUT {} END_VAR ; END_FUNCTION_BLOCK " + MAIN.format("b : B;")
-TASKS = (
-    "PROGRAM Main ; END_PROGRAM CONFIGURATION C RESOURCE R ON PLC {} PROGRAM P WITH T : Main; "
-    "END_RESOURCE END_CONFIGURATION"
-)
 EXIT = "FUNCTION_BLOCK E METHOD FB_Exit : BOOL ; END_METHOD ; END_FUNCTION_BLOCK "
 
 
@@ -84,11 +80,6 @@ EXIT = "FUNCTION_BLOCK E METHOD FB_Exit : BOOL ; END_METHOD ; END_FUNCTION_BLOCK
         (
             EXIT + MAIN.format("e : E;"), EXIT + MAIN.format("f : INT;"),
             "Main.e is removed, and its FB_Exit would not run",
-        ),
-        (
-            TASKS.format("TASK T(INTERVAL := T#10ms, PRIORITY := 1);"),
-            TASKS.format("TASK T(INTERVAL := T#20ms, PRIORITY := 1);"),
-            "task T has another interval: 10000, now 20000",
         ),
     ],
 )  # fmt: skip

@@ -828,6 +828,9 @@ void IecCycleSetCode(const CDL_TASK *records, RTS_UI32 count, RTS_UI32 kept, con
             create(&tasks.list[i], &records[i], prototype);
     }
     tasks.count = count;
+#if TASK_LOAD
+    SysAtomicStore(&tasks.starts, tasks.starts + 1); /* what is known of the load may be that of other tasks */
+#endif
     IecCycleFindPhases();
 }
 #endif
