@@ -33,7 +33,7 @@
 #define LOG_TEXT_SIZE 48
 #define CYCLE_OWN_PHASES 1
 #define IO_MAX_CONNECTORS 4
-#define APP_INPUT_SIZE 256
+#define APP_INPUT_SIZE 512
 #define APP_OUTPUT_SIZE 256
 
 /* What 1010h and LSS store: two files, and one that is written. */
