@@ -60,6 +60,16 @@ def test_two_devices_are_refused(tmp_path: Path) -> None:
         compiled(tmp_path, write=WRITE + '[[canopen_device]]\nname = "Second"\nnode = 10\n')
 
 
+@pytest.mark.parametrize(("network", "is_taken"), [(0, True), (1, False)])
+def test_number_of_the_manager_on_the_same_network_is_refused(tmp_path: Path, network: int, is_taken: bool) -> None:
+    manager = f'[[canopen]]\nname = "Bus"\nnetwork = {network}\nnode = 9\n'
+    if is_taken:
+        with pytest.raises(CompileError, match="has the node number 9, too"):
+            compiled(tmp_path, write=WRITE + manager)
+    else:
+        assert compiled(tmp_path, write=WRITE + manager)
+
+
 def test_fifth_pdo_needs_an_identifier(tmp_path: Path) -> None:
     pdos = ", ".join(['{ objects = ["2104"] }'] * 3)
     with pytest.raises(CompileError, match="only 4 PDOs have an identifier by the node; give it a cob"):

@@ -131,11 +131,12 @@ class Connector:
 @dataclass
 class Context:
     """What kinds share. `device`: what the vendor says of the board, None if nothing. `lines`: where each line of the
-    board that is in use was named."""
+    board that is in use was named. `nodes`: who has a node number, by the number of a CANopen network."""
 
     mistakes: Mistakes
     device: DeviceFile | None = None
     lines: dict[str, Pos] = field(default_factory=dict)
+    nodes: dict[int, dict[int, str]] = field(default_factory=dict)
 
 
 @dataclass

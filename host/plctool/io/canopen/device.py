@@ -25,7 +25,7 @@ from plctool.files import Pos
 from plctool.iec.types import BYTE, UDINT, ArrayType, Elementary, StringType, SubrangeType, Type, base_of
 from plctool.io.canopen.data_types import DATA_TYPES, UNSIGNED8, UNSIGNED32, VISIBLE_STRING, DataType, type_named
 from plctool.io.canopen.eds import MAX_PDO_BITS
-from plctool.io.canopen.manager import MAX_NODE
+from plctool.io.canopen.manager import MAX_NODE, take_number
 from plctool.io.channels import channel_of
 from plctool.io.common import read_connector
 from plctool.io.mistakes import Mistakes
@@ -272,6 +272,7 @@ def read_canopen_device(table: Table, context: Context) -> list[Connector]:
     made.takes = "the CANopen device of this PLC"
     lss = table.flag("lss")
     made.node = table.number("node", 1, MAX_NODE, required=None if lss else 9) or 0
+    take_number(table, context.nodes.setdefault(network, {}), made.node, f"this PLC as {made.name}")
     heartbeat = table.duration_us("heartbeat", *_DURATION_US) or 0
     flags = int(lib.CANOPEN_DEVICE_STORE) * table.flag("store", True) | int(lib.CANOPEN_DEVICE_LSS) * lss
     for number, value, name in (

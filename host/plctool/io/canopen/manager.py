@@ -109,8 +109,8 @@ def read_canopen(table: Table, context: Context) -> list[Connector]:
         line.parameters.append(Parameter(int(number), UDINT, value, name))
     for number, event, name in sync.events(line.name):
         line.parameters.append(Parameter(number, StringType(len(event)), event, name))
-    if line.node:
-        line.nodes[line.node] = "this PLC"
+    line.nodes = context.nodes.setdefault(network, line.nodes)
+    take_number(table, line.nodes, line.node, "this PLC")
     return [line, *each(table.tables("device"), lambda inner: _read_device(inner, line))]
 
 
@@ -187,10 +187,15 @@ def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
 
 def _read_number(made: CanopenDevice, table: Table, line: CanopenLine) -> None:
     made.node = table.number("node", 1, MAX_NODE, required=5) or 0
-    if made.node in line.nodes:
-        table.error(f"{line.nodes[made.node]} has the node number {made.node}, too", "node")
-    elif made.node:
-        line.nodes[made.node] = made.name
+    take_number(table, line.nodes, made.node, made.name)
+
+
+def take_number(table: Table, nodes: dict[int, str], number: int, name: str) -> None:
+    """Gives a node its number, 0 for none; an error if another one of the network has it. `nodes`: who has which."""
+    if number in nodes:
+        table.error(f"{nodes[number]} has the node number {number}, too", "node")
+    elif number:
+        nodes[number] = name
 
 
 @dataclass
