@@ -29,7 +29,8 @@ _ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted(path for path in (_ROOT / "examples").iterdir() if any(path.rglob("*.st")))
 SYSTEMS = [_ROOT / "tests/corpus" / system for system in ("codesys", "openplc", "twincat")]
 CORPUS = [path for system in SYSTEMS for path in sorted(system.iterdir())]
-RUNNING = share([path for path in PROGRAMS if runs(read_script(path))], 4)
+ALL_RUNNING = [path for path in PROGRAMS if runs(read_script(path))]
+RUNNING = share(ALL_RUNNING, 4)
 OPTIONS = Options(find_target(DEFAULT_TARGET), 0, parse_checks("all"))
 PLAIN = re.compile(r'<data name="[^"]*interfaceasplaintext".*?</data>', re.DOTALL)
 ASKS_FOR_ITS_PLACE = "__POSITION"  # of which the place in the XML is another one
@@ -112,5 +113,6 @@ def test_globals_of_a_file_with_units_keep_their_names(tmp_path: Path) -> None:
 
 
 def test_few_programs_are_kept_as_text() -> None:
-    kept = [path for path in RUNNING if "SourceText" in exported_program(path).text]
-    assert 0 < len(kept) < len(RUNNING) // 25
+    """Of all of them: those of a share may be many by chance."""
+    kept = [path for path in ALL_RUNNING if "SourceText" in exported_program(path).text]
+    assert 0 < len(kept) < len(ALL_RUNNING) // 30
