@@ -13,7 +13,7 @@
 /* Reads an object into `data`, which has room for CANOPEN_DEVICE_SDO bytes. */
 RTS_UI32 CanopenAccessRead(CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object, RTS_UI8 *data, RTS_UI32 *size);
 
-/* Checks whether an object can be written, of so many bytes. */
+/* Checks a write of `size` bytes to an object, before it is done. */
 RTS_UI32 CanopenAccessCheck(const CANOPEN_OBJECT *object, RTS_UI32 size);
 
 RTS_UI32 CanopenAccessWrite(CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object, const RTS_UI8 *data, RTS_UI32 size,

@@ -33,7 +33,7 @@ void CanopenDeviceReport(CANOPEN_SLAVE *slave, CANOPEN_ERROR error, RTS_UI16 cod
 /* The bus has gone off, or is back. */
 void CanopenDeviceNoteBus(CANOPEN_SLAVE *slave, bool off, RTS_UI32 now_ms);
 
-/* How long it is until it has something to do without a frame [ms]; UINT32_MAX: never. */
+/* Returns the time until the next call is due even if no frame arrives [ms]; UINT32_MAX: none. */
 RTS_UI32 CanopenDeviceGetWaitMs(const CANOPEN_SLAVE *slave, RTS_UI32 now_ms);
 
 #endif

@@ -33,7 +33,7 @@ enum {
 /* CANOPEN_LIVE: what `place` is. */
 enum { LIVE_REGISTER, LIVE_HISTORY, LIVE_STORE, LIVE_RESTORE, LIVE_SERIAL, LIVE_PDO, LIVE_MAPPING };
 
-/* What 1010h stores of communication. */
+/* The settings of communication that 1010h:02 stores. */
 typedef struct {
     RTS_UI32 sync_cob;
     RTS_UI32 emcy_cob;

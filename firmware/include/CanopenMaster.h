@@ -122,7 +122,7 @@ bool CanopenNodeIsAsked(const CANOPEN_NODE *node);
 /* True if its heartbeat or guarding reply is not late. */
 bool CanopenNodeIsHeard(const CANOPEN_NODE *node, RTS_UI32 now_ms);
 
-/* How long it is until it has something to do without a frame [ms]; UINT32_MAX: never. */
+/* Returns the time until the next call is due even if no frame arrives [ms]; UINT32_MAX: none. */
 RTS_UI32 CanopenNodeGetWaitMs(const CANOPEN_NODE *node, RTS_UI32 now_ms);
 
 /* Sends a command to a node; false: no room. */

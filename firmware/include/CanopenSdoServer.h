@@ -21,7 +21,7 @@ void SdoServerPoll(CANOPEN_SLAVE *slave, RTS_UI32 now_ms);
 /* Ends a transfer without a word: the device leaves the state in which it serves. */
 void SdoServerReset(CANOPEN_SLAVE *slave);
 
-/* How long it is until it has something to do without a request [ms]; UINT32_MAX: never. */
+/* Returns the time until the next call is due [ms], for a reply that waits or a time-out; UINT32_MAX: none. */
 RTS_UI32 SdoServerGetWaitMs(const CANOPEN_SLAVE *slave, RTS_UI32 now_ms);
 
 #endif

@@ -27,7 +27,7 @@ RTS_RESULT CanopenStoreSave(const CANOPEN_SLAVE *slave, RTS_UI32 parts);
 /* From now on a part is not stored. Errors as above. */
 RTS_RESULT CanopenStoreForget(const CANOPEN_SLAVE *slave, RTS_UI32 parts);
 
-/* Puts a stored part back; what is not stored, or of another dictionary, stays as it is. */
+/* Restores a stored part. Objects that are not stored, or are of another dictionary, keep their values. */
 void CanopenStoreLoad(CANOPEN_SLAVE *slave, RTS_UI32 part);
 
 /* The node number that LSS has stored for this device, 0: none, CANOPEN_NO_NODE: it shall have none. */
