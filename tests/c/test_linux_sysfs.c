@@ -14,6 +14,7 @@
 #include "io_driver.h"
 
 #include <ftw.h>
+#include <poll.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -139,13 +140,14 @@ bool __wrap_SysfsWrite(const SYSFS_SETUP *setup, RTS_UI32 n, const char *folder,
     return __real_SysfsWrite(setup, n, folder, value);
 }
 
-/* The runtime waits for the threads only at its end. */
-int __real_pthread_clockjoin_np(pthread_t thread, void **result, clockid_t clock, const struct timespec *until);
-int __wrap_pthread_clockjoin_np(pthread_t thread, void **result, clockid_t clock, const struct timespec *until);
-int __wrap_pthread_clockjoin_np(pthread_t thread, void **result, clockid_t clock, const struct timespec *until)
+/* The runtime waits for the threads only at its end; they wait for each round. */
+int __real_poll(struct pollfd *files, nfds_t count, int ms);
+int __wrap_poll(struct pollfd *files, nfds_t count, int ms);
+int __wrap_poll(struct pollfd *files, nfds_t count, int ms)
 {
-    SysAtomicStore(&bus.is_slow, 0);
-    return __real_pthread_clockjoin_np(thread, result, clock, until);
+    if (gettid() == getpid())
+        SysAtomicStore(&bus.is_slow, 0);
+    return __real_poll(files, count, ms);
 }
 
 static RTS_UI32 bits_of(float number)

@@ -22,9 +22,10 @@
 
 #include <errno.h>
 #include <pthread.h>
-#include <semaphore.h>
+#include <poll.h>
 #include <string.h>
-#include <time.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
 enum { DEVICES = 8, TIMEOUT_MS = 3000, LAST_TRIES = 3 };
 
@@ -40,10 +41,11 @@ typedef struct {
     RTS_UI32 rounds_seen; /* by the cycle */
     RTS_UI32 errors_seen;
     RTS_UI32 heard_ms; /* when it last saw a round, good or bad */
-    RTS_UI32 is_awake; /* `wake` was posted */
+    RTS_UI32 is_awake; /* `wake` was sent */
     RTS_UI32 is_ending;
     RTS_UI32 has_thread;
-    sem_t wake;
+    int wake; /* events: to the thread, and that it has ended */
+    int ended;
     pthread_t thread;
     /* the thread's */
     SYSFS_SETUP work; /* changed within SysLock */
@@ -173,20 +175,17 @@ static void end_work(DEVICE *device)
         tries--;
 }
 
-static void sleep_or_wake(DEVICE *device, RTS_UI32 ms)
+/* Until an event was sent, or a time is over. */
+static bool await_event(int event, RTS_UI32 ms)
 {
-    struct timespec until;
+    struct pollfd wanted = {.fd = event, .events = POLLIN};
+    eventfd_t count;
+    int found;
 
-    (void)clock_gettime(CLOCK_MONOTONIC, &until);
-    until.tv_sec += ms / 1000;
-    until.tv_nsec += (long)(ms % 1000) * 1000000;
-    if (until.tv_nsec >= 1000000000) {
-        until.tv_sec++;
-        until.tv_nsec -= 1000000000;
-    }
-    while (sem_clockwait(&device->wake, CLOCK_MONOTONIC, &until) != 0 && errno == EINTR) {
-    }
-    SysAtomicStore(&device->is_awake, 0);
+    do
+        found = poll(&wanted, 1, (int)ms);
+    while (found < 0 && errno == EINTR);
+    return found > 0 && eventfd_read(event, &count) == 0;
 }
 
 static void *run(void *arg)
@@ -204,60 +203,71 @@ static void *run(void *arg)
         } else {
             if (device->work.count > 0)
                 do_round(device);
-            sleep_or_wake(device, device->work.count > 0 ? device->work.every_ms : 1000);
+            (void)await_event(device->wake, device->work.count > 0 ? device->work.every_ms : 1000);
+            SysAtomicStore(&device->is_awake, 0);
         }
     }
+    (void)eventfd_write(device->ended, 1);
     return NULL;
 }
 
 static void wake(DEVICE *device)
 {
     if (SysAtomicReplace(&device->is_awake, 0, 1))
-        (void)sem_post(&device->wake);
+        (void)eventfd_write(device->wake, 1);
+}
+
+static void close_events(DEVICE *device)
+{
+    if (device->wake >= 0)
+        (void)close(device->wake);
+    if (device->ended >= 0)
+        (void)close(device->ended);
 }
 
 static RTS_RESULT start_thread(DEVICE *device)
 {
     if (device->has_thread)
         return ERR_OK;
-    if (sem_init(&device->wake, 0, 0) != 0)
-        return ERR_FAILED;
-    device->has_thread = pthread_create(&device->thread, NULL, run, device) == 0;
+    device->wake = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    device->ended = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    device->has_thread =
+        device->wake >= 0 && device->ended >= 0 && pthread_create(&device->thread, NULL, run, device) == 0;
     if (device->has_thread)
         return ERR_OK;
-    (void)sem_destroy(&device->wake);
+    close_events(device);
     return ERR_FAILED;
 }
 
 /* One that hangs in the kernel is not waited for: the process ends. */
-static void await_end(DEVICE *device, const struct timespec *until)
+static void await_end(DEVICE *device, RTS_UI32 ms)
 {
-    if (pthread_clockjoin_np(device->thread, NULL, CLOCK_MONOTONIC, until) != 0) {
+    if (!await_event(device->ended, ms)) {
         (void)pthread_detach(device->thread);
         device->has_thread = 0;
         return;
     }
-    (void)sem_destroy(&device->wake);
+    (void)pthread_join(device->thread, NULL);
+    close_events(device);
     memset(device, 0, sizeof *device);
 }
 
 /* All at once: each writes its outputs, and as long as a device may take that is waited for. */
 static void end_threads(void)
 {
-    struct timespec until;
+    RTS_UI32 started_ms = SysTimeGetMs();
     DEVICE *device;
 
     for (device = devices; device < devices + DEVICES; device++) {
         if (!device->has_thread)
             continue;
         SysAtomicStore(&device->is_ending, 1);
-        (void)sem_post(&device->wake);
+        (void)eventfd_write(device->wake, 1);
     }
-    (void)clock_gettime(CLOCK_MONOTONIC, &until);
-    until.tv_sec += TIMEOUT_MS / 1000;
     for (device = devices; device < devices + DEVICES; device++) {
+        RTS_UI32 passed_ms = SysTimeGetMs() - started_ms;
         if (device->has_thread)
-            await_end(device, &until);
+            await_end(device, passed_ms < TIMEOUT_MS ? TIMEOUT_MS - passed_ms : 0);
     }
 }
 
