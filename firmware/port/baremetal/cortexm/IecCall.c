@@ -5,12 +5,12 @@
  */
 #include "rts_config.h"
 
+#define ARGUMENT __attribute__((unused)) /* in its register; a naked function has no statement that could use it */
+
 #ifdef __ARM_ARCH_6M__
-__attribute__((naked)) void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry)
+__attribute__((naked)) void IecCall(const IEC_CONTEXT *context ARGUMENT, RTS_UI32 argument ARGUMENT,
+                                    uintptr_t entry ARGUMENT)
 {
-    RTS_UNUSED(context);
-    RTS_UNUSED(argument);
-    RTS_UNUSED(entry);
     __asm__ volatile("push {r4, lr}\n\tmov r4, r9\n\tpush {r3, r4}\n\tldr r4, [r0, %0]\n\tmov r9, r4\n\t"
                      "blx r2\n\tpop {r3, r4}\n\tmov r9, r4\n\tpop {r4, pc}" ::"i"(offsetof(IEC_CONTEXT, imports)));
 }
@@ -25,11 +25,9 @@ __attribute__((naked)) void IecCall(const IEC_CONTEXT *context, RTS_UI32 argumen
 #define RETURN "pop {r9, pc}"
 #endif
 
-__attribute__((naked)) void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry)
+__attribute__((naked)) void IecCall(const IEC_CONTEXT *context ARGUMENT, RTS_UI32 argument ARGUMENT,
+                                    uintptr_t entry ARGUMENT)
 {
-    RTS_UNUSED(context);
-    RTS_UNUSED(argument);
-    RTS_UNUSED(entry);
     __asm__ volatile(PUSH_ENTRY "ldr r9, [r0, %0]\n\t"
                                 "blx r2\n\t" RETURN ::"i"(offsetof(IEC_CONTEXT, imports)));
 }
