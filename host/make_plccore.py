@@ -30,6 +30,7 @@ SHARED = [
     "CmpAppEmbedded.h",
     "CmpForce.h",
     "CmpOperationControl.h",
+    "AppByName.h",
     "AppReason.h",
     "CmpTraceMgr.h",
     "CmpAppBP.h",

@@ -12,7 +12,7 @@
 #include "SysStart.h"
 
 /* Code outside of tasks. */
-enum { APP_IN_INITIALISATION = -1, APP_IN_EVENT = -2 };
+enum { APP_IN_INITIALISATION = -1, APP_IN_EVENT = -2, APP_IN_CALL = -3 };
 
 /* The last exception; code RTSEXCPT_NOEXCEPTION when there is none. */
 typedef struct {

@@ -140,6 +140,7 @@ enum {
     CDL_BLOB_RETAIN = 2,  /* what is kept: CDL_KEPT, some with a CDL_KEPT_RUN, in ascending order of their hashes */
     CDL_BLOB_EVENTS = 3,  /* names of the external events tasks wait for, each with NUL; for readers of the image */
     CDL_BLOB_CHANGE = 4,  /* a CDL_CHANGE: it can take the place of another image while that runs */
+    CDL_BLOB_EXPORTS = 5, /* CDL_EXPORT, each with its name: what components in C find by name */
     CDL_BLOB_IMAGES = 16, /* CDL_IMAGE for inputs and outputs of each task; those it lacks work on the shared areas */
 };
 
@@ -258,6 +259,25 @@ typedef struct {
     RTS_UI8 reserved;
 } CDL_CHANGE_STEP;
 
+/*
+ * A function or variable of the program that components in C find by name (AppByName.h). NUL-terminated name and padding to
+ * a multiple of 4 follow. `signature`: the CRC-32 of the layout of the `size` bytes at `offset` of `area`: of the variable,
+ * or of the parameters and the result of the function, whose entry (an IEC_ENTRY) is at `entry` of the code.
+ */
+typedef struct {
+    RTS_UI32 signature;
+    RTS_UI32 entry; /* CDL_EXPORT_VARIABLE: a variable */
+    RTS_UI32 offset;
+    RTS_UI32 size;
+    RTS_UI32 area;
+} CDL_EXPORT;
+
+#ifdef RTS_CFFI
+static const RTS_UI32 CDL_EXPORT_VARIABLE;
+#else
+#define CDL_EXPORT_VARIABLE 0xFFFFFFFFu
+#endif
+
 /* Download flags (5.4), low word of CDL_HEADER.flags and of the download service. */
 enum {
     DLF_CONTINUEDOWNLOAD = 1,
@@ -292,6 +312,7 @@ RTS_STATIC_ASSERT(sizeof(CDL_KEPT) == 12, cdl_kept_is_12_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_KEPT_RUN) == 12, cdl_kept_run_is_12_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_IMAGE) == 8, cdl_image_is_8_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_CHANGE) == 16, cdl_change_is_16_bytes);
+RTS_STATIC_ASSERT(sizeof(CDL_EXPORT) == 20, cdl_export_is_20_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_CHANGE_STEP) == 16, cdl_change_step_is_16_bytes);
 #endif
 

@@ -64,6 +64,8 @@ typedef struct {
     RTS_UI32 image_count;                /* 0: no blob */
     IO_CONFIG_PLACE io;                  /* size 0: no blob */
     CDL_CHANGE change;                   /* base 0: no blob */
+    const void *exports;                 /* of CDL_BLOB_EXPORTS */
+    RTS_UI32 exports_size;               /* 0: no blob */
     const char *info[5];
     const void *more_info; /* after the strings and the date */
     RTS_UI32 more_info_size;
@@ -390,6 +392,8 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
         append_blob(image, CDL_BLOB_IMAGES, spec->images, spec->image_count * (RTS_UI32)sizeof(CDL_IMAGE));
     if (spec->io.size != 0)
         append_blob(image, CDL_BLOB_IO, &spec->io, sizeof spec->io);
+    if (spec->exports_size != 0)
+        append_blob(image, CDL_BLOB_EXPORTS, spec->exports, spec->exports_size);
     if (spec->change.base != 0)
         append_blob(image, CDL_BLOB_CHANGE, &spec->change, sizeof spec->change);
     h.blob = end_segment(image, h.blob.offset);

@@ -197,6 +197,28 @@ def test_a_driver_from_the_blank_one_has_a_device(product: Callable[[str], Path]
         assert plc.io_devices()[0].state == "ok"
 
 
+def test_a_component_calls_a_function_of_the_program(product: Callable[[str], Path]) -> None:
+    folder = product("full")
+    (source,), (component,) = blocks("c-functions.md", "tank.st"), blocks("c-functions.md", "AcmeTank.c")
+    (folder / "tank.st").write_text(source)
+    assert plctool(["export-itf", str(folder / "tank.st"), "-o", str(folder)]) == 0
+    (folder / "AcmeTank.c").write_text(component)
+    hook = "enum { CMPID_AcmeTank = 0x8006 };\nRTS_RESULT AcmeTank_Hook(CMP_HOOK hook);"
+    (folder / "AcmeTank.h").write_text(f'#include "CmpItf.h"\n{hook}\n')
+    merge(folder / "cmp_list.c", '#include "AcmeTank.h"\n#define PORT_COMPONENTS(X) X(AcmeTank)')
+    built = compile_text(source + program("VAR n : DINT; END_VAR", "n := n + 1;"), TARGET, folder)
+    failing = source.replace("level := INT_TO_REAL(raw)", "level := INT_TO_REAL(raw / (raw - 525))")
+    other = compile_text(failing + program("VAR n : DINT; END_VAR", "n := n + 1;"), TARGET, folder)
+    with Board(MACHINE, make(folder), folder) as board, Plc(Connection(board.line())) as plc:
+        plc.flash(built.path)
+        eventually(lambda: "The level is above the limit" in [entry.text for entry in plc.log()])
+        assert plc.read("level") == 52.5
+        plc.flash(other.path)
+        eventually(lambda: plc.status().exception is not None)
+        exception = plc.status().exception
+        assert exception is not None and (exception.name, str(exception.pou).upper()) == ("DIVIDEBYZERO", "MEASURED")
+
+
 LABEL = "[information]\nname = 'P'\n[information.properties]\nserial = 'A-17'\n"
 
 

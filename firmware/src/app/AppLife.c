@@ -103,6 +103,8 @@ static const char *place_of(RTS_I32 task)
 {
     if (IEC_EVENTS && task == APP_IN_EVENT)
         return "Event";
+    if (IEC_EVENTS && task == APP_IN_CALL)
+        return "Call from C";
     return task < 0 ? "Initialisation" : app.tables.tasks[task].name;
 }
 

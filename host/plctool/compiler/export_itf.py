@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from plctool.compiler.semantics.declarations.functions import interface_text
-from plctool.compiler.typed.nodes import Direction, Parameter, Pou, PouKind
+from plctool.compiler.typed.nodes import Direction, Export, Parameter, Pou, PouKind
 from plctool.errors import UsageError
 from plctool.iec.types import (
     MAX_ALIGN,
@@ -47,7 +47,8 @@ _WIDTH = 100  # columns of a prototype
 
 @dataclass(frozen=True)
 class Interface:
-    """What is written. `header_name`, `source_name`: file names; `functions`: text, signature and version of each."""
+    """What is written. `header_name`, `source_name`: file names; `source`: "" if no function is in C; `functions`:
+    text, signature and version of each."""
 
     header_name: str
     header: str
@@ -56,8 +57,9 @@ class Interface:
     functions: list[tuple[str, int, int]]
 
 
-def export_interface(library: str, functions: list[Pou]) -> Interface:
-    """The C side of a library. `library`: its name; `functions`: those with an `external` part.
+def export_interface(library: str, functions: list[Pou], exports: Sequence[Export] = ()) -> Interface:
+    """The C side of a library. `library`: its name; `functions`: those with an `external` part; `exports`: what C calls
+    and uses.
 
     Raises UsageError when something has no name in C.
     """
@@ -72,8 +74,8 @@ def export_interface(library: str, functions: list[Pou]) -> Interface:
         assert pou.external is not None
         details.append((interface_text(pou.external.name, pou), pou.external.signature, pou.external.version))
     header_name, source_name = f"{name}Itf.h", f"{name}.c"
-    source = _source(name, header_name, functions)
-    return Interface(header_name, _header(name, functions), source_name, source, details)
+    source = _source(name, header_name, functions) if functions else ""
+    return Interface(header_name, _header(name, functions, exports), source_name, source, details)
 
 
 def _external(pou: Pou) -> str:
@@ -84,24 +86,26 @@ def _external(pou: Pou) -> str:
 # ---- the header ------------------------------------------------------------------------------------------------------
 
 
-def _header(name: str, functions: list[Pou]) -> str:
+def _header(name: str, functions: list[Pou], exports: Sequence[Export]) -> str:
     guard = f"{name.upper()}ITF_H"
+    what = f"the functions of the library {name} that are implemented in C"
     lines = [
         "/*",
-        f" * {name}Itf.h - the functions of the library {name} that are implemented in C.",
+        f" * {name}Itf.h - {what if functions else f'what the program {name} offers to components in C'}.",
         " *",
         " * Written by 'plctool export-itf': do not change it, export it again.",
         " */",
         f"#ifndef {guard}",
         f"#define {guard}",
         "",
+        *(['#include "AppByName.h"'] if exports else []),
         '#include "CmpItf.h"',
         '#include "rts_config.h"',
         "",
         "/* The number of the component in log entries; any that no other component has. */",
         f"enum {{ CMPID_{name} = 0x{0x8000 | zlib.crc32(name.encode()) & 0x7FFF:04X} }};",
     ]
-    types = _named_types(functions)
+    types = _named_types([*_types_of(functions), *_types_used(exports)])
     if any(isinstance(t, StructType) for t in types):
         lines.append("")
     lines += [f"typedef {_struct_word(t)} {_type_name(t)} {_type_name(t)};" for t in types if isinstance(t, StructType)]
@@ -114,14 +118,55 @@ def _header(name: str, functions: list[Pou]) -> str:
         lines += [f"/* {text}, version {version_text(pou.external.version)} */", f"{_prototype(pou)};"]
     for pou in functions:
         lines += ["", *_wrapper(pou)] if pou.instance is not None else []
-    lines += ["", "/* They have all rights of the runtime, also where the program that calls them has not. */"]
+    lines += [*(_table_lines(name, functions) if functions else []), *_export_lines(exports)]
+    return "\n".join([*lines, "", "#endif", ""])
+
+
+def _table_lines(name: str, functions: list[Pou]) -> list[str]:
+    lines = ["", "/* They have all rights of the runtime, also where the program that calls them has not. */"]
     lines += [f"APP_GATE({_called(pou)});" for pou in functions]
     lines += ["", "/* The entries of the table for CMRegisterExternal: name, signature, version, function. */"]
     entries = [_entry(pou) for pou in functions]
     lines.append(f"#define {name.upper()}_EXT_FUNCTIONS \\")
-    lines += [f"    {entry}, \\" for entry in entries[:-1]] + [f"    {entry}" for entry in entries[-1:]]
-    lines += ["", "#endif", ""]
-    return "\n".join(lines)
+    return lines + [f"    {entry}, \\" for entry in entries[:-1]] + [f"    {entry}" for entry in entries[-1:]]
+
+
+# ---- what C calls and uses ----
+
+
+def _export_lines(exports: Sequence[Export]) -> Iterator[str]:
+    """The name and signature of each for AppFindFunctionByName and AppFindVariableByName, and its structure or type."""
+    done: set[str] = set()
+    for export in exports:
+        word = "_".join(_NAME.findall(export.name.replace("[", "_").lower()))
+        yield from ("", f"/* {'variable' if export.caller is None else 'function'} {export.name} */")
+        values = None if export.variable is None else _type_of_values(export)
+        if export.caller is None:
+            assert values is not None
+            yield f"typedef {_field(values, f'{word}_value')};"
+        elif isinstance(values, StructType) and values.name not in done:
+            done.add(values.name)
+            yield f"typedef struct {values.name} {values.name};"
+            yield from _type_lines(values)
+        yield f'#define {word.upper()}_NAME "{export.name}"'
+        yield f"#define {word.upper()}_SIGNATURE 0x{export.signature:08X}u"
+
+
+def _types_used(exports: Sequence[Export]) -> Iterator[Type]:
+    """The types of variables, parameters and results."""
+    for export in exports:
+        if export.variable is not None:
+            t = export.variable.type
+            yield from (f.type for f in t.fields) if export.caller is not None and isinstance(t, StructType) else (t,)
+
+
+def _type_of_values(export: Export) -> Type:
+    """The type of a variable; the structure of a function by the name that it has in C."""
+    assert export.variable is not None
+    t = export.variable.type
+    if export.caller is None or not isinstance(t, StructType):
+        return t
+    return replace(t, name="_".join((*_NAME.findall(t.name.rpartition(" ")[2].lower()), "call")))
 
 
 def _entry(pou: Pou) -> str:
@@ -301,8 +346,18 @@ def _is_named(t: EnumType | StructType) -> bool:
     return _NAME.fullmatch(_type_name(t)) is not None
 
 
-def _named_types(functions: list[Pou]) -> list[EnumType | StructType]:
-    """The enums and structs the functions need, each after what it consists of."""
+def _types_of(functions: list[Pou]) -> Iterator[Type]:
+    for pou in functions:
+        if pou.instance is not None:
+            yield pou.instance
+        for parameter in pou.parameters if pou.kind is not PouKind.FUNCTION_BLOCK else []:
+            yield parameter.variable.type
+        if pou.result is not None:
+            yield pou.result.type
+
+
+def _named_types(types: Iterable[Type]) -> list[EnumType | StructType]:
+    """The enums and structs that are needed, each after what it consists of."""
     found: dict[EnumType | StructType, None] = {}
     pointed: list[Type] = []  # which are declared, but need not be complete before
 
@@ -318,13 +373,8 @@ def _named_types(functions: list[Pou]) -> list[EnumType | StructType]:
                 add(f.type)
             found[t] = None
 
-    for pou in functions:
-        if pou.instance is not None:
-            add(pou.instance)
-        for parameter in pou.parameters if pou.kind is not PouKind.FUNCTION_BLOCK else []:
-            add(parameter.variable.type)
-        if pou.result is not None:
-            add(pou.result.type)
+    for needed in types:
+        add(needed)
     while pointed:
         add(pointed.pop())
     enums = [t for t in found if isinstance(t, EnumType)]

@@ -346,6 +346,7 @@ def place(checked: Checked) -> Placed:
         startup_of_new=program.startup_of_new,
         shutdown=program.shutdown,
         events=checked.application.events,
+        exports=checked.application.exports,
         aliases=world.names.aliases(),
         accesses=program.config.accesses(),
         constants=world.constants,

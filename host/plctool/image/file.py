@@ -43,6 +43,7 @@ _NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 ELF_TAG = b"\x7fELF"
 TAG = int(lib.CDL_HEADER_TAG).to_bytes(4, "little")
 _BLOB_IO = int(lib.CDL_BLOB_IO)
+_VARIABLE = int(lib.CDL_EXPORT_VARIABLE)
 _NO_INIT = int(lib.CDL_CHANGE_NO_INIT)
 
 
@@ -122,6 +123,19 @@ class ImageEvent:
 
 
 @dataclass(frozen=True)
+class ImageExport:
+    """A function or variable that components in C find by name. `offset` in `area` and `size` [bytes]: of the variable,
+    or of the parameters and result of the function; `entry`: code offset to call, None for a variable."""
+
+    name: str
+    signature: int
+    area: int
+    offset: int
+    size: int
+    entry: int | None = None
+
+
+@dataclass(frozen=True)
 class KeptVariable:
     """A variable that is kept, or the elements of an array (`is_run`), `stride` bytes apart. `hash`: of its name and
     type; `offset` in the retain area and `size` of one element [bytes]; `first`: index of the first element in the
@@ -184,6 +198,7 @@ class Image:
     compiler_version: int = COMPILER_VERSION
     flags: int = 0
     events: list[ImageEvent] = field(default_factory=list)
+    exports: list[ImageExport] = field(default_factory=list)
     kept: list[KeptVariable] = field(default_factory=list)
     io: tuple[int, int] | None = None
     change: ImageChange | None = None
@@ -302,6 +317,8 @@ def _blobs(image: Image) -> Iterator[bytes]:
         yield _blob(lib.CDL_BLOB_EVENTS, events)
     if image.kept:
         yield _blob(lib.CDL_BLOB_RETAIN, b"".join(map(_kept_entry, image.kept)))
+    if image.exports:
+        yield _blob(lib.CDL_BLOB_EXPORTS, b"".join(map(_export_entry, image.exports)))
     if image.io is not None:
         offset, size = image.io
         yield _blob(_BLOB_IO, _pack("IO_CONFIG_PLACE", {"offset": offset, "size": size}))
@@ -309,6 +326,17 @@ def _blobs(image: Image) -> Iterator[bytes]:
         yield _blob(lib.CDL_BLOB_CHANGE, _change_entry(image.change))
     if any(task.parts != NO_PARTS for task in image.tasks):
         yield _blob(lib.CDL_BLOB_IMAGES, b"".join(_part_entry(part) for task in image.tasks for part in task.parts))
+
+
+def _export_entry(export: ImageExport) -> bytes:
+    values = {
+        "signature": export.signature,
+        "entry": _VARIABLE if export.entry is None else export.entry,
+        "offset": export.offset,
+        "size": export.size,
+        "area": export.area,
+    }
+    return _padded(_pack("CDL_EXPORT", values) + export.name.encode("ascii") + b"\0")
 
 
 def _change_entry(change: ImageChange) -> bytes:
@@ -419,6 +447,7 @@ def parse_image(data: bytes) -> Image:
         device_version=int(header.device_version),
         compiler_version=int(header.compiler_version),
         flags=int(header.flags),
+        exports=list(_parse_exports(blobs.get(int(lib.CDL_BLOB_EXPORTS), b""))),
         kept=list(_parse_kept(blobs.get(int(lib.CDL_BLOB_RETAIN), b""))),
         io=_parse_io(blobs.get(_BLOB_IO, b""), len(code)),
         change=_parse_change(blobs.get(int(lib.CDL_BLOB_CHANGE), b""), code),
@@ -547,6 +576,21 @@ def _parse_events(data: bytes, code_size: int) -> Iterator[ImageEvent]:
             raise _refuse(f"its function {name} is outside the code")
         if entry.identifier:
             yield ImageEvent(int(entry.identifier), name, int(entry.offset))
+        at = end + 1 + -(end + 1) % 4
+
+
+def _parse_exports(data: bytes) -> Iterator[ImageExport]:
+    size, at = ffi.sizeof("CDL_EXPORT"), 0
+    while at < len(data):
+        end = data.find(b"\0", at + size, at + size + _MAX_NAME)
+        if end < 0:
+            raise _refuse("its table of exported functions is cut off")
+        (entry,) = _entries("CDL_EXPORT", data[at : at + size], "table of exported functions")
+        name, where = (
+            data[at + size : end].decode("ascii", "replace"),
+            None if entry.entry == _VARIABLE else int(entry.entry),
+        )
+        yield ImageExport(name, int(entry.signature), int(entry.area), int(entry.offset), int(entry.size), where)
         at = end + 1 + -(end + 1) % 4
 
 
@@ -734,6 +778,10 @@ def describe_image(data: bytes) -> dict[str, Any]:
                 "entry": t.entry,
             }
             for t in image.tasks
+        ],
+        "exports": [
+            {"name": e.name, "kind": "variable" if e.entry is None else "function", "signature": f"{e.signature:08X}"}
+            for e in image.exports
         ],
         "events": [{"event": event_name(e.event), "function": e.name, "entry": e.entry} for e in image.events],
     }

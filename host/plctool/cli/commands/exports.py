@@ -110,9 +110,10 @@ def _export_itf(args: argparse.Namespace) -> int:
 
 
 def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
-    """Writes the C header of the functions that are implemented in C, and a C file to fill in, unless there is one.
+    """Writes the C header of the functions that are implemented in C and of what C calls and uses, and a C file for the
+    former to fill in, unless there is one.
 
-    Raises CompileError when the sources have errors, UsageError when no function is implemented in C.
+    Raises CompileError when the sources have errors, UsageError when there is nothing of either.
     """
     from plctool.compiler import CompileError, io_sources, library_sources
     from plctool.compiler.base.internal import bugs_reported
@@ -130,15 +131,17 @@ def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
         checked = check_sources(sources, io=io, libraries=libraries, dialect=dialect, information=files.information)
     if checked.program is None:
         raise CompileError(checked.diagnostics, [*sources, *io_sources(io), *library_sources(libraries)])
-    functions = checked.program.externals
-    if not functions:
+    functions, exports = checked.program.externals, checked.program.exports
+    if not functions and not exports:
         raise UsageError(
-            "No function is implemented in C; mark those that are by {attribute 'external' := 'name'}.", "no-external"
+            "No function is implemented in C; mark those that are by {attribute 'external' := 'name'}, and what C "
+            "calls or uses by {attribute 'from_c'}.",
+            "no-external",
         )
     named = files.sources[0] if files.project is None else files.project.file.parent
-    interface = interface_of(named.resolve().stem, functions)
+    interface = interface_of(named.resolve().stem, functions, exports)
     header, source = folder / interface.header_name, folder / interface.source_name
-    written = force or not source.exists()
+    written = bool(functions) and (force or not source.exists())
     for file in (header, source) if written else (header,):
         check_not_read(file, files.every_file(), "-o interface, a folder for it")
         check_no_way_out(file, folder, "-o interface, a folder for it")
@@ -148,20 +151,24 @@ def export_interface(settings: Settings, folder: Path, force: bool) -> Document:
         write_atomically(source, interface.source.encode("latin-1", "replace"))
     return {
         "header": str(header),
-        "source": str(source),
+        "source": str(source) if functions else "",
         "source_written": written,
         "functions": [
             {"interface": text, "signature": f"{signature:08X}", "version": version_text(version)}
             for text, signature, version in interface.functions
         ],
+        "exports": [{"name": export.name, "signature": f"{export.signature:08X}"} for export in exports],
     }
 
 
 def interface_text(document: dict[str, Any]) -> str:
-    """The functions of a C interface, and the files."""
-    kept = "" if document["source_written"] else " (kept as it is; --force replaces it)"
-    functions = table(document["functions"], document["functions"][0])
-    return f"{functions}\n{document['header']}\n{document['source']}{kept}"
+    """The functions of a C interface, what C calls and uses, and the files."""
+    lines = [table(rows, rows[0]) for rows in (document["functions"], document["exports"]) if rows]
+    lines.append(document["header"])
+    if document["source"]:
+        kept = "" if document["source_written"] else " (kept as it is; --force replaces it)"
+        lines.append(f"{document['source']}{kept}")
+    return "\n".join(lines)
 
 
 def export_m4(files: list[Path], folder: Path) -> Document:

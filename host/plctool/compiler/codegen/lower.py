@@ -47,14 +47,16 @@ CHANGE_INIT = "change_init"
 class Lowered:
     """LLVM IR, in parts, and what an image of it needs. `tasks`: entry symbols in the order of the program's tasks;
     `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `events`: those of the program's events, in their
-    order; `change_init`: what it calls at an online change, empty if nothing; `pous`: by symbol, all that are part of
-    it; `imports`: in the order of their slots; `bounds`: what is checked; `transient`: variables of blocks that are not
-    kept in memory; `passed_lines`: by the numbers in the trail of an exception, from 1."""
+    order; `exports`: the same of what components in C call, empty for a variable; `change_init`: what it calls at an
+    online change, empty if nothing; `pous`: by symbol, all that are part of it; `imports`: in the order of their slots;
+    `bounds`: what is checked; `transient`: variables of blocks that are not kept in memory; `passed_lines`: by the
+    numbers in the trail of an exception, from 1."""
 
     parts: list[Part]
     tasks: list[str]
     functions: dict[int, str]
     events: list[str]
+    exports: list[str]
     pous: dict[str, Pou]
     imports: list[External]
     bounds: list[BoundsCheck]
@@ -65,7 +67,8 @@ class Lowered:
     @property
     def entries(self) -> list[str]:
         """All that the runtime calls."""
-        return [*self.tasks, *self.functions.values(), *self.events, *([self.change_init] if self.change_init else [])]
+        others = [*filter(None, self.exports), *([self.change_init] if self.change_init else [])]
+        return [*self.tasks, *self.functions.values(), *self.events, *others]
 
 
 def lower(program: TypedProgram, options: Options) -> Lowered:
@@ -88,6 +91,11 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     events = [f"event.{number}" for number in range(len(program.events))]
     for name, event in zip(events, program.events, strict=True):
         _entry_of(unit, name, event.pou)
+    exports = []
+    for number, export in enumerate(program.exports):
+        exports.append("" if export.caller is None else f"export.{number}")
+        if export.caller is not None:
+            _entry_of(unit, exports[-1], export.caller)
     effects = Effects()
     done = chosen = 0
     while done < len(unit.pous) or chosen < len(unit.dispatchers):
@@ -122,6 +130,7 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
         tasks,
         functions,
         events,
+        exports,
         pous,
         unit.imports,
         bounds,

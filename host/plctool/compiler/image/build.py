@@ -19,7 +19,17 @@ from plctool.compiler.image.online_change import Steps, check_facts, constants_o
 from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.compiler.syntax.library import is_standard
 from plctool.compiler.typed.kept import kept_parts, kept_variables
-from plctool.compiler.typed.nodes import Direction, External, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
+from plctool.compiler.typed.nodes import (
+    Direction,
+    Export,
+    External,
+    Pou,
+    PouKind,
+    ScalarInit,
+    Task,
+    TaskPart,
+    TypedProgram,
+)
 from plctool.compiler.typed.online_change import OnlineChange
 from plctool.core import lib
 from plctool.debug.frames import INSTANCE
@@ -31,11 +41,13 @@ from plctool.iec.types import CLASS_NUMBER, Type, base_of
 from plctool.iec.values import encode
 from plctool.image.c_functions import find_c_function
 from plctool.image.file import (
+    NO_AREA,
     ApplicationInfo,
     ExternalFunction,
     Image,
     ImageChange,
     ImageEvent,
+    ImageExport,
     ImagePart,
     ImageTask,
     build_image,
@@ -138,6 +150,10 @@ def _build(
             ImageEvent(event.event, event.name, _entry(linked, name, target))
             for event, name in zip(program.events, lowered.events, strict=True)
         ],
+        exports=[
+            _export(export, _entry(linked, name, target) if name else None)
+            for export, name in zip(program.exports, lowered.exports, strict=True)
+        ],
         kept=kept_variables(kept),
         io=io,
         change=changes,
@@ -148,6 +164,14 @@ def _build(
     needs = _needs(program, lowered, linked, image, len(built), sizes, options)
     symbols.stack = needs["stack"]
     return BuildResult(built, symbols, sizes, needs, change=change)
+
+
+def _export(export: Export, entry: int | None) -> ImageExport:
+    variable = export.variable
+    area, offset, size = (
+        (NO_AREA, 0, 0) if variable is None else (variable.area.value, variable.offset, variable.type.size)
+    )
+    return ImageExport(export.name, export.signature, area, offset, size, entry)
 
 
 def _image_change(

@@ -89,7 +89,8 @@ def plan_images(program: TypedProgram, diagnostics: Diagnostics) -> None:
 
 def _outside_of_tasks(program: TypedProgram) -> list[Pou]:
     startups = [pou for pou in (program.startup, program.startup_of_new) if pou is not None]
-    return [*startups, *(function.pou for function in program.events)]
+    callers = [export.caller for export in program.exports if export.caller is not None]
+    return [*startups, *(function.pou for function in program.events), *callers]
 
 
 def task_ranges(program: TypedProgram) -> list[dict[Area, set[tuple[int, int]]]]:

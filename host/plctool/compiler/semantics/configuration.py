@@ -21,6 +21,7 @@ from plctool.compiler.typed.nodes import (
     BitPlace,
     Direction,
     EventFunction,
+    Export,
     Load,
     MemberPlace,
     Place,
@@ -194,6 +195,7 @@ class Application:
 
     tasks: list[Task] = field(default_factory=list)
     events: list[EventFunction] = field(default_factory=list)
+    exports: list[Export] = field(default_factory=list)
     of_tests: bool = False
 
 

@@ -10,6 +10,7 @@ from typing import Protocol
 from plctool.compiler.base.source import Source
 from plctool.compiler.semantics.configuration import Application, configure
 from plctool.compiler.semantics.event_functions import declare_event_functions
+from plctool.compiler.semantics.exports_to_c import declare_called_programs, declare_exports
 from plctool.compiler.semantics.program import Program
 from plctool.compiler.syntax import ast
 
@@ -56,8 +57,10 @@ class _DeviceTasks(Participant):
         world = self._program.world
         self._application = configure(world, self._program.config)
         self._application.events = declare_event_functions(world)
+        declare_called_programs(world)
         return self._application
 
     def after_check(self) -> None:
         world = self._program.world
         world.io.check_tasks(self._application.tasks, world.diagnostics)
+        self._application.exports = declare_exports(world, self._program.programs.declared())

@@ -29,6 +29,7 @@ HEEDED: dict[str, frozenset[str]] = {
     "instance-path": frozenset(("variable",)),
     "external": frozenset(("FUNCTION", "FUNCTION_BLOCK")),
     "fault": frozenset(("TEST",)),
+    "from_c": frozenset(("FUNCTION", "METHOD", "PROGRAM", "variable")),
     "version": frozenset(("FUNCTION", "FUNCTION_BLOCK")),
     "shared_output": frozenset(("variable",)),
 }

@@ -52,6 +52,7 @@ class Variable:
     bit: int | None = None  # a BOOL at an address such as %IX0.3: the bit in the byte at `offset`
     bounds: list[tuple[Variable, Variable]] = field(default_factory=list)
     shared_output: bool = False  # several tasks are meant to write it
+    from_c: bool = False  # components in C use it by its name
 
 
 # ---- initial values ------------------------------------------------------------------------------------------------
@@ -697,6 +698,18 @@ class EventFunction:
     pou: Pou
 
 
+@dataclass(frozen=True)
+class Export:
+    """What components in C find by its name. `variable`: of the program; of a function that with its parameters and
+    result, None if it has neither. `caller`: calls the function; None for a variable."""
+
+    name: str
+    signature: int
+    pos: Pos
+    variable: Variable | None
+    caller: Pou | None = None
+
+
 @dataclass
 class TypedProgram:
     """A checked program. `globals` holds every AREA variable, program variables included (with dotted names Main.x)."""
@@ -716,6 +729,7 @@ class TypedProgram:
     startup_of_new: Pou | None = None  # the same of the variables that an online change adds
     shutdown: Pou | None = None  # what is called when the application ends, or its variables are initialised
     events: list[EventFunction] = field(default_factory=list)
+    exports: list[Export] = field(default_factory=list)
     externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not
     io: Description | None = None  # the inputs and outputs, each with its address
     may_recurse: bool = False  # a call may lead back to its caller, so that the depth of calls is not known

@@ -47,6 +47,7 @@ from plctool.compiler.typed.nodes import (
 from plctool.iec.types import (
     ArrayType,
     EnumType,
+    Field,
     OpenArrayType,
     ReferenceType,
     StringType,
@@ -226,6 +227,20 @@ def _signed_text(name: str, pou: Pou) -> str:
     return f"{name}({','.join(('&' + _layout(pou.instance), *types))}){result}"
 
 
+def layout_signature(t: Type) -> int:
+    """The signature of a variable that components in C use."""
+    return interface_signature(_layout(t))
+
+
+def call_signature(members: list[Field], size: int) -> int:
+    """The signature of a function that components in C call with a structure of its parameters and result."""
+    return interface_signature(f"CALL[{size}]{{{_members(members)}}}")
+
+
+def _members(fields: list[Field], *known: StructType) -> str:
+    return ",".join(f"{f.name.upper()}@{f.offset}:{_layout(f.type, *known)}" for f in fields)
+
+
 def _layout(t: Type, *known: StructType) -> str:
     """The name of a type, and where its members are unless it is one of those that are `known`."""
     if isinstance(t, ReferenceType):
@@ -236,8 +251,7 @@ def _layout(t: Type, *known: StructType) -> str:
         return f"{_interface_name(t)}={t.base.name}"
     if not isinstance(t, StructType) or t in known:
         return _NAMESPACE.sub("", t.name).upper()
-    members = (f"{f.name.upper()}@{f.offset}:{_layout(f.type, t, *known)}" for f in t.fields)
-    return f"{_interface_name(t)}[{t.size}]{{{','.join(members)}}}"
+    return f"{_interface_name(t)}[{t.size}]{{{_members(t.fields, t, *known)}}}"
 
 
 def _interface_name(t: Type) -> str:

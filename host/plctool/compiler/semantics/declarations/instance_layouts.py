@@ -294,6 +294,8 @@ class Programs:
                 if symbol.variable is None:
                     continue
                 symbol.variable.shared_output = "shared_output" in line.attributes
+                symbol.variable.from_c = "from_c" in line.attributes
+                symbol.used = symbol.used or symbol.variable.from_c
                 allocation.add(symbol.variable)
                 if direction is not None:
                     info.parameters.append((symbol, direction))

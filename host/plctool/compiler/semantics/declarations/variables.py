@@ -138,6 +138,7 @@ class Variables:
                 result.variable = self.area_variable(symbol.full_name, t, init, location, keep, scope, symbol.pos)
                 if result.variable is not None:
                     result.variable.shared_output = "shared_output" in symbol.decl.attributes
+                    result.variable.from_c = "from_c" in symbol.decl.attributes
                     self._world.allocation.add(result.variable)
         symbol.busy = False
         symbol.symbol = result
