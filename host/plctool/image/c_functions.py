@@ -63,7 +63,8 @@ _FUNCTIONS = {
         canopen_emcy_data(DINT):LWORD                           80   96""",
     "IecClock": """
         clock_get():LINT                                    32    48
-        clock_set(LINT):UDINT                               16    32""",
+        clock_set(LINT):UDINT                               16    32
+        clock_now():LINT                                    32    48""",
     "IecTaskCalls": """
         task_value(UDINT,UDINT):UDINT                      224   240
         task_name(UDINT,UDINT):LWORD                       192   192

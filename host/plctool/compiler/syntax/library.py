@@ -23,7 +23,7 @@ _OPENING = re.compile(
 )
 STAND_INS = (
     "Standard", "Standard64", "Util", "SysMem", "IBaseLibrary", "__System", "MEM", "CmpLog", "CmpIecTask", "CmpApp",
-    "SysTimeRtc", "SysFile", "SysDir", "StringUtils", "STU",
+    "SysTime", "SysTimeRtc", "SysFile", "SysDir", "StringUtils", "STU",
     "Tc2_Standard", "Tc2_System", "Tc2_Utilities",
 )  # fmt: skip
 """Libraries of other systems that this one stands in for, as far as it has their names."""
