@@ -31,6 +31,36 @@ IF close.xError THEN error := close.eError; END_IF
 END_PROGRAM
 """
 
+FUNCTIONS = """
+PROGRAM Main
+VAR
+    go, other : BOOL; handle, none, second, badLine : DWORD; echoed : UDINT; count : DWORD; data : ARRAY[0..99] OF BYTE;
+    settings : COMMSETTINGS := (dwBaudRate := 19200, byParity := 2, byStopBits := 2);
+    set, odd, closed, again : BOOL;
+END_VAR
+IF go AND handle = 0 THEN
+    none := SysComOpen(COM8);
+    handle := FwSysComOpen(COM1);
+    second := SysComOpen(COM1);
+    set := FwSysComSetSettings(handle, ADR(settings)) = 1;
+    settings.byStopBits := 1;
+    odd := SysComSetSettings(handle, ADR(settings));
+END_IF
+IF handle <> 0 THEN
+    count := SysComRead(handle, ADR(data), SIZEOF(data), 0);
+    IF count > 0 THEN
+        echoed := echoed + SysComWrite(handle, ADR(data), count, 0);
+    END_IF
+    IF other THEN
+        closed := SysComClose(handle);
+        again := SysComClose(handle);
+        other := FALSE;
+    END_IF
+END_IF
+END_PROGRAM
+"""
+"""With the functions of SysLibCom and FastwelSysLibCom."""
+
 
 class ProgramSerial:
     """Needs the fixture `plc`, with PROGRAM in it, whose serial port 1 leads to `talk`."""
@@ -71,3 +101,17 @@ class ProgramSerial:
 
     def wait_stopped(self, plc: Controller) -> None:
         """Lets main make a pass."""
+
+
+def check_functions(
+    plc: Controller, wait: Callable[[Callable[[], Any]], None], exchange: Callable[[bytes, int], bytes]
+) -> None:
+    """Runs FUNCTIONS, whose port 1 leads to `exchange`."""
+    plc.write({"Main.go": True})
+    wait(lambda: plc.read("Main.handle"))
+    assert plc.read("Main.second") == 0xFFFF_FFFF
+    assert plc.read("Main.set") and not plc.read("Main.odd")
+    assert exchange(b"hello", 5) == b"hello"
+    plc.write({"Main.other": True})
+    wait(lambda: plc.read("Main.closed"))
+    assert not plc.read("Main.again")

@@ -121,3 +121,101 @@ class ProgramSockets:
     def stopped(self, plc: Controller, port: int) -> None:
         """Checks, and lets main make a pass."""
         raise NotImplementedError
+
+
+STEPS = """
+PROGRAM Main
+VAR
+    server, client, peer, udp, got : DINT := -1; step : INT := -1; a : SOCKADDRESS; asize : DINT := 16; set :
+        SOCKET_FD_SET;
+    ok : ARRAY[0..19] OF BOOL; data : ARRAY[0..99] OF BYTE; text : STRING := 'hello'; from : SOCKADDRESS;
+        waiting : DINT; port : UINT;
+    name : STRING(20); ip : INADDR; value, size, err : DINT;
+END_VAR
+CASE step OF
+0:
+    server := SysSockCreate(SOCKET_AF_INET, SOCKET_STREAM, SOCKET_IPPROTO_TCP);
+    client := FwSysSockCreate(SOCKET_AF_INET, SOCKET_STREAM, 0);
+    a.sin_family := SOCKET_AF_INET;
+    a.sin_port := SysSockHtons(port);
+    ok[0] := SysSockBind(server, ADR(a), SIZEOF(a)) AND SysSockListen(server, 5);
+    ok[1] := SysSockAccept(server, 0, 0) = SOCKET_INVALID AND SysSockGetLastError() = SOCKET_EWOULDBLOCK;
+    a.sin_addr := SysSockInetAddr('127.0.0.1');
+    ok[2] := NOT SysSockConnect(client, ADR(a), SIZEOF(a)) AND SysSockGetLastError() = SOCKET_EWOULDBLOCK;
+    step := 1;
+1:
+    set.fd_count := 1;
+    set.fd_array[0] := client;
+    IF SysSockSelect(SOCKET_FD_SETSIZE, 0, ADR(set), 0, 0) = 1 THEN
+        peer := SysSockAccept(server, ADR(from), ADR(asize));
+        ok[3] := peer > 0 AND from.sin_addr = a.sin_addr;
+        ok[4] := SysSockRecv(peer, ADR(data), 100, 0) = -1 AND SysSockGetLastError() = SOCKET_EWOULDBLOCK;
+        ok[5] := SysSockSend(client, ADR(text), 5, 0) = 5;
+        step := 2;
+    END_IF
+2:
+    set.fd_count := 2;
+    set.fd_array[0] := server;
+    set.fd_array[1] := peer;
+    IF SysSockSelect(SOCKET_FD_SETSIZE, ADR(set), 0, 0, 0) = 1 THEN
+        ok[6] := set.fd_array[0] = peer AND set.fd_count = 1
+            AND SysSockIoctl(peer, SOCKET_FIONREAD, ADR(waiting)) = 0 AND waiting = 5;
+        ok[7] := SysSockRecv(peer, ADR(data), 100, 0) = 5 AND data[4] = 16#6F;
+        ok[8] := SysSockShutdown(client, SOCKET_SD_BOTH) AND SysSockSend(client, ADR(text), 5, 0) = -1
+            AND SysSockGetLastError() = SOCKET_ESHUTDOWN;
+        ok[9] := SysSockClose(client) AND NOT SysSockClose(client) AND SysSockGetLastError() = SOCKET_EBADF;
+        step := 3;
+    END_IF
+3:
+    got := FwSysSockRecv(peer, ADR(data), 100, 0);
+    IF got = 0 THEN
+        udp := SysSockCreate(SOCKET_AF_INET, SOCKET_DGRAM, SOCKET_IPPROTO_UDP);
+        ok[10] := SysSockBind(udp, ADR(a), SIZEOF(a));
+        client := SysSockCreate(SOCKET_AF_INET, SOCKET_DGRAM, SOCKET_IPPROTO_UDP);
+        ok[11] := SysSockSendTo(client, ADR(text), 5, 0, ADR(a), SIZEOF(a)) = 5;
+        step := 4;
+    END_IF
+4:
+    got := SysSockRecvFrom(udp, ADR(data), 100, 0, ADR(from), SIZEOF(from));
+    IF got = 5 THEN
+        ok[12] := from.sin_addr = a.sin_addr AND from.sin_port <> 0 AND data[0] = 16#68;
+        ok[13] := SysSockRecvFrom(udp, ADR(data), 100, 0, 0, 0) = -1 AND SysSockGetLastError() = SOCKET_EWOULDBLOCK;
+        ip.S_addr := SysSockInetAddr('10.1.2.33');
+        ok[14] := FwSysSockInetNtoa(ADR(ip), name, 20) AND name = '10.1.2.33'
+            AND NOT SysSockInetNtoa(ADR(ip), name, 9);
+        ok[15] := SysSockInetAddr('10.1.2') = 16#FFFFFFFF;
+        value := 1;
+        ok[16] := SysSockSetOption(udp, SOCKET_SOL, SOCKET_SO_BROADCAST, ADR(value), 4)
+            AND NOT SysSockSetOption(udp, SOCKET_SOL, SOCKET_SO_RCVBUF, ADR(value), 4)
+            AND SysSockGetLastError() = SOCKET_ENOPROTOOPT;
+        step := 5;
+        SysSockClose(server);
+        client := SysSockCreate(SOCKET_AF_INET, SOCKET_STREAM, 0);
+        SysSockConnect(client, ADR(a), SIZEOF(a));
+    END_IF
+5:
+    set.fd_count := 1;
+    set.fd_array[0] := client;
+    IF SysSockSelect(SOCKET_FD_SETSIZE, 0, 0, ADR(set), 0) = 1 THEN
+        size := 4;
+        ok[17] := SysSockGetOption(client, SOCKET_SOL, SOCKET_SO_ERROR, ADR(err), ADR(size))
+            AND err = SOCKET_ECONNRESET;
+        ok[18] := NOT SysSockBind(client, 0, 16) AND SysSockGetLastError() = SOCKET_EFAULT;
+        ok[19] := SysSockCreate(1, SOCKET_STREAM, 0) = -1 AND SysSockGetLastError() = SOCKET_EAFNOSUPPORT;
+        step := 6;
+    END_IF
+END_CASE
+END_PROGRAM
+"""
+"""With the functions of SysLibSockets and FastwelSysLibSockets: when `step` is 6, each of `ok` is TRUE."""
+
+
+def check_steps(plc: Controller, port: int, wait: Callable[[Callable[[], Any]], None]) -> None:
+    """Runs STEPS to its end."""
+    plc.write({"Main.port": port, "Main.step": 0})
+    wait(lambda: plc.read("Main.step") == 6)
+    assert [i for i, good in enumerate(plc.read("Main.ok")) if not good] == []
+    plc.stop()
+    plc.start()
+    plc.write({"Main.step": 4})  # a stop has closed all sockets
+    wait(lambda: plc.read("Main.got") == -1)

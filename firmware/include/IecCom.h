@@ -15,10 +15,11 @@
 
 /* Operations of a call. */
 enum {
-    IEC_COM_OPEN = 1,  /* handle: number of the port, from 1 on; value: baud | IEC_COM_*; the result is a handle */
-    IEC_COM_CLOSE = 2, /* handle */
-    IEC_COM_READ = 3,  /* handle, `value` most bytes; the result is how many there are */
-    IEC_COM_WRITE = 4, /* handle; the result is how many bytes of the data were taken */
+    IEC_COM_OPEN = 1,     /* handle: number of the port, from 1 on; value: baud | IEC_COM_*; the result is a handle */
+    IEC_COM_CLOSE = 2,    /* handle */
+    IEC_COM_READ = 3,     /* handle, `value` most bytes; the result is how many there are */
+    IEC_COM_WRITE = 4,    /* handle; the result is how many bytes of the data were taken */
+    IEC_COM_SETTINGS = 5, /* handle; value as of IEC_COM_OPEN; what has come before is lost */
 };
 
 /* In the upper bits of a baud rate. */

@@ -26,7 +26,20 @@ enum {
     IEC_SOCKET_STATE = 8,       /* handle; the result is 1 when the connection is there */
     IEC_SOCKET_READ = 9,        /* handle, `value` most bytes; the result is the size of the data */
     IEC_SOCKET_WRITE = 10,      /* handle; the result is how many bytes were taken */
+
+    /* In the steps of Berkeley sockets (stdlib/syslib_sockets.st); what is open then takes the operations above. */
+    IEC_SOCKET_CREATE = 11,   /* `value` IEC_SOCKET_STREAM or .._DATAGRAM; the result is a handle */
+    IEC_SOCKET_BIND = 12,     /* handle, own address; opens a socket for datagrams */
+    IEC_SOCKET_LISTEN = 13,   /* handle */
+    IEC_SOCKET_CONNECT = 14,  /* handle, address of the peer; IEC_SOCKET_STATE tells the end */
+    IEC_SOCKET_POLL = 15,     /* handle; the result is SYSNET_READABLE .., IEC_SOCKET_WAITING in front of it */
+    IEC_SOCKET_SHUTDOWN = 16, /* handle; it stays until IEC_SOCKET_CLOSE */
 };
+
+enum { IEC_SOCKET_STREAM = 1, IEC_SOCKET_DATAGRAM = 2 };
+
+/* Shifts the bytes that can be read at once in the result of IEC_SOCKET_POLL. */
+enum { IEC_SOCKET_WAITING = 8 };
 
 /* Before received data: address of the peer [0..3], its port [4..5], 1 if there is a datagram [6]; little-endian. */
 enum { IEC_SOCKET_HEAD = 8 };
@@ -44,6 +57,9 @@ enum {
     IEC_SOCKET_NO_CONNECTION = 6019, /* the peer has closed it */
     IEC_SOCKET_TOO_MANY = 6090,      /* own: open sockets */
     IEC_SOCKET_NO_NETWORK = 6091,    /* own: the device has none for programs */
+    IEC_SOCKET_SHUT = 6092,          /* own: after IEC_SOCKET_SHUTDOWN */
+    IEC_SOCKET_IS_CONNECTED = 6093,  /* own: IEC_SOCKET_CONNECT has ended well */
+    IEC_SOCKET_CONNECTING = 6094,    /* own: it has not ended */
 };
 
 RTS_RESULT IecSocket_Hook(CMP_HOOK hook);

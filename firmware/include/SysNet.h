@@ -37,6 +37,15 @@ RTS_RESULT SysNetSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RTS
 RTS_RESULT SysNetRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received);
 RTS_RESULT SysNetSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to);
 
+enum {
+    SYSNET_READABLE = 1, /* data, the end of a connection, or a connection to accept */
+    SYSNET_WRITABLE = 2,
+    SYSNET_FAILED = 4, /* the connection was refused, or is broken */
+};
+
+/* Returns what can be done at once, SYSNET_*; `waiting` is how many bytes can be read, of datagrams those of the first one. */
+RTS_UI32 SysNetPoll(RTS_HANDLE socket, RTS_UI32 *waiting);
+
 /* Closes a socket; a connection after sending what was taken. */
 void SysNetClose(RTS_HANDLE socket);
 

@@ -13,9 +13,10 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from serial_programs import PROGRAM, ProgramSerial
+from serial_programs import FUNCTIONS, PROGRAM, ProgramSerial, check_functions
 
 from plctool import connect
+from plctool.cli.main import main
 from plctool.controller import Controller
 from plctool.device import Plc
 from plctool.testing.plcrt import Plcrt
@@ -46,3 +47,10 @@ class TestPlcrt(ProgramSerial):
         while len(came) < size:
             came += os.read(self.line, size)
         return came
+
+    def test_functions_of_syslibcom_exchange_bytes(self, plc: Plc, tmp_path: Path) -> None:
+        source = tmp_path / "functions.st"
+        source.write_text(FUNCTIONS)
+        assert main(["build", str(source), "-o", str(source.with_suffix(".cdl"))]) == 0
+        plc.flash(source.with_suffix(".cdl"))
+        check_functions(plc, eventually, lambda data, size: self.exchange(plc, data, size))

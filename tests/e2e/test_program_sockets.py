@@ -13,7 +13,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from socket_programs import INVALID_ADDR, PROGRAM, ProgramSockets
+from socket_programs import INVALID_ADDR, PROGRAM, STEPS, ProgramSockets, check_steps
 
 from plctool import connect
 from plctool.cli.main import main
@@ -106,3 +106,15 @@ def test_a_list_of_addresses_that_is_none_is_refused(tmp_path: Path) -> None:
             text=True,
         )
         assert done.returncode == 2 and "is not a list of addresses: write for example" in done.stderr, text
+
+
+def test_functions_of_syslibsockets_reach_each_other(plcrt: Plcrt, port: int, tmp_path: Path) -> None:
+    source = tmp_path / "steps.st"
+    source.write_text(STEPS)
+    assert main(["build", str(source), "-o", str(source.with_suffix(".cdl"))]) == 0
+    plcrt.stop()
+    plcrt.options = ("--tcp", "0")
+    plcrt.start()
+    with connect(f"tcp:{plcrt.tcp}") as plc:
+        plc.flash(source.with_suffix(".cdl"))
+        check_steps(plc, port, eventually)

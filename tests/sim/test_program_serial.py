@@ -11,7 +11,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from serial_programs import PROGRAM, ProgramSerial
+from serial_programs import FUNCTIONS, PROGRAM, ProgramSerial, check_functions
 
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -56,3 +56,13 @@ class TestSimulator(ProgramSerial):
 def test_bytes_for_a_port_that_is_not_open_are_refused(plc: Simulator) -> None:
     with pytest.raises(DeviceError, match="the program has to open it"):
         plc.serial_send(1, b"x")
+
+
+def test_functions_of_syslibcom_exchange_bytes(tmp_path: Path) -> None:
+    source = tmp_path / "functions.st"
+    source.write_text(FUNCTIONS)
+    with Simulator.from_sources(source) as plc:
+        test = TestSimulator()
+        check_functions(
+            plc, lambda condition: test.wait(plc, condition), lambda data, size: test.exchange(plc, data, size)
+        )

@@ -11,7 +11,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from socket_programs import LONG, NO_CONNECTION, PROGRAM, ProgramSockets
+from socket_programs import LONG, NO_CONNECTION, PROGRAM, STEPS, ProgramSockets, check_steps
 
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -95,3 +95,10 @@ def test_datagram_longer_than_the_buffer_is_an_error(plc: Simulator) -> None:
     run_until(lambda: plc.run_cycles(1), lambda: plc.read("Main.peer.xActive"))
     plc.udp_send(b"hello", 5000)
     run_until(lambda: plc.run_cycles(1), lambda: plc.read("Main.receive.fetch.calls.code") == 6005)
+
+
+def test_functions_of_syslibsockets_reach_each_other(tmp_path: Path) -> None:
+    source = tmp_path / "steps.st"
+    source.write_text(STEPS)
+    with Simulator.from_sources(source) as plc:
+        check_steps(plc, 5020, lambda condition: run_until(lambda: plc.run_cycles(1), condition))

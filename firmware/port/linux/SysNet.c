@@ -14,6 +14,7 @@
 #include <arpa/inet.h>
 #include <errno.h>
 #include <limits.h>
+#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -187,6 +188,16 @@ RTS_RESULT SysNetRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKA
 RTS_RESULT SysNetSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to)
 {
     return SysSockSendTo(socket, data, size, to);
+}
+
+RTS_UI32 SysNetPoll(RTS_HANDLE socket, RTS_UI32 *waiting)
+{
+    short events = PortSockPoll(socket, waiting);
+    if ((events & POLLERR) != 0) {
+        return SYSNET_FAILED;
+    }
+    RTS_UI32 readable = (events & (POLLIN | POLLHUP)) != 0 ? SYSNET_READABLE : 0;
+    return readable | ((events & POLLOUT) != 0 ? SYSNET_WRITABLE : 0);
 }
 
 void SysNetClose(RTS_HANDLE socket)

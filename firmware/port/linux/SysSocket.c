@@ -25,6 +25,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -441,6 +442,18 @@ void PortSockQuiet(RTS_HANDLE socket)
     if (source != NULL) {
         PortWaitRemove(source);
     }
+}
+
+short PortSockPoll(RTS_HANDLE socket, RTS_UI32 *waiting)
+{
+    struct pollfd polled = {.fd = file_of(socket), .events = POLLIN | POLLOUT};
+    int bytes = 0;
+    if (poll(&polled, 1, 0) < 0) {
+        polled.revents = POLLERR;
+    }
+    (void)ioctl(polled.fd, FIONREAD, &bytes);
+    *waiting = (RTS_UI32)bytes;
+    return polled.revents;
 }
 
 static void send_without_delay(int file)

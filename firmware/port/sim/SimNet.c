@@ -384,6 +384,35 @@ RTS_RESULT SysNetSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, c
     return send_packet(SIM_NET_DATAGRAM, &found->own, to, data, size);
 }
 
+static bool has_waiting(const SOCKET *listener)
+{
+    FOR_EACH_SOCKET(found)
+    if (found->state != FREE && found->is_waiting && found->own.port == listener->own.port)
+        return true;
+    return false;
+}
+
+/* Returns the bytes of the first datagram, or those of a connection. */
+static RTS_UI32 count_readable(const SOCKET *found)
+{
+    if (found->state != UDP || found->count == 0)
+        return found->count;
+    return found->data[(found->first + 6) % ROOM] + ((RTS_UI32)found->data[(found->first + 7) % ROOM] << 8);
+}
+
+RTS_UI32 SysNetPoll(RTS_HANDLE socket, RTS_UI32 *waiting)
+{
+    const SOCKET *found = find(socket);
+
+    *waiting = found != NULL ? count_readable(found) : 0;
+    if (found == NULL || found->state == REFUSED)
+        return SYSNET_FAILED;
+    if (found->state == LISTENER)
+        return has_waiting(found) ? SYSNET_READABLE : 0;
+    return (found->count > 0 || found->state == ENDED ? SYSNET_READABLE : 0) |
+           (found->state == UDP || found->state == CONNECTED ? SYSNET_WRITABLE : 0);
+}
+
 static void close(SOCKET *found)
 {
     bool tells = found->state == CONNECTED || found->state == CONNECTING;

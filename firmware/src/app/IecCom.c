@@ -23,9 +23,12 @@ enum { VERSION = 0x00010000 };
 
 enum { SLOTS = 256 }; /* in a handle: its slot, and how many ports were opened before */
 
+#define NOT_OPEN UINT32_MAX
+
 typedef struct {
     RTS_UI32 handle; /* 0: closed */
-    RTS_UI32 line;
+    RTS_UI32 number; /* of the port */
+    RTS_UI32 line;   /* NOT_OPEN after settings that it cannot do */
 } OPEN_COM;
 
 static struct {
@@ -49,9 +52,16 @@ static OPEN_COM *find_closed(void)
     return NULL;
 }
 
+static void close_line(OPEN_COM *com)
+{
+    if (com->line != NOT_OPEN)
+        SysComClose(com->line);
+    com->line = NOT_OPEN;
+}
+
 static void close_com(OPEN_COM *com)
 {
-    SysComClose(com->line);
+    close_line(com);
     com->handle = 0;
 }
 
@@ -86,20 +96,27 @@ static RTS_I32 error_of(RTS_RESULT result)
     }
 }
 
-static RTS_I32 open_com(APP_CALL *call)
+static RTS_I32 open_line(OPEN_COM *com, RTS_UI32 value)
 {
     const SYSCOM_SETTINGS settings = {
-        .baud = call->value & IEC_COM_BAUD,
-        .parity = (RTS_UI8)(call->value >> IEC_COM_PARITY_SHIFT & 3),
-        .stop_bits = (call->value & IEC_COM_TWO_STOP_BITS) != 0 ? 2 : 1,
+        .baud = value & IEC_COM_BAUD,
+        .parity = (RTS_UI8)(value >> IEC_COM_PARITY_SHIFT & 3),
+        .stop_bits = (value & IEC_COM_TWO_STOP_BITS) != 0 ? 2 : 1,
     };
+
+    if (settings.baud == 0 || settings.parity > SYSCOM_PARITY_ODD)
+        return IEC_COM_WRONG_PARAMETER;
+    return error_of(SysComOpenProgram(com->number, &settings, &com->line));
+}
+
+static RTS_I32 open_com(APP_CALL *call)
+{
     OPEN_COM *com = find_closed();
 
     if (com == NULL)
         return IEC_COM_IN_USE;
-    if (settings.baud == 0 || settings.parity > SYSCOM_PARITY_ODD)
-        return IEC_COM_WRONG_PARAMETER;
-    RTS_I32 error = error_of(SysComOpenProgram(call->handle, &settings, &com->line));
+    com->number = call->handle;
+    RTS_I32 error = open_line(com, call->value);
     if (error != 0)
         return error;
     com->handle = (++coms.opened % (UINT32_MAX / SLOTS) + 1) * SLOTS + (RTS_UI32)(com - coms.com);
@@ -107,10 +124,38 @@ static RTS_I32 open_com(APP_CALL *call)
     return 0;
 }
 
+/* A port without a line has the handle still: the program may try other settings. */
+static RTS_I32 change_settings(OPEN_COM *com, RTS_UI32 value)
+{
+    close_line(com);
+    return open_line(com, value);
+}
+
+static RTS_I32 undo(const APP_CALL *call)
+{
+    OPEN_COM *com = call->operation == IEC_COM_OPEN ? find_open(call->result) : NULL;
+
+    if (com != NULL)
+        close_com(com);
+    return 0;
+}
+
+static RTS_I32 move_bytes(APP_CALL *call, RTS_UI32 line)
+{
+    RTS_UI32 room = call->value < sizeof call->data ? call->value : sizeof call->data;
+
+    if (call->operation == IEC_COM_READ)
+        call->result = SysComRead(line, call->data, room);
+    else if (call->operation == IEC_COM_WRITE)
+        call->result = SysComWrite(line, call->data, call->size);
+    else
+        return IEC_COM_WRONG_PARAMETER;
+    return 0;
+}
+
 static RTS_I32 do_with_open(APP_CALL *call)
 {
     OPEN_COM *com = find_open(call->handle);
-    RTS_UI32 room = call->value < sizeof call->data ? call->value : sizeof call->data;
 
     if (com == NULL)
         return IEC_COM_WRONG_HANDLE;
@@ -118,19 +163,17 @@ static RTS_I32 do_with_open(APP_CALL *call)
     case IEC_COM_CLOSE:
         close_com(com);
         return 0;
-    case IEC_COM_READ:
-        call->result = SysComRead(com->line, call->data, room);
-        return 0;
-    case IEC_COM_WRITE:
-        call->result = SysComWrite(com->line, call->data, call->size);
-        return 0;
+    case IEC_COM_SETTINGS:
+        return change_settings(com, call->value);
     default:
-        return IEC_COM_WRONG_PARAMETER;
+        return com->line == NOT_OPEN ? IEC_COM_WRONG_HANDLE : move_bytes(call, com->line);
     }
 }
 
 static RTS_I32 carry_out(APP_CALL *call)
 {
+    if (call->error == APP_CALL_ABANDONED)
+        return undo(call);
     return call->operation == IEC_COM_OPEN ? open_com(call) : do_with_open(call);
 }
 

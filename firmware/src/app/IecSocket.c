@@ -31,12 +31,14 @@ enum {
 
 RTS_STATIC_ASSERT(IEC_SOCKETS <= SLOTS, sockets_have_numbers);
 
-typedef enum { CLOSED, UDP, LISTENER, CONNECTION } USE;
+/* The last three have no socket of the port. */
+typedef enum { CLOSED, UDP, LISTENER, CONNECTION, NEW_DATAGRAM, NEW_STREAM, SHUT } USE;
 
 typedef struct {
     USE use;
     RTS_UI32 handle; /* of the program */
     RTS_HANDLE socket;
+    SOCKADDRESS own; /* of a new one for connections */
 } OPEN_SOCKET;
 
 static struct {
@@ -49,11 +51,11 @@ static struct {
 
 /* ---- open sockets ---- */
 
-static OPEN_SOCKET *find_open(RTS_UI32 handle, USE use)
+static OPEN_SOCKET *find_any(RTS_UI32 handle)
 {
     OPEN_SOCKET *found = &sockets.socket[handle % SLOTS % IEC_SOCKETS];
 
-    return found->use == use && found->handle == handle ? found : NULL;
+    return found->use != CLOSED && found->handle == handle ? found : NULL;
 }
 
 static OPEN_SOCKET *find_closed(void)
@@ -74,10 +76,16 @@ static RTS_UI32 use_socket(OPEN_SOCKET *found, USE use, RTS_HANDLE socket)
     return found->handle;
 }
 
+static void end_socket(OPEN_SOCKET *found, USE use)
+{
+    if (found->use <= CONNECTION)
+        SysNetClose(found->socket);
+    found->use = use;
+}
+
 static void close_socket(OPEN_SOCKET *found)
 {
-    SysNetClose(found->socket);
-    found->use = CLOSED;
+    end_socket(found, CLOSED);
     sockets.count--;
 }
 
@@ -247,17 +255,101 @@ static RTS_I32 write_data(APP_CALL *call, const OPEN_SOCKET *found)
     return result == ERR_OK ? 0 : IEC_SOCKET_NO_CONNECTION;
 }
 
-/* ---- in main ---- */
+/* ---- the steps of Berkeley sockets ---- */
 
-static RTS_I32 close_any(RTS_UI32 handle)
+static RTS_I32 create(APP_CALL *call)
 {
-    OPEN_SOCKET *found = &sockets.socket[handle % SLOTS % IEC_SOCKETS];
+    OPEN_SOCKET *found = find_closed();
 
-    if (found->use == CLOSED || found->handle != handle)
-        return IEC_SOCKET_INVALID_HANDLE;
-    close_socket(found);
+    if (call->value != IEC_SOCKET_STREAM && call->value != IEC_SOCKET_DATAGRAM)
+        return IEC_SOCKET_WRONG_PARAMETER;
+    if (found == NULL)
+        return IEC_SOCKET_TOO_MANY;
+    found->own = (SOCKADDRESS){0, 0};
+    call->result = use_socket(found, call->value == IEC_SOCKET_STREAM ? NEW_STREAM : NEW_DATAGRAM, RTS_INVALID_HANDLE);
     return 0;
 }
+
+static RTS_I32 open_new(OPEN_SOCKET *found, SYSNET_KIND kind, const SOCKADDRESS *address, USE use, RTS_I32 error)
+{
+    RTS_HANDLE socket;
+    RTS_RESULT result = SysNetOpen(kind, address, &socket);
+
+    if (result != ERR_OK)
+        return open_error(result, error);
+    found->socket = socket;
+    found->use = use;
+    return 0;
+}
+
+static RTS_I32 bind_to(OPEN_SOCKET *found, const SOCKADDRESS *own)
+{
+    if (found->use == NEW_DATAGRAM)
+        return open_new(found, SYSNET_UDP, own, UDP, IEC_SOCKET_UDP_OPEN_ERROR);
+    if (found->use != NEW_STREAM)
+        return IEC_SOCKET_WRONG_PARAMETER;
+    found->own = *own;
+    return 0;
+}
+
+static RTS_I32 listen_with(OPEN_SOCKET *found)
+{
+    if (found->use != NEW_STREAM)
+        return IEC_SOCKET_WRONG_PARAMETER;
+    return open_new(found, SYSNET_LISTENER, &found->own, LISTENER, IEC_SOCKET_TCP_OPEN_ERROR);
+}
+
+/* The own address is chosen by the system. */
+static RTS_I32 connect_with(OPEN_SOCKET *found, const SOCKADDRESS *peer)
+{
+    if (found->use == CONNECTION)
+        return SysNetGetConnected(found->socket) == ERR_PENDING ? IEC_SOCKET_CONNECTING : IEC_SOCKET_IS_CONNECTED;
+    if (found->use != NEW_STREAM)
+        return IEC_SOCKET_WRONG_PARAMETER;
+    if (peer->port == 0 || !may_reach(peer))
+        return IEC_SOCKET_INVALID_ADDR;
+    return open_new(found, SYSNET_CLIENT, peer, CONNECTION, IEC_SOCKET_TCP_CONNECT_ERROR);
+}
+
+static RTS_I32 poll_any(APP_CALL *call, const OPEN_SOCKET *found)
+{
+    RTS_UI32 waiting = 0;
+
+    if (found->use <= CONNECTION)
+        call->result = SysNetPoll(found->socket, &waiting);
+    call->result |= waiting << IEC_SOCKET_WAITING;
+    return 0;
+}
+
+static RTS_I32 take_step(APP_CALL *call, RTS_UI32 operation)
+{
+    OPEN_SOCKET *found = find_any(call->handle);
+    SOCKADDRESS address = address_of(call);
+
+    if (found == NULL)
+        return IEC_SOCKET_INVALID_HANDLE;
+    if (operation == IEC_SOCKET_CLOSE) {
+        close_socket(found);
+        return 0;
+    }
+    if (found->use == SHUT)
+        return IEC_SOCKET_SHUT;
+    switch (operation) {
+    case IEC_SOCKET_BIND:
+        return bind_to(found, &address);
+    case IEC_SOCKET_LISTEN:
+        return listen_with(found);
+    case IEC_SOCKET_CONNECT:
+        return connect_with(found, &address);
+    case IEC_SOCKET_POLL:
+        return poll_any(call, found);
+    default:
+        end_socket(found, SHUT);
+        return 0;
+    }
+}
+
+/* ---- in main ---- */
 
 static USE use_of(RTS_UI32 operation)
 {
@@ -274,9 +366,13 @@ static USE use_of(RTS_UI32 operation)
 
 static RTS_I32 do_with_open(APP_CALL *call, RTS_UI32 operation)
 {
-    OPEN_SOCKET *found = find_open(call->handle, use_of(operation));
+    OPEN_SOCKET *found = find_any(call->handle);
 
-    if (found == NULL)
+    if (found != NULL && found->use == NEW_DATAGRAM && operation == IEC_SOCKET_SEND_TO)
+        (void)bind_to(found, &found->own);
+    if (found != NULL && found->use == SHUT)
+        return IEC_SOCKET_SHUT;
+    if (found == NULL || found->use != use_of(operation))
         return IEC_SOCKET_INVALID_HANDLE;
     switch (operation) {
     case IEC_SOCKET_SEND_TO:
@@ -296,10 +392,24 @@ static RTS_I32 do_with_open(APP_CALL *call, RTS_UI32 operation)
     }
 }
 
+/* No block knows the socket that an abandoned call has opened. */
+static RTS_I32 undo(const APP_CALL *call, RTS_UI32 operation)
+{
+    bool opens =
+        operation <= IEC_SOCKET_TCP_CONNECT || operation == IEC_SOCKET_ACCEPT || operation == IEC_SOCKET_CREATE;
+    OPEN_SOCKET *found = opens ? find_any(call->result) : NULL;
+
+    if (found != NULL)
+        close_socket(found);
+    return 0;
+}
+
 static RTS_I32 carry_out(APP_CALL *call)
 {
     RTS_UI32 operation = call->operation & OPERATION_MASK;
 
+    if (call->error == APP_CALL_ABANDONED)
+        return undo(call, operation);
     switch (operation) {
     case IEC_SOCKET_UDP_OPEN:
         return open_socket(call, SYSNET_UDP, UDP, IEC_SOCKET_UDP_OPEN_ERROR);
@@ -307,8 +417,15 @@ static RTS_I32 carry_out(APP_CALL *call)
         return open_socket(call, SYSNET_LISTENER, LISTENER, IEC_SOCKET_TCP_OPEN_ERROR);
     case IEC_SOCKET_TCP_CONNECT:
         return open_socket(call, SYSNET_CLIENT, CONNECTION, IEC_SOCKET_TCP_CONNECT_ERROR);
+    case IEC_SOCKET_CREATE:
+        return create(call);
     case IEC_SOCKET_CLOSE:
-        return close_any(call->handle);
+    case IEC_SOCKET_BIND:
+    case IEC_SOCKET_LISTEN:
+    case IEC_SOCKET_CONNECT:
+    case IEC_SOCKET_POLL:
+    case IEC_SOCKET_SHUTDOWN:
+        return take_step(call, operation);
     default:
         return do_with_open(call, operation);
     }

@@ -169,6 +169,7 @@ _WIDE = {"STRING": "WSTRING", "BYTE": "WORD"}
 _LONG = {"TIME": "LTIME", "T": "LTIME"}
 _VARIANTS: dict[str, list[Variant]] = {
     "stdlib/strings.st": [Variant("{}__WSTRING", _WIDE), Variant("W{}", _WIDE)],
+    "stdlib/syslib_sockets.st": [Variant("Fw{}")],
     "stdlib/timers.st": [Variant("{}_TIME"), Variant("{}_LTIME", _LONG), Variant("L{}", _LONG)],
     "stdlib/counters.st": [
         Variant("{}_INT"), _counter("DINT", 32, signed=True), _counter("LINT", 64, signed=True),
