@@ -1,90 +1,235 @@
-"""Makes the wheel for Windows on x86-64 from that for Linux: `make_windows_wheel.py WHEEL BUILD MODULE OUTPUT`.
+"""Makes the wheel for another system from that for this one: `make_wheel.py PLATFORM WHEEL OUTPUT`.
 
-WHEEL: for Linux; BUILD: the build folder of cross/x86_64-windows.ini; MODULE: the source of _plccore. Python's own
-library for Windows is not needed: the module names python3.dll, which every Python from 3.11 on has.
+WHEEL: for this Linux. What is compiled stays in the folder build-wheel-PLATFORM. Zig's compiler (PyPI: ziglang) has the C libraries of all systems
+but Windows, for which Debian's compiler is used. Python's own library is not needed: modules of the limited interface
+run with every Python from 3.11 on, which has their names.
 
-Checks what can be checked elsewhere than on Windows: what the module imports and exports.
+Checks what can be checked elsewhere: what the module imports and exports, and for which processor it is.
 """
 
 from __future__ import annotations
 
+import argparse
 import base64
 import csv
 import hashlib
 import io
 import re
+import shlex
 import subprocess
 import sys
 import sysconfig
-import tempfile
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 
+from elftools.elf.elffile import ELFFile
+from macholib.MachO import MachO
+
 ROOT = Path(__file__).resolve().parents[1]
-TAG = "cp311-abi3-win_amd64"
-TOOLS = "x86_64-w64-mingw32-"
-INCLUDE = [ROOT / "firmware/include", ROOT / "firmware/port/sim", ROOT / "firmware/port/windows"]
-OF_LINUX = re.compile(r"(^|/)(_plccore\..*\.so|plcrt(\.\d)?)$|\.libs/|\.data/(scripts|data)/")
+SIM = Path("firmware/port/sim")
+PLCRT = Path("firmware/port/linux/plcrt")
+OF_THIS_LINUX = re.compile(r"(^|/)(_plccore\..*\.so|plcrt(\.\d)?)$|\.libs/|\.data/(scripts|data)/")
+ZIG = [sys.executable, "-m", "ziglang"]
+MINGW = "x86_64-w64-mingw32-"
+
+# What is part of each system, or of Python.
 OF_WINDOWS = re.compile(r"(python3|KERNEL32|msvcrt|api-ms-win-crt-[\w-]+)\.dll", re.IGNORECASE)
+OF_LINUX = re.compile(r"lib(c|m|pthread|dl|rt)\.so(\.\d+)?|ld-linux[\w-]*\.so\.\d")
+OF_MACOS = re.compile(r"/usr/lib/libSystem\.B\.dylib|@rpath/_plccore\.abi3\.so")
 
 
-def tool(name: str, *arguments: str | Path) -> str:
-    """The output of a compiler tool, which has to succeed."""
-    command = [TOOLS + name, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+@dataclass(frozen=True)
+class Platform:
+    """A system and its processor."""
+
+    tag: str
+    system: str  # as meson names it
+    processor: str  # as meson names its family
+    target: str  # as Zig names it; "": not by Zig
+    machine: str  # as its files name the processor
+    module: str = "_plccore.abi3.so"
+
+    @property
+    def has_plcrt(self) -> bool:
+        return self.system == "linux"
+
+    def tool(self, name: str) -> list[str]:
+        """The command of a tool, of `cc` and `ar`."""
+        if not self.target:
+            return [MINGW + {"cc": "gcc-posix"}.get(name, name)]
+        return [*ZIG, name, *(["-target", self.target] if name == "cc" else [])]
+
+
+# The C library of Debian 11 and Ubuntu 20.04 is 2.31: plcrt needs functions that are new in it.
+PLATFORMS = {
+    "aarch64-linux": Platform("manylinux_2_31_aarch64", "linux", "aarch64", "aarch64-linux-gnu.2.31", "EM_AARCH64"),
+    "armv7-linux": Platform("manylinux_2_31_armv7l", "linux", "arm", "arm-linux-gnueabihf.2.31", "EM_ARM"),
+    "x86_64-musl": Platform("musllinux_1_2_x86_64", "linux", "x86_64", "x86_64-linux-musl", "EM_X86_64"),
+    "aarch64-musl": Platform("musllinux_1_2_aarch64", "linux", "aarch64", "aarch64-linux-musl", "EM_AARCH64"),
+    "arm64-macos": Platform("macosx_11_0_arm64", "darwin", "aarch64", "aarch64-macos.11.0", "ARM64"),
+    "x86_64-windows": Platform("win_amd64", "windows", "x86_64", "", "pei-x86-64", "_plccore.pyd"),
+}
+
+
+def run(*command: str | Path) -> str:
+    """The output of a command, which has to succeed."""
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     if done.returncode:
-        sys.exit(f"{' '.join(command)}\n{done.stderr}")
+        sys.exit(f"{' '.join(map(str, command))}\n{done.stdout[-4000:]}{done.stderr[-4000:]}")
     return done.stdout
 
 
-def compile_module(source: Path, folder: Path) -> Path:
-    include = [*INCLUDE, Path(sysconfig.get_paths()["include"])]
-    flags = ["-O2", "-std=gnu99", "-DPy_LIMITED_API=0x030B0000", "-include", ROOT / "packages/windows/pyconfig.h"]
-    result = folder / "_plccore.o"
-    tool("gcc-posix", *flags, *(f"-I{path}" for path in include), "-c", source, "-o", result)
+# ---- the firmware's libraries ----
+
+
+def cross_file(platform: Platform) -> str:
+    """A file for meson; nothing of the build is run."""
+    return f"""\
+[binaries]
+c = {platform.tool("cc")}
+ar = {platform.tool("ar")}
+exe_wrapper = ['false']
+[built-in options]
+c_args = ['-Wno-c11-extensions']
+[properties]
+skip_sanity_check = true
+[host_machine]
+system = '{platform.system}'
+cpu_family = '{platform.processor}'
+cpu = '{platform.processor}'
+endian = 'little'
+[project options]
+host = false
+"""
+
+
+def build_firmware(platform: Platform, folder: Path) -> None:
+    """The simulator's libraries, and plcrt where it runs."""
+    cross = ROOT / "cross/x86_64-windows.ini"
+    if platform.target:
+        cross = folder / "cross.ini"
+        cross.write_text(cross_file(platform))
+    build = folder / "build"
+    if not (build / "build.ninja").exists():
+        run("meson", "setup", "--buildtype=release", build, ROOT, "--cross-file", cross)
+    targets = run("ninja", "-C", build, "-t", "targets", "all")
+    facts = {str(SIM / path) for path in re.findall(r"libboard_facts_\w+\.a", targets)}
+    wanted = [*sorted(facts), str(SIM / "librts_sim_bus.a"), str(SIM / "librts_sim.a")]
+    run("ninja", "-C", build, *wanted, *([str(PLCRT)] if platform.has_plcrt else []))
+
+
+# ---- the module ----
+
+
+def include_folders(platform: Platform) -> list[Path]:
+    folders = [ROOT / "firmware/include", ROOT / SIM]
+    return [*folders, ROOT / "firmware/port/windows"] if platform.system == "windows" else folders
+
+
+def write_module(platform: Platform, folder: Path) -> Path:
+    """Its source, which the compiler's idea of sizes is part of."""
+    source = folder / "_plccore.c"
+    run(sys.executable, ROOT / "host/make_plccore.py", "--cc", shlex.join(platform.tool("cc")), "--include",
+        *include_folders(platform), "--output", source, "--depfile", folder / "_plccore.c.d")  # fmt: skip
+    return source
+
+
+def compile_c(platform: Platform, source: Path, result: Path) -> Path:
+    flags = ["-O2", "-std=gnu99", "-fPIC", "-DPy_LIMITED_API=0x030B0000", "-include", ROOT / "packages/pyconfig.h"]
+    include = [*include_folders(platform), Path(sysconfig.get_paths()["include"])]
+    run(*platform.tool("cc"), *flags, *(f"-I{path}" for path in include), "-c", source, "-o", result)
     return result
 
 
 def python_library(module: Path, folder: Path) -> Path:
     """An import library of python3.dll with the names that the module uses."""
-    names = re.findall(r"__imp_(_?Py\w+)", tool("nm", "-u", module))
+    names = re.findall(r"__imp_(_?Py\w+)", run(MINGW + "nm", "-u", module))
     definition = folder / "python3.def"
     definition.write_text("LIBRARY python3.dll\nEXPORTS\n" + "".join(f"{name}\n" for name in names))
     library = folder / "libpython3.a"
-    tool("dlltool", "-d", definition, "-l", library)
+    run(MINGW + "dlltool", "-d", definition, "-l", library)
     return library
 
 
-def link(build: Path, source: Path, folder: Path) -> Path:
+def system_flags(platform: Platform, module: Path, folder: Path) -> list[str | Path]:
+    """How the names of Python are left to it."""
+    if platform.system == "windows":
+        return ["-static", python_library(module, folder)]
+    return ["-undefined", "dynamic_lookup"] if platform.system == "darwin" else ["-Wl,-z,lazy"]
+
+
+def whole(platform: Platform, archives: list[Path]) -> list[str | Path]:
+    """Flags of the linker that takes each member of archives."""
+    if platform.system == "darwin":
+        return [flag for archive in archives for flag in (f"-Wl,-force_load,{archive}",)]
+    return ["-Wl,--whole-archive", *archives, "-Wl,--no-whole-archive"]
+
+
+def link_module(platform: Platform, folder: Path) -> Path:
     """The module, with all that its simulator needs."""
-    port = build / "firmware/port/sim"
-    whole = [port / "librts_sim_bus.a", *sorted(port.glob("libboard_facts_*.a"))]
-    boards = folder / "boards.o"
-    tool(
-        "gcc-posix",
-        "-O2",
-        *(f"-I{path}" for path in INCLUDE),
-        "-c",
-        ROOT / "firmware/port/sim/SimBoards.c",
-        "-o",
-        boards,
-    )
-    module = compile_module(source, folder)
-    result = folder / "_plccore.pyd"
-    archives = ["-Wl,--whole-archive", *whole, "-Wl,--no-whole-archive", port / "librts_sim.a"]
-    tool("gcc-posix", "-shared", "-s", "-static", "-o", result, module, boards, *archives,
-         python_library(module, folder), "-pthread")  # fmt: skip
+    port = folder / "build" / SIM
+    boards = compile_c(platform, ROOT / SIM / "SimBoards.c", folder / "boards.o")
+    module = compile_c(platform, write_module(platform, folder), folder / "_plccore.o")
+    archives = whole(platform, [port / "librts_sim_bus.a", *sorted(port.glob("libboard_facts_*.a"))])
+    result = folder / platform.module
+    run(*platform.tool("cc"), "-shared", "-s", "-o", result, module, boards, *archives, port / "librts_sim.a",
+        *system_flags(platform, module, folder), "-pthread", "-lm")  # fmt: skip
     return result
 
 
-def check(module: Path) -> None:
-    """The module needs nothing but Python and what each Windows has, and is one."""
-    headers = tool("objdump", "-p", module)
-    imported = set(re.findall(r"DLL Name: (\S+)", headers))
-    if strange := sorted(name for name in imported if not OF_WINDOWS.fullmatch(name)):
-        sys.exit(f"The module needs {', '.join(strange)}, which a Windows may not have.")
-    if "python3.dll" not in imported or "PyInit__plccore" not in headers:
-        sys.exit("The module is not one of Python.")
+# ---- what can be checked here ----
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a linked file says of itself."""
+
+    machine: str
+    needed: set[str]
+    exported: set[str]
+
+
+def facts_of_elf(path: Path) -> Facts:
+    with path.open("rb") as file:
+        elf = ELFFile(file)
+        dynamic, symbols = elf.get_section_by_name(".dynamic"), elf.get_section_by_name(".dynsym")
+        needed = {tag.needed for tag in dynamic.iter_tags("DT_NEEDED")} if dynamic else set()
+        exported = {s.name for s in symbols.iter_symbols() if s["st_shndx"] != "SHN_UNDEF"} if symbols else set()
+        return Facts(elf["e_machine"], needed, exported)
+
+
+def facts_of_mach_o(path: Path) -> Facts:
+    (header,) = MachO(str(path)).headers
+    needed = {name for _, _, name in header.walkRelocatables()}
+    exported = {name for name in ("PyInit__plccore",) if f"_{name}".encode() in path.read_bytes()}
+    return Facts("ARM64" if header.header.cputype == 0x0100000C else "", needed, exported)
+
+
+def facts_of_pe(path: Path) -> Facts:
+    said = run(MINGW + "objdump", "-p", path)
+    machine = re.search(r"file format (\S+)", said)
+    exported = {name for name in ("PyInit__plccore",) if name in said}
+    return Facts(machine[1] if machine else "", set(re.findall(r"DLL Name: (\S+)", said)), exported)
+
+
+def check(platform: Platform, path: Path, exports: set[str]) -> None:
+    """A file is for its platform, and needs nothing but Python and what each such system has."""
+    reader, known = {
+        "linux": (facts_of_elf, OF_LINUX),
+        "darwin": (facts_of_mach_o, OF_MACOS),
+        "windows": (facts_of_pe, OF_WINDOWS),
+    }[platform.system]
+    facts = reader(path)
+    if facts.machine != platform.machine:
+        sys.exit(f"{path.name} is for {facts.machine or 'another processor'}, not for {platform.machine}.")
+    if strange := sorted(name for name in facts.needed if not known.fullmatch(name)):
+        sys.exit(f"{path.name} needs {', '.join(strange)}, which such a system may not have.")
+    if missing := sorted(exports - facts.exported):
+        sys.exit(f"{path.name} lacks {', '.join(missing)}.")
+
+
+# ---- the wheel ----
 
 
 def recorded(files: dict[str, bytes], record: str) -> bytes:
@@ -98,30 +243,52 @@ def recorded(files: dict[str, bytes], record: str) -> bytes:
     return text.getvalue().encode()
 
 
-def files_of(wheel: Path, module: Path) -> dict[str, bytes]:
-    """Those of a wheel for Linux that are for all systems, and the module."""
+def files_of(wheel: Path, platform: Platform, tag: str, parts: dict[str, Path]) -> dict[str, bytes]:
+    """Those of a wheel for this Linux that are for all systems, and the parts of a platform."""
     with zipfile.ZipFile(wheel) as archive:
-        files = {name: archive.read(name) for name in archive.namelist() if not OF_LINUX.search(name)}
+        files = {name: archive.read(name) for name in archive.namelist() if not OF_THIS_LINUX.search(name)}
     files = {name: data for name, data in files.items() if not name.endswith("/RECORD")}
     about = next(name for name in files if name.endswith(".dist-info/WHEEL"))
-    files[about] = re.sub(rb"(?m)^Tag: .*\n", b"", files[about]) + f"Tag: {TAG}\n".encode()
-    files["_plccore.pyd"] = module.read_bytes()
+    files[about] = re.sub(rb"(?m)^Tag: .*\n", b"", files[about]) + f"Tag: {tag}\n".encode()
+    files |= {name: path.read_bytes() for name, path in parts.items()}
     record = about.replace("WHEEL", "RECORD")
     files[record] = recorded(files, record)
     return files
 
 
+def write_wheel(path: Path, files: dict[str, bytes]) -> None:
+    """Programs may be executed."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files.items():
+            entry = zipfile.ZipInfo(name)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = (0o100755 if ".data/scripts/" in name else 0o100644) << 16
+            archive.writestr(entry, data)
+
+
 def main() -> None:
-    wheel, build, source, output = map(Path, sys.argv[1:])
-    with tempfile.TemporaryDirectory() as folder:
-        module = link(build, source, Path(folder))
-        check(module)
-        files = files_of(wheel, module)
-    name = output / ("-".join(wheel.name.split("-")[:2]) + f"-{TAG}.whl")
-    with zipfile.ZipFile(name, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path, data in files.items():
-            archive.writestr(path, data)
-    print(f"{name.name}: {len(files)} files, module of {len(files['_plccore.pyd'])} bytes")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("platform", choices=PLATFORMS)
+    parser.add_argument("wheel", type=Path)
+    parser.add_argument("output", type=Path)
+    args = parser.parse_args()
+    platform = PLATFORMS[args.platform]
+    tag = f"cp311-abi3-{platform.tag}"
+    name, version = args.wheel.name.split("-")[:2]
+    folder = ROOT / f"build-wheel-{args.platform}"
+    folder.mkdir(exist_ok=True)
+    build_firmware(platform, folder)
+    module = link_module(platform, folder)
+    check(platform, module, {"PyInit__plccore"})
+    parts = {platform.module: module}
+    if platform.has_plcrt:
+        plcrt = folder / "build" / PLCRT
+        check(platform, plcrt, set())
+        parts[f"{name}-{version}.data/scripts/plcrt"] = plcrt
+    files = files_of(args.wheel, platform, tag, parts)
+    result = args.output / f"{name}-{version}-{tag}.whl"
+    write_wheel(result, files)
+    print(f"{result.name}: {len(files)} files, module of {len(files[platform.module])} bytes")
 
 
 if __name__ == "__main__":
