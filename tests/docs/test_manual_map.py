@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
+from collections import Counter
 from functools import cache
 
 import pytest
@@ -14,6 +15,7 @@ from plctool.cli.command_line import parser
 
 MAP = ROOT / "docs" / "manual-map.md"
 MISSING = "-"
+STATES = ("works", "in part", "not taken", "not yet")
 # The numbers of subsections that the tables of contents of the manuals have, for what is listed.
 CONTENTS = {
     "CODESYS Control V3 Manual": {
@@ -41,6 +43,14 @@ def rows() -> list[tuple[str, list[str]]]:
         if manual in CONTENTS and line.startswith("|") and re.match(NUMBER, cells[0]):
             found.append((manual, cells))
     return found
+
+
+def state(cells: list[str]) -> str:
+    """How far the subject of a row is here."""
+    _, place, difference = cells
+    if place == MISSING:
+        return "not yet" if "not yet" in difference else "not taken"
+    return "in part" if re.search(r"\b(no|not|none|only)\b", difference, re.IGNORECASE) else "works"
 
 
 def sections(cell: str) -> list[str]:
@@ -133,6 +143,13 @@ def test_every_section_is_listed_once_and_in_order(manual: str) -> None:
     listed = [number for m, cells in rows() if m == manual for number in sections(cells[0])]
     wanted = {f"{parent}.{n}" for parent, count in CONTENTS[manual].items() for n in range(1, count + 1)}
     assert listed == sorted(wanted | UNDIVIDED.get(manual, set()), key=order)
+
+
+@pytest.mark.parametrize("manual", CONTENTS)
+def test_the_table_at_the_head_counts_the_rows(manual: str) -> None:
+    found = Counter(state(cells) for m, cells in rows() if m == manual)
+    line = f"| {manual} | {' | '.join(str(found[name]) for name in STATES)} |"
+    assert line in MAP.read_text(), f"docs/manual-map.md: write {line}"
 
 
 @pytest.mark.parametrize("row", rows(), ids=lambda row: row[1][0])
