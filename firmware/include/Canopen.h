@@ -69,6 +69,7 @@ enum {
     CANOPEN_UNSIGNED16 = 0x06,
     CANOPEN_UNSIGNED32 = 0x07,
     CANOPEN_VISIBLE_STRING = 0x09,
+    CANOPEN_UNSIGNED24 = 0x16, /* those of 24, 40, 48 and 56 bits before it have a sign */
 };
 
 /* Identifiers of the LSS master and of those it talks to, and values of a COB-ID beside its identifier. */

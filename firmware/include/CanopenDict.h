@@ -27,7 +27,8 @@ enum {
     CANOPEN_DIRECTIONS = 2,
     CANOPEN_LAST_SYNC_TYPE = 240, /* transmission types: 0 to this one after SYNC */
     CANOPEN_FIRST_EVENT_TYPE = 254,
-    CANOPEN_NOWHERE = 0xFFFF, /* of a dummy in an RPDO */
+    CANOPEN_NOWHERE = 0xFFFF, /* `place` of CANOPEN_PDO_RUN: a dummy in an RPDO */
+    CANOPEN_SIGNED = 0x8000,  /* flag of it: an integer that has to be widened with its sign */
 };
 
 /* CANOPEN_LIVE: what `place` is. */
@@ -50,7 +51,7 @@ typedef struct {
 /* A PDO at work. */
 typedef struct {
     RTS_UI32 active;                  /* its identifier while it is exchanged, 0: it is not */
-    RTS_UI16 place[CANOPEN_MAPPINGS]; /* byte in the values */
+    RTS_UI16 place[CANOPEN_MAPPINGS]; /* byte in the values, and CANOPEN_SIGNED */
     RTS_UI8 size;                     /* bytes of its mapping */
     RTS_UI8 syncs;                    /* since it was sent */
     bool is_sent;                     /* since it is active */
@@ -168,5 +169,12 @@ RTS_UI32 CanopenDictGetConstant(const CANOPEN_SLAVE *slave, RTS_UI16 index, RTS_
 
 /* Bits of an object in a PDO. */
 RTS_UI32 CanopenDictGetBits(const CANOPEN_OBJECT *object);
+
+/* Integers of 24, 40, 48 and 56 bits are in the next larger type. True if `size` is that of one of them, in bytes. */
+bool CanopenIsNarrow(RTS_UI32 size);
+bool CanopenIsSigned(const CANOPEN_OBJECT *object);
+
+/* The lower `size` bytes of such an integer have been written: makes the others fit. Within SysLock. */
+void CanopenWiden(RTS_UI8 *value, RTS_UI32 size, bool is_signed);
 
 #endif

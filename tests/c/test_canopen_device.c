@@ -13,6 +13,7 @@
 #include "test.h"
 
 enum { NODE = 5, VALUES = 160, TEXT_PLACE = 16, TEXT_SIZE = 100, SENT = 200, SECTOR = 1024, STORE_SIZE = 10 * SECTOR };
+enum { NARROW_PLACE = 120, INTEGER24 = 0x10 };
 enum { WORD_PLACE = 2, RO = CANOPEN_ACCESS_READ, RW = CANOPEN_ACCESS_READ | CANOPEN_ACCESS_WRITE };
 
 static CANOPEN_SLAVE slave;
@@ -108,6 +109,7 @@ static void a_damaged_dictionary_is_refused(void)
         {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_SETTING, 2, 0},                  /* the firmware's */
         {0x2000, 0, CANOPEN_UNSIGNED16, RW, CANOPEN_LIVE, 2, 0},                     /* the firmware's */
         {0x2000, 0, CANOPEN_VISIBLE_STRING, RW, CANOPEN_IN_VALUES, CANOPEN_DEVICE_SDO + 1, 0}, /* for the server */
+        {0x2000, 0, INTEGER24, RW, CANOPEN_IN_VALUES, 3, VALUES - 3},                          /* to be widened */
     };
     const CANOPEN_OBJECT good = objects[4];
 
@@ -251,6 +253,23 @@ static void what_is_stored_is_void_for_another_dictionary(void)
     CHECK_EQUAL(BytesGet16(values + WORD_PLACE), 3);
 }
 
+/* The fourth byte follows the sign of the three that are stored. */
+static void a_narrow_integer_is_restored_with_its_sign(void)
+{
+    const CANOPEN_OBJECT good = objects[4];
+    const RTS_UI8 negative[] = {0xFE, 0xFF, 0xFF};
+
+    start();
+    objects[4] = (CANOPEN_OBJECT){0x2000, 0, INTEGER24, RW | CANOPEN_ACCESS_STORED, CANOPEN_IN_VALUES, 3, NARROW_PLACE};
+    CHECK(begin(NODE));
+    CHECK_EQUAL(write_object(0x2000, 0, negative, 3), 0);
+    CHECK_EQUAL(BytesGet32(values + NARROW_PLACE), 0xFFFFFFFE);
+    CHECK_EQUAL(CanopenStoreSave(&slave, CANOPEN_PARTS), ERR_OK);
+    CHECK(begin(NODE));
+    CHECK_EQUAL(BytesGet32(values + NARROW_PLACE), 0xFFFFFFFE);
+    objects[4] = good;
+}
+
 static void a_file_of_garbage_is_void(void)
 {
     RTS_UI8 garbage[400];
@@ -314,6 +333,7 @@ int main(void)
     RUN(fastscan_selects_only_with_the_last_bit_and_the_first_part_next);
     RUN(a_power_cut_while_it_stores_leaves_the_previous_or_the_new_values);
     RUN(what_is_stored_is_void_for_another_dictionary);
+    RUN(a_narrow_integer_is_restored_with_its_sign);
     RUN(a_file_of_garbage_is_void);
     RUN(error_of_the_program_lasts_over_a_reset_of_communication);
     RUN(every_event_time_is_kept);

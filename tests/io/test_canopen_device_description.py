@@ -48,6 +48,12 @@ def compiled(folder: Path, old: str = "", new: str = "", **keys: str) -> bytes:
         ('name = "Mixer"', 'name = "Mixér"', "name can have 63 printable ASCII characters"),
         ('"Main.error"', '"Main.count"', "Main.count is UDINT, but Field.emergency is 16 bits"),
         ("heartbeat", "heartbeet", "there is no 'heartbeet' here"),
+        ('"A140:01"', '"A480:01"', "A480 is in an area of CiA 405 that others write, and Main.narrow is in read"),
+        ('"A140:01"', '"A040:01"', "A040 is an object of UNSIGNED8, but Main.narrow is DINT"),
+        ('"A140:01"', '"A900:01"', "CiA 405 assigns no type to A900"),
+        ('"2102"', '"A0C0:FD"', "A0C0:FD and those that follow have no room for Main.temps"),
+        ('["Main.energy"]', '["Main.batch2"]', "batch2"),
+        ('["2104", "2103:01"]', '["Main.nothing"]', "Main.nothing is not an object of .canopen_device.read. for a PDO"),
     ],
 )
 def test_mistakes_are_reported(tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -74,6 +80,11 @@ def test_fifth_pdo_needs_an_identifier(tmp_path: Path) -> None:
     pdos = ", ".join(['{ objects = ["2104"] }'] * 3)
     with pytest.raises(CompileError, match="only 4 PDOs have an identifier by the node; give it a cob"):
         compiled(tmp_path, "tpdo = [", f"tpdo = [{pdos},")
+
+
+def test_text_is_no_network_variable(tmp_path: Path) -> None:
+    with pytest.raises(CompileError, match="CiA 405 has no network variables of STRING"):
+        compiled(tmp_path, 'read."2101" = "Main.batch"\n', "", write=WRITE.replace('["Main.night"]', '["Main.batch"]'))
 
 
 def test_eds_is_the_same_for_the_same_image_and_has_no_doubts(tmp_path: Path) -> None:

@@ -128,6 +128,8 @@ static RTS_UI32 write_values(CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object,
     memcpy(to, data, size);
     if (object->type == CANOPEN_VISIBLE_STRING)
         memset(to + size, 0, object->size + 1u - size);
+    else if (CanopenIsNarrow(size))
+        CanopenWiden(to, size, CanopenIsSigned(object));
     slave->written++;
     SysLockLeave(lock);
     return 0;

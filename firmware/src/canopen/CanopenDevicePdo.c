@@ -80,7 +80,7 @@ static RTS_UI32 resolve(const CANOPEN_SLAVE *slave, RTS_UI32 map, RTS_UI32 direc
         return abort;
     if (object.where != CANOPEN_IN_VALUES || (object.access & access) == 0 || CanopenDictGetBits(&object) != bits)
         return SDO_ABORT_NOT_MAPPABLE;
-    *place = (RTS_UI16)object.place;
+    *place = (RTS_UI16)(object.place | (CanopenIsSigned(&object) ? CANOPEN_SIGNED : 0));
     return 0;
 }
 
@@ -236,6 +236,11 @@ static void copy_bits(RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from, RTS_UI3
     }
 }
 
+static RTS_UI32 get_place(const CANOPEN_PDO_RUN *run, RTS_UI32 number)
+{
+    return run->place[number] & ~(RTS_UI32)CANOPEN_SIGNED;
+}
+
 /* ---- reception ---- */
 
 static void publish(CANOPEN_PDO_RUN *run, const RTS_UI8 *data, RTS_UI32 size)
@@ -319,8 +324,12 @@ static void unpack(CANOPEN_SLAVE *slave, const CANOPEN_PDO_SETTING *pdo, CANOPEN
     slave->written++;
     for (RTS_UI32 i = 0; i < pdo->count; i++) {
         RTS_UI32 bits = pdo->map[i] & 0xFF;
-        if (run->place[i] != CANOPEN_NOWHERE)
-            copy_bits(slave->values + run->place[i], 0, data, bit, bits);
+        if (run->place[i] != CANOPEN_NOWHERE) {
+            RTS_UI8 *value = slave->values + get_place(run, i);
+            copy_bits(value, 0, data, bit, bits);
+            if (bits > 8 && CanopenIsNarrow(bits / 8))
+                CanopenWiden(value, bits / 8, (run->place[i] & CANOPEN_SIGNED) != 0);
+        }
         bit += bits;
     }
 }
@@ -367,7 +376,7 @@ static bool pack(const CANOPEN_SLAVE *slave, RTS_UI32 number, CAN_FRAME *frame)
     frame->id = run->active;
     frame->size = run->size;
     for (RTS_UI32 i = 0; i < pdo->count && frame->id != 0; i++) {
-        copy_bits(frame->data, bit, slave->values + run->place[i], 0, pdo->map[i] & 0xFF);
+        copy_bits(frame->data, bit, slave->values + get_place(run, i), 0, pdo->map[i] & 0xFF);
         bit += pdo->map[i] & 0xFF;
     }
     SysLockLeave(lock);

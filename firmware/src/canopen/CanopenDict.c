@@ -6,6 +6,7 @@
 #include "CanopenDict.h"
 
 #include <stddef.h>
+#include <string.h>
 
 enum {
     RO = CANOPEN_ACCESS_READ,
@@ -15,7 +16,7 @@ enum {
     KIND = 2,
     INHIBIT = 3,
     PDO_SPACE = 0x200, /* objects from 1400h to 1600h and so on */
-    MOST_VALUES = 0xFFFE,
+    MOST_VALUES = CANOPEN_SIGNED - 1,
 };
 
 #if CANOPEN_DEVICE_DATA > 0
@@ -93,10 +94,31 @@ static RTS_UI32 search(const CANOPEN_SLAVE *slave, RTS_UI32 key)
     return low;
 }
 
+static RTS_UI32 get_wide(RTS_UI32 size)
+{
+    return size < 4 ? 4 : 8;
+}
+
+bool CanopenIsNarrow(RTS_UI32 size)
+{
+    return size < 8 && (size & (size - 1)) != 0;
+}
+
+bool CanopenIsSigned(const CANOPEN_OBJECT *object)
+{
+    return object->type < CANOPEN_UNSIGNED24;
+}
+
+void CanopenWiden(RTS_UI8 *value, RTS_UI32 size, bool is_signed)
+{
+    memset(value + size, is_signed && value[size - 1] >> 7 != 0 ? 0xFF : 0, get_wide(size) - size);
+}
+
 static bool is_object_good(const CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object)
 {
     bool is_text = object->type == CANOPEN_VISIBLE_STRING;
     RTS_UI32 room = slave->values_size;
+    RTS_UI32 size = object->size;
 
     if (object->size == 0 || object->size > CANOPEN_DEVICE_SDO)
         return false;
@@ -107,7 +129,9 @@ static bool is_object_good(const CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *obj
                object->size <= sizeof(object->place) && (object->access & CANOPEN_ACCESS_WRITE) == 0;
     else if (is_text)
         room = room > 0 ? room - 1 : 0;
-    return object->place <= room && object->size <= room - object->place &&
+    else if (CanopenIsNarrow(object->size))
+        size = get_wide(size);
+    return object->place <= room && size <= room - object->place &&
            (object->where == CANOPEN_IN_VALUES || (object->access & CANOPEN_ACCESS_WRITE) == 0);
 }
 

@@ -201,6 +201,8 @@ static void load_values(const CANOPEN_SLAVE *slave, const FILE_ENTRY *entry, RTS
             place += size;
             RTS_UI32 lock = SysLockEnter();
             memcpy(slave->values + object->place + at, data, size);
+            if (at == 0 && object->type != CANOPEN_VISIBLE_STRING && CanopenIsNarrow(size))
+                CanopenWiden(slave->values + object->place, size, CanopenIsSigned(object));
             SysLockLeave(lock);
         }
     }

@@ -26,6 +26,7 @@ from plctool.io.faults import FAULTS
 from plctool.io.mistakes import Mistakes
 
 if TYPE_CHECKING:
+    from plctool.io.canopen.profile import ProgramFacts
     from plctool.io.device_file import DeviceFile
 
 HOLD, ZERO, VALUE = int(lib.IO_HOLD), int(lib.IO_ZERO), int(lib.IO_VALUE)
@@ -126,6 +127,9 @@ class Connector:
 
     def complete(self, mistakes: Mistakes) -> None:
         """The types of all channels are known: a kind's own class overrides it to make what depends on them."""
+
+    def describe(self, program: ProgramFacts) -> None:
+        """The image is made: a kind's own class overrides it if its parameters describe the program."""
 
 
 @dataclass

@@ -14,7 +14,7 @@ from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.objects import emit_objects
 from plctool.compiler.codegen.stack import CallGraph, Frames
-from plctool.compiler.image.io_configuration import assign_tasks, configuration_of, io_document
+from plctool.compiler.image.io_configuration import assign_tasks, configuration_of, describe_program, io_document
 from plctool.compiler.image.online_change import Steps, check_facts, constants_of, device_facts, facts_of, tasks_of
 from plctool.compiler.syntax.diagnostics import Diagnostic
 from plctool.compiler.syntax.library import is_standard
@@ -115,6 +115,7 @@ def _build(
     code, io, devices = linked.code, None, []
     if program.io is not None and program.io.connectors:
         assign_tasks(program, program.io)
+        describe_program(program, info, program.io)
         tables = configuration_of(program, program.io)
         configuration, devices = pack_configuration(tables), device_facts(tables)
         code += bytes(-len(code) % _CODE_ALIGN)

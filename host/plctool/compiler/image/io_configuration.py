@@ -13,6 +13,8 @@ from plctool.core import lib
 from plctool.iec.areas import Area
 from plctool.iec.types import Elementary, Type, base_of
 from plctool.iec.values import encode
+from plctool.image.file import ApplicationInfo
+from plctool.io.canopen.profile import EVENT, FREEWHEELING, PERIODIC, ProgramFacts, TaskFacts
 from plctool.io.configuration import (
     ChannelEntry,
     Configuration,
@@ -46,6 +48,22 @@ def assign_tasks(program: TypedProgram, description: Description) -> None:
         if bus is not None and (not using or (waited_for and bus not in using)):
             using = sorted({*using, bus})
         channel.tasks = using
+
+
+_KINDS = {TaskKind.CYCLIC: PERIODIC, TaskKind.FREEWHEELING: FREEWHEELING}
+
+
+def describe_program(program: TypedProgram, info: ApplicationInfo, description: Description) -> None:
+    """Tells the connectors what the program is, for those whose parameters describe it."""
+    tasks = tuple(
+        TaskFacts(
+            task.name, _KINDS.get(task.kind, EVENT), task.priority,
+            task.interval_us if task.kind is TaskKind.CYCLIC else 0,
+        )
+        for task in program.tasks
+    )  # fmt: skip
+    for connector in description.connectors:
+        connector.describe(ProgramFacts(info.project, info.version, tasks))
 
 
 def bus_task(connector: Connector, tasks: list[Task]) -> int | None:

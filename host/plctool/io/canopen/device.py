@@ -5,20 +5,21 @@
     node = 9
     heartbeat = "T#200ms"
     identity = { name = "Mixer", vendor = 0x319, product = 7, revision = 0x10002 }
-    read  = { "2100:00" = "Main.count", "2101:00" = "Main.batch" }   # what others read
+    read  = { "2100:00" = "Main.count", "A0C0:01" = "Main.power", auto = ["Main.energy"] }   # what others read
     write = { "2200:00" = { var = "Main.setpoint", store = true } }  # what others write
     tpdo  = [{ objects = ["2100:00"], every = "T#50ms" }]
     rpdo  = [{ objects = ["2200:00"], deadline = "T#200ms" }]
 
-A key is an object, INDEX or INDEX:SUB in hex. An ARRAY is an object whose sub-indices are its elements. The tool makes
-the dictionary; the firmware adds the objects of communication (CanopenDict.h). docs/canopen.md.
+A key is an object, INDEX or INDEX:SUB in hex. An ARRAY is an object whose sub-indices are its elements. Objects from
+A000 on are the network variables of CiA 405 (profile.py), which `auto` places by their types. The tool makes the
+dictionary; the firmware adds the objects of communication (CanopenDict.h). docs/canopen.md.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from plctool.core import ffi, lib
 from plctool.files import Pos
@@ -26,6 +27,17 @@ from plctool.iec.types import BYTE, UDINT, ArrayType, Elementary, StringType, Su
 from plctool.io.canopen.data_types import DATA_TYPES, UNSIGNED8, UNSIGNED32, VISIBLE_STRING, DataType, type_named
 from plctool.io.canopen.eds import MAX_PDO_BITS
 from plctool.io.canopen.manager import MAX_NODE, take_number
+from plctool.io.canopen.profile import (
+    END_RESERVED,
+    FIRST_AREA,
+    MAX_SUB,
+    ProgramFacts,
+    memory_bytes,
+    place,
+    program_objects,
+    segment_at,
+    segment_of,
+)
 from plctool.io.channels import channel_of
 from plctool.io.common import read_connector
 from plctool.io.mistakes import Mistakes
@@ -38,7 +50,6 @@ LEAST_PDOS = 4  # of each direction, so that a manager can map some
 MAX_PDOS = 64
 MAX_MAPPINGS = int(lib.CANOPEN_MAPPINGS)
 MAX_TEXT = 63
-MAX_ELEMENTS = 254
 _MOST_LIMITED = 4  # bytes of a value with limits
 INVALID, NO_REMOTE = 0x8000_0000, 0x4000_0000
 FIRST_RPDO, FIRST_TPDO = 0x200, 0x180
@@ -55,7 +66,8 @@ _TPDO, _RPDO, _STORED = int(lib.CANOPEN_ACCESS_TPDO), int(lib.CANOPEN_ACCESS_RPD
 
 @dataclass
 class Value:
-    """A variable that others read or write. `sub` is None if the key has none."""
+    """A variable that others read or write. `sub` is None if the key has none; `auto`: both follow from its name and
+    type."""
 
     index: int
     sub: int | None
@@ -63,6 +75,7 @@ class Value:
     stored: bool
     channel: Channel
     pos: Pos
+    auto: bool = False
 
 
 @dataclass
@@ -93,6 +106,7 @@ class CanopenSlave(Connector):
     objects: dict[tuple[int, int], dict[str, int]] = field(default_factory=dict)
     texts: bytearray = field(default_factory=bytearray)
     limits: dict[tuple[int, int], SubrangeType] = field(default_factory=dict)
+    shows_program: bool = False  # by 9501h to 9800h
 
     def add(self, number: int, value: int, name: str = "") -> None:
         """A parameter of 32 bits."""
@@ -106,31 +120,47 @@ class CanopenSlave(Connector):
     def complete(self, mistakes: Mistakes) -> None:
         """Makes the dictionary of the types of the variables."""
         size = 0
-        for value in self.values:
+        for value in sorted(self.values, key=lambda value: value.auto):  # those that have an object first
             t = value.channel.variable_type
             if t is not None:
                 size = self._add_value(value, t, -(-size // 8) * 8, mistakes)
         self._add_counts(mistakes)
         for is_tpdo, number in ((False, lib.CANOPEN_DEVICE_RPDOS), (True, lib.CANOPEN_DEVICE_TPDOS)):
             self.add_bytes(int(number), b"".join(self._settings(is_tpdo, mistakes)))
-        self.add_bytes(int(lib.CANOPEN_DEVICE_OBJECTS), b"".join(self._packed()))
-        self.add_bytes(int(lib.CANOPEN_DEVICE_TEXTS), bytes(self.texts))
+        self._add_dictionary()
         self.add_bytes(int(lib.CANOPEN_DEVICE_LIMITS), b"".join(self._packed_limits()))
         self.add(int(lib.CANOPEN_DEVICE_VALUES), size)
         self.parameters.sort(key=lambda p: p.id)
 
+    def describe(self, program: ProgramFacts) -> None:
+        """Adds the objects that describe the program."""
+        if not self.shows_program:
+            return
+        for constant in program_objects(program):
+            if isinstance(constant.value, str):
+                self.add_text(constant.index, constant.value, constant.sub)
+            else:
+                self.add_constant(constant.index, constant.sub, constant.type, constant.value)
+        tables = (int(lib.CANOPEN_DEVICE_OBJECTS), int(lib.CANOPEN_DEVICE_TEXTS))
+        self.parameters = [parameter for parameter in self.parameters if parameter.id not in tables]
+        self._add_dictionary()
+
     # ---- the dictionary ----
+
+    def _add_dictionary(self) -> None:
+        self.add_bytes(int(lib.CANOPEN_DEVICE_OBJECTS), b"".join(self._packed()))
+        self.add_bytes(int(lib.CANOPEN_DEVICE_TEXTS), bytes(self.texts))
 
     def add_constant(self, index: int, sub: int, kind: DataType, value: int, *, of_node: bool = False) -> None:
         """An object that never changes."""
         where = lib.CANOPEN_OF_NODE if of_node else lib.CANOPEN_CONSTANT
         self._add(index, sub, kind, _READ, where=int(where), size=kind.size, place=value)
 
-    def add_text(self, index: int, text: str) -> None:
+    def add_text(self, index: int, text: str, sub: int = 0) -> None:
         """A text that never changes."""
         data = text.encode("ascii")
         where = int(lib.CANOPEN_TEXT)
-        self._add(index, 0, VISIBLE_STRING, _READ, where=where, size=len(data), place=len(self.texts))
+        self._add(index, sub, VISIBLE_STRING, _READ, where=where, size=len(data), place=len(self.texts))
         self.texts += data
 
     def _add(self, index: int, sub: int, kind: DataType, access: int, *, where: int, size: int, place: int) -> None:
@@ -142,22 +172,24 @@ class CanopenSlave(Connector):
     def _add_value(self, value: Value, t: Type, place: int, mistakes: Mistakes) -> int:
         """The objects of a variable whose value is at `place`; returns where the next one may be."""
         base = base_of(t)
+        is_array = isinstance(base, ArrayType)
         elements = 1
         if isinstance(base, ArrayType):
             elements = _elements_of(base)
             base = base_of(base.element)
-            if value.sub is not None:
-                key = f"{value.index:04X}"
-                mistakes.error(value.pos, f'{value.channel.target} is {t}: write "{key}", whose sub-indices it has')
-                return place
         kind = _type_of(base)
-        if kind is None or not 1 <= elements <= MAX_ELEMENTS:
+        if kind is None or not 1 <= elements <= MAX_SUB:
             what = f"no object of CANopen can be {t}; name its elements, or use another type"
             mistakes.error(value.pos, f"{value.channel.target}: {what}")
             return place
-        first = 0 if value.sub is None else value.sub
+        try:
+            kind = self._settle(value, t, kind, base.size, elements)
+        except _MistakeError as mistake:
+            mistakes.error(value.pos, str(mistake))
+            return place
+        first = value.sub if value.sub is not None else int(is_array)
         for number in range(elements):
-            sub = first if elements == 1 and not isinstance(base_of(t), ArrayType) else number + 1
+            sub = first + number
             if (value.index, sub) in self.objects:
                 mistakes.error(value.pos, f"the object {value.index:04X}:{sub:02X} is there already")
                 return place
@@ -170,6 +202,38 @@ class CanopenSlave(Connector):
             self.limits[value.index, first] = t
         value.channel.parameter, value.channel.parameter_bit = int(lib.CANOPEN_DEVICE_VALUE), 8 * place
         return place + elements * base.size
+
+    def _settle(self, value: Value, t: Type, kind: DataType, size: int, elements: int) -> DataType:
+        """Finds the object of a variable and the type that it has there. Raises _MistakeError."""
+        target = value.channel.target
+        if value.auto:
+            segment = segment_of(kind, is_output=value.writable)
+            if segment is None:
+                raise _MistakeError(f'CiA 405 has no network variables of {t}: write "2100" = "{target}", for example')
+            found = place(target, segment, elements, self.objects.keys())
+            if found is None:
+                raise _MistakeError(
+                    f"the area of {kind.name} has no place for {target}; give it an object from 2000 on"
+                )
+            value.index, value.sub = found
+            return kind
+        if not FIRST_AREA <= value.index < END_RESERVED:
+            if elements > 1 and value.sub is not None:
+                raise _MistakeError(f'{target} is {t}: write "{value.index:04X}", whose sub-indices it has')
+            return kind
+        segment = segment_at(value.index)
+        if segment is None:
+            raise _MistakeError(f"CiA 405 assigns no type to {value.index:04X}; take an object from A000 to A8FF")
+        value.sub = value.sub or 1
+        if segment.is_output is not value.writable:
+            way, other = ("write", "read") if segment.is_output else ("read", "write")
+            area = f"{value.index:04X} is in an area of CiA 405 that others {way}"
+            raise _MistakeError(f'{area}, and {target} is in {other}; let "auto" choose, or take another object')
+        if segment.type.kind != kind.kind or memory_bytes(segment.type) != size:
+            raise _MistakeError(f"{value.index:04X} is an object of {segment.type.name}, but {target} is {t}")
+        if value.sub + elements - 1 > MAX_SUB:
+            raise _MistakeError(f"{value.index:04X}:{value.sub:02X} and those that follow have no room for {target}")
+        return segment.type
 
     @staticmethod
     def _access(value: Value, kind: DataType) -> int:
@@ -227,11 +291,21 @@ class CanopenSlave(Connector):
             "map": maps + [0] * (MAX_MAPPINGS - len(maps)),
         }
 
+    def _key_of(self, text: str) -> tuple[int, int]:
+        """The object that a PDO names by its number, or by the variable that `auto` has placed."""
+        match = _KEY.fullmatch(text)
+        if match is not None:
+            sub = int(FIRST_AREA <= int(match[1], 16) < END_RESERVED) if match[2] is None else int(match[2], 16)
+            return int(match[1], 16), sub
+        return next(
+            ((v.index, v.sub or 0) for v in self.values if v.auto and v.channel.target.casefold() == text.casefold()),
+            (0, 0),
+        )
+
     def _mapping(self, is_tpdo: bool, pdo: Pdo, mistakes: Mistakes) -> Iterator[int]:
         bits = 0
         for entry in pdo.objects:
-            match = _KEY.fullmatch(str(entry.value))
-            key = (int(match[1], 16), int(match[2] or "0", 16)) if match else (0, 0)
+            key = self._key_of(str(entry.value))
             found = self.objects.get(key)
             wanted = _TPDO if is_tpdo else _RPDO
             if found is None or not found["access"] & wanted:
@@ -244,6 +318,10 @@ class CanopenSlave(Connector):
                 mistakes.error(entry.pos, f"a PDO has 64 bits; with {entry.value} there are {bits}")
                 return
             yield key[0] << 16 | key[1] << 8 | size
+
+
+class _MistakeError(Exception):
+    """A message about a value."""
 
 
 def _elements_of(t: ArrayType) -> int:
@@ -282,6 +360,7 @@ def read_canopen_device(table: Table, context: Context) -> list[Connector]:
         (lib.CANOPEN_DEVICE_FLAGS, flags, "flags"),
     ):
         made.add(int(number), value, name)
+    made.shows_program = table.flag("program")
     _identify(table, made)
     for key, writable in (("read", False), ("write", True)):
         _read_values(table, key, writable, made)
@@ -320,14 +399,24 @@ def _identify(table: Table, made: CanopenSlave) -> None:
 
 def _read_values(table: Table, key: str, writable: bool, made: CanopenSlave) -> None:
     names = table.table(key)
-    for entry in names.items() if names is not None else ():
+    if names is None:
+        return
+    for entry in names.strings("auto"):
+        target = str(entry.value)
+        channel = channel_of(replace(entry, key=target), table.mistakes, output=not writable, holds=True)
+        if channel is not None:
+            made.values.append(Value(0, None, writable, False, channel, entry.pos, auto=True))
+            made.channels.append(channel)
+    for entry in names.items():
+        if entry.key == "auto":
+            continue
         match = _KEY.fullmatch(entry.key)
         if match is None or not _FIRST_OBJECT <= int(match[1], 16) <= _LAST_OBJECT:
             message = f"'{entry.key}' is not an object from 2000 to BFFF; write for example \"2100:00\""
             table.mistakes.error(entry.key_pos, message)
             continue
         sub = int(match[2], 16) if match[2] else None
-        if sub is not None and sub > MAX_ELEMENTS:
+        if sub is not None and sub > MAX_SUB:
             table.mistakes.error(entry.key_pos, f"the sub-indices of {match[1]} are 00 to FE")
             continue
         stored = writable and isinstance(entry.value, Table) and entry.value.flag("store")

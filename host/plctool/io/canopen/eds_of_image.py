@@ -12,11 +12,14 @@ from plctool.image.file import Image
 from plctool.io.canopen.data_types import DATA_TYPES
 from plctool.io.canopen.device import DRIVER
 from plctool.io.canopen.eds import BIT_RATES, TYPE_ARRAY, TYPE_RECORD, TYPE_VAR
+from plctool.io.canopen.profile import dynamic_channels, names_of, segment_at
 from plctool.io.configuration import ConnectorEntry, configuration_of_image
 
 _MANDATORY = (0x1000, 0x1001, 0x1018)
 _FIRST_MANUFACTURER, _END_MANUFACTURER = 0x2000, 0x6000
 _LAST_FIXED = 0x1FFF
+_NO_DOWNLOAD = 1  # ObjFlags: a configuration does not write it
+_AS_IN_PROFILE = 3  # dynamic channels, in the layout of CiA 405
 _ARRAYS = (0x1003, 0x1010, 0x1011, 0x1016, 0x1020, 0x1029)
 _DUMMIES = range(1, 8)
 _NAMES = {
@@ -51,6 +54,7 @@ class Row:
     default: str = ""
     mappable: bool = False
     limits: tuple[int, int] | None = None
+    flags: int = 0  # ObjFlags
 
 
 @dataclass
@@ -84,6 +88,11 @@ class _Writer:
             if c["parameter"] == lib.CANOPEN_DEVICE_VALUE
         }
         self._objects: dict[int, Object] = {}
+        self._firsts = {
+            int(entry.place): int(entry.sub)
+            for entry in self._table("CANOPEN_OBJECT", lib.CANOPEN_DEVICE_OBJECTS)
+            if entry.where == lib.CANOPEN_IN_VALUES and int(entry.place) in self._places
+        }
         self._limits = {
             (int(limit.index), int(limit.sub)): (_signed(limit, limit.low), _signed(limit, limit.high))
             for limit in self._table("CANOPEN_LIMIT", int(lib.CANOPEN_DEVICE_LIMITS))
@@ -113,6 +122,8 @@ class _Writer:
             )
         ]
         sections = [self._file_info(file_name), self._device_info(*counts), self._dummies(), *self._lists()]
+        if self._has_segments():
+            sections.append(("DynamicChannels", dynamic_channels()))
         sections += [s for index in sorted(self._objects) for s in self._sections(self._objects[index])]
         return "\n".join("\n".join([f"[{name}]", *lines, ""]) for name, lines in sections)
 
@@ -135,7 +146,7 @@ class _Writer:
             Row(
                 sub, self._row_name(entry), int(entry.type), self._access(entry), self._default(entry),
                 bool(entry.access & (lib.CANOPEN_ACCESS_TPDO | lib.CANOPEN_ACCESS_RPDO)),
-                self._limits.get((index, sub)),
+                self._limits.get((index, sub)), _NO_DOWNLOAD if names_of(index) is not None else 0,
             )
         )  # fmt: skip
 
@@ -146,9 +157,15 @@ class _Writer:
             return self._places[place]
         first = max((p for p in self._places if p < place), default=None)
         name = f"object {entry.index:04X}" if first is None else self._places[first]
-        return f"{name.partition(',')[0]}, element {entry.sub}"
+        number = entry.sub if first is None else entry.sub - self._firsts[first] + 1
+        return f"{name.partition(',')[0]}, element {number}"
 
     def _object_name(self, entry: Any) -> str:
+        segment, program = segment_at(int(entry.index)), names_of(int(entry.index))
+        if segment is not None:
+            return f"{segment.type.name} {'outputs' if segment.is_output else 'inputs'}"
+        if program is not None:
+            return program[0]
         if entry.where == lib.CANOPEN_IN_VALUES:
             return self._variable(entry).partition(",")[0]
         return _NAMES.get(int(entry.index), f"Object {entry.index:04X}")
@@ -159,6 +176,9 @@ class _Writer:
             return self._variable(entry)
         if sub == 0:
             return "Highest sub-index"
+        program = names_of(index)
+        if program is not None:
+            return program[1][sub - 1]
         return _SUB_NAMES.get((index, sub), f"Entry {sub}")
 
     @staticmethod
@@ -176,7 +196,7 @@ class _Writer:
         if where == lib.CANOPEN_OF_NODE:
             return f"$NODEID+0x{place:X}"
         if where == lib.CANOPEN_TEXT:
-            return self._texts[place : place + int(entry.size)].decode("ascii")
+            return self._texts[place : place + int(entry.size)].decode("ascii").rstrip("\0")
         if where == lib.CANOPEN_IN_VALUES or entry.index == 0x1018:
             return ""
         stores = bool(self._number(lib.CANOPEN_DEVICE_FLAGS) & lib.CANOPEN_DEVICE_STORE)
@@ -205,6 +225,9 @@ class _Writer:
 
     # ---- sections ----
 
+    def _has_segments(self) -> bool:
+        return any(segment_at(index) is not None for index in self._objects)
+
     @staticmethod
     def _file_info(file_name: str) -> tuple[str, list[str]]:
         lines = [f"FileName={file_name}", "FileVersion=1", "FileRevision=1", "EDSVersion=4.0", "CreatedBy=plctool"]
@@ -218,7 +241,8 @@ class _Writer:
             "VendorName=", f"VendorNumber={identity.get(1, '0')}", f"ProductName={name}",
             f"ProductNumber={identity.get(2, '0')}", f"RevisionNumber={identity.get(3, '0')}", "OrderCode=",
             *(f"BaudRate_{rate}=1" for rate in BIT_RATES),
-            "SimpleBootUpMaster=0", "SimpleBootUpSlave=1", "Granularity=1", "DynamicChannelsSupported=0",
+            "SimpleBootUpMaster=0", "SimpleBootUpSlave=1", "Granularity=1",
+            f"DynamicChannelsSupported={_AS_IN_PROFILE if self._has_segments() else 0}",
             "GroupMessaging=0", f"NrOfRXPDO={rpdos}", f"NrOfTXPDO={tpdos}", f"LSS_Supported={int(lss)}",
         ]  # fmt: skip
 
@@ -256,8 +280,9 @@ def _signed(limit: Any, value: int) -> int:
 
 def _lines(row: Row, name: str) -> list[str]:
     default = [f"DefaultValue={row.default}"] if row.default else []
+    flags = [f"ObjFlags={row.flags}"] if row.flags else []
     limits = [] if row.limits is None else [f"LowLimit={row.limits[0]}", f"HighLimit={row.limits[1]}"]
     return [
         f"ParameterName={name}", f"ObjectType=0x{TYPE_VAR:X}", f"DataType=0x{DATA_TYPES[row.type].code:04X}",
-        f"AccessType={row.access}", *limits, *default, f"PDOMapping={int(row.mappable)}",
+        f"AccessType={row.access}", *limits, *default, f"PDOMapping={int(row.mappable)}", *flags,
     ]  # fmt: skip
