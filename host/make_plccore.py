@@ -22,6 +22,7 @@ SHARED = [
     "IoDrvModbus.h",
     "IoDrvCanopen.h",
     "CanopenObject.h",
+    "CanopenProgram.h",
     "IoDrvCanopenDevice.h",
     "IoDrvSysfs.h",
     "CmpIecAbi.h",

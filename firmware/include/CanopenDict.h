@@ -13,6 +13,7 @@
 
 #include "Canopen.h"
 #include "CanopenObject.h"
+#include "CanopenProgram.h"
 #include "SysCan.h"
 #include "rts_config.h"
 
@@ -99,6 +100,10 @@ typedef struct {
     CANOPEN_OBJECT object;
     RTS_UI32 size;
     RTS_UI32 done;
+#if CANOPEN_PROGRAM_DOWNLOAD
+    RTS_UI32 passed_on; /* bytes of a program before those in `data` */
+    RTS_UI16 crc;       /* of them */
+#endif
     RTS_UI32 block_start; /* of what is read: where the block begins */
     RTS_UI32 since_ms;
     CAN_FRAME reply;
@@ -120,6 +125,9 @@ typedef bool (*PF_CANOPEN_DEVICE_SEND)(const CAN_FRAME *frame);
 /* A device. The owner sets the first fields before CanopenDeviceBegin, and does not change them. */
 typedef struct {
     PF_CANOPEN_DEVICE_SEND send;
+#if CANOPEN_PROGRAM_DOWNLOAD
+    const CANOPEN_PROGRAM *program; /* NULL: it has no such objects */
+#endif
     const CANOPEN_OBJECT *objects;
     RTS_UI32 object_count;
     const CANOPEN_LIMIT *limits;

@@ -20,12 +20,13 @@ enum {
 
 /* where of CANOPEN_OBJECT: what `place` is */
 enum {
-    CANOPEN_IN_VALUES = 0, /* byte of the values; a text has a NUL after its `size` characters */
-    CANOPEN_CONSTANT = 1,  /* the value */
-    CANOPEN_TEXT = 2,      /* byte of the strings, `size` characters */
-    CANOPEN_OF_NODE = 3,   /* the value without the node number, which is added */
-    CANOPEN_SETTING = 4,   /* of the firmware: byte of its settings */
-    CANOPEN_LIVE = 5,      /* of the firmware */
+    CANOPEN_IN_VALUES = 0,      /* byte of the values; a text has a NUL after its `size` characters */
+    CANOPEN_CONSTANT = 1,       /* the value */
+    CANOPEN_TEXT = 2,           /* byte of the strings, `size` characters */
+    CANOPEN_OF_NODE = 3,        /* the value without the node number, which is added */
+    CANOPEN_SETTING = 4,        /* of the firmware: byte of its settings */
+    CANOPEN_LIVE = 5,           /* of the firmware */
+    CANOPEN_PROGRAM_OBJECT = 6, /* PROGRAM_* of CanopenProgram.h */
 };
 
 /* An entry of the dictionary. Those of a table are in ascending order of index and sub-index. */
@@ -65,6 +66,7 @@ typedef struct {
 enum {
     CANOPEN_DEVICE_STORE = 1, /* flags: 1010h and 1011h */
     CANOPEN_DEVICE_LSS = 2,
+    CANOPEN_DEVICE_DOWNLOAD = 4, /* 1F50h to 1F57h */
 };
 
 /* Entry `number` of the firmware's own objects of communication, without those of PDOs. False: there are no more. */

@@ -10,6 +10,10 @@
 #define CMPAPPSRV_H
 
 #include "CmpItf.h"
+#include "CmpStd.h"
+
+/* True while a tool that is connected has begun a download. From main. */
+bool AppSrvHasDownload(void);
 
 RTS_RESULT CmpAppSrv_Hook(CMP_HOOK hook);
 

@@ -115,6 +115,7 @@ enum {
     CMPID_IecSocket = 0x0073,
     CMPID_IecCom = 0x0074,
     CMPID_CmpTaskLoad = 0x00C8,
+    CMPID_CmpCanopenProgram = 0x07E0,
     CMPID_IecTaskHandler = 0x00C9,
 };
 

@@ -72,6 +72,9 @@
 #if HAS_IoDrvCanopenDevice && (CANOPEN_DEVICE_DATA == 0 || !HAS_CmpCan)
 #error "HAS_IoDrvCanopenDevice: set CANOPEN_DEVICE_DATA in rts_config_port.h, and HAS_CmpCan in cmp_list.c."
 #endif
+#if HAS_CmpCanopenProgram && (!CANOPEN_PROGRAM_DOWNLOAD || !HAS_IoDrvCanopenDevice)
+#error "HAS_CmpCanopenProgram: set CANOPEN_PROGRAM_DOWNLOAD in rts_config_port.h, and HAS_IoDrvCanopenDevice in cmp_list.c."
+#endif
 #if HAS_CmpLogKeep && (LOG_KEEP == 0 || !HAS_CmpLog)
 #error \
     "HAS_CmpLogKeep: set LOG_KEEP, the entries that survive power-off, in rts_config_port.h, and HAS_CmpLog in cmp_list.c."

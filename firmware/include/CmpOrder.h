@@ -109,6 +109,9 @@ X(CmpAppEmbedded)
 #if HAS_COMMUNICATION
 X(CmpSrv)
 X(CmpAppSrv)
+#if HAS_CmpCanopenProgram
+X(CmpCanopenProgram)
+#endif
 #if HAS_CmpLogSrv
 X(CmpLogSrv)
 #endif

@@ -37,7 +37,19 @@ enum {
 };
 
 #ifndef RTS_CFFI
+#include "CanopenProgram.h"
 #include "CmpItf.h"
+#include "SysCan.h"
+#include "rts_config.h"
+
+#if CANOPEN_PROGRAM_DOWNLOAD
+/* Before any configuration: the functions of 1F50h to 1F57h. */
+void IoDrvCanopenDeviceSetProgram(const CANOPEN_PROGRAM *program);
+
+/* Makes the reply "written" to the last request; returns the network it is for. */
+RTS_UI32 IoDrvCanopenDeviceMakeReply(CAN_FRAME *frame);
+#endif
+
 RTS_RESULT IoDrvCanopenDevice_Hook(CMP_HOOK hook);
 #endif
 

@@ -598,6 +598,11 @@
 #define CANOPEN_DEVICE_PDOS 4
 #endif
 
+/* 1: the manager of the network can replace the program (CmpCanopenProgram.h): 1 KiB of flash, 240 bytes of RAM. */
+#ifndef CANOPEN_PROGRAM_DOWNLOAD
+#define CANOPEN_PROGRAM_DOWNLOAD 0
+#endif
+
 /* Packets that may arrive over CAN at a time, from as many tools; each costs a packet of CAN_PACKET_SIZE bytes
  * and 30. */
 #ifndef CAN_RX_SESSIONS

@@ -6,9 +6,16 @@
  * A device runs application 1 (proven). Then application 2 is downloaded, started, proves itself, saves its retain
  * variables, is stopped and started again. Each run of this story is cut at another operation. After it the device must
  * run 1 or 2, never nothing and never a mix, and must accept application 3.
+ *
+ * With BY_CANOPEN application 2 comes from the manager of a CANopen network, by block transfer to 1F50h.
  */
 #include "app_image.h"
 #include "test.h"
+#ifdef BY_CANOPEN
+#include "canopen_download.h"
+#else
+#define download_by_canopen(image) download(image)
+#endif
 
 typedef struct {
     RTS_UI32 program_size;
@@ -35,7 +42,7 @@ static bool packed; /* application 2 comes packed */
 
 static RTS_RESULT try_story(void)
 {
-    RTS_RESULT result = packed ? download_packed(&images[2]) : download(&images[2]);
+    RTS_RESULT result = packed ? download_packed(&images[2]) : download_by_canopen(&images[2]);
 
     if (result == ERR_OK)
         result = AppStartApplication();
@@ -306,6 +313,52 @@ static void cuts_go_on_for_ever(void)
     CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
+#ifdef BY_CANOPEN
+/* Until the image was started the old application runs, also after a restart. */
+static void a_manager_may_be_killed_at_each_frame(void)
+{
+    static const GEOMETRY g = {8, 0xFF, 512};
+    int last = 0;
+
+    prepare(&g);
+    do {
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        download_last_frame = last++;
+        RTS_RESULT result = download_by_canopen(&images[2]);
+        CHECK_EQUAL(app_state(), AS_RUN);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), (result == ERR_OK ? 2 : 1));
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(check_whole(), (RTS_UI32)(result == ERR_OK ? 2 : 1));
+        if (result == ERR_OK)
+            break;
+    } while (last < 1000);
+    CHECK(last > 50 && last < 1000);
+    download_last_frame = NO_FRAME;
+    check_can_be_flashed_again();
+}
+
+/* Whatever byte is wrong, the image is refused, and the old application runs. */
+static void an_image_with_a_wrong_byte_is_refused(void)
+{
+    static const GEOMETRY g = {8, 0xFF, 512};
+    static APP_BYTES wrong;
+
+    prepare(&g);
+    for (RTS_UI32 at = 0; at < images[2].size; at++) {
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        wrong = images[2];
+        wrong.bytes[at] ^= 0x10;
+        CHECK_EQUAL(download_by_canopen(&wrong), ERR_FAILED);
+        CHECK_EQUAL(download_reply.data[0], SDO_ABORT);
+        CHECK_EQUAL(app_state(), AS_RUN);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+    }
+    check_can_be_flashed_again();
+}
+#endif
+
 int main(void)
 {
     RTS_UI32 step;
@@ -313,6 +366,13 @@ int main(void)
     NEEDS_X86_64;
     for (step = 1; step <= 3; step++)
         build_counter(&images[step], step);
+#ifdef BY_CANOPEN
+    RUN(a_manager_may_be_killed_at_each_frame);
+    RUN(an_image_with_a_wrong_byte_is_refused);
+    RUN(every_cut_leaves_the_old_or_the_new_application);
+    RUN(a_flash_fault_at_any_operation_of_a_download_is_survived);
+    return test_result();
+#endif
     RUN(every_cut_leaves_the_old_or_the_new_application);
     RUN(a_second_cut_during_recovery_changes_nothing);
     RUN(a_flash_fault_at_any_operation_of_a_download_is_survived);

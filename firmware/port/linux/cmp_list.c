@@ -21,6 +21,7 @@
 #define HAS_IoDrvModbus 1
 #define HAS_IoDrvCanopen 1
 #define HAS_IoDrvCanopenDevice 1
+#define HAS_CmpCanopenProgram 1
 #define HAS_CmpForce 1
 #define HAS_CmpOperationControl 1
 #define HAS_IecLog 1

@@ -39,6 +39,7 @@
 #define HAS_IoDrvModbus 1
 #define HAS_IoDrvCanopen 1
 #define HAS_IoDrvCanopenDevice 1
+#define HAS_CmpCanopenProgram CANOPEN_PROGRAM_DOWNLOAD
 #define HAS_CmpCan 1
 #define HAS_IecCan 1
 #define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim) X(SimModbus)

@@ -71,6 +71,11 @@ RTS_UI32 CanopenAccessRead(CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object, R
     case CANOPEN_LIVE:
         BytesPut32(data, get_live(slave, object));
         break;
+#if CANOPEN_PROGRAM_DOWNLOAD
+    case CANOPEN_PROGRAM_OBJECT:
+        slave->program->read(object->place, data, size);
+        break;
+#endif
     default:
         BytesPut32(data, object->place + (object->where == CANOPEN_OF_NODE ? slave->node : 0));
         break;
@@ -234,6 +239,10 @@ RTS_UI32 CanopenAccessWrite(CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object, 
             note_change(slave, object->index);
         return abort;
     }
+#if CANOPEN_PROGRAM_DOWNLOAD
+    if (object->where == CANOPEN_PROGRAM_OBJECT)
+        return object->place == PROGRAM_CONTROL ? slave->program->control(data[0]) : SDO_ABORT_READ_ONLY;
+#endif
     memcpy(number, data, size);
     if (object->where == CANOPEN_SETTING)
         return write_setting(slave, object, data, BytesGet32(number), now_ms);

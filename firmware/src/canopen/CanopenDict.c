@@ -114,6 +114,18 @@ void CanopenWiden(RTS_UI8 *value, RTS_UI32 size, bool is_signed)
     memset(value + size, is_signed && value[size - 1] >> 7 != 0 ? 0xFF : 0, get_wide(size) - size);
 }
 
+static bool is_program_good(const CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object)
+{
+#if CANOPEN_PROGRAM_DOWNLOAD
+    return slave->program != NULL && object->place < PROGRAM_OBJECTS &&
+           (object->place != PROGRAM_DATA || (object->access & CANOPEN_ACCESS_READ) == 0);
+#else
+    RTS_UNUSED(slave);
+    RTS_UNUSED(object);
+    return false;
+#endif
+}
+
 static bool is_object_good(const CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object)
 {
     bool is_text = object->type == CANOPEN_VISIBLE_STRING;
@@ -122,6 +134,8 @@ static bool is_object_good(const CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *obj
 
     if (object->size == 0 || object->size > CANOPEN_DEVICE_SDO)
         return false;
+    if (object->where == CANOPEN_PROGRAM_OBJECT)
+        return is_program_good(slave, object);
     if (object->where == CANOPEN_TEXT)
         room = slave->texts_size;
     else if (object->where != CANOPEN_IN_VALUES)

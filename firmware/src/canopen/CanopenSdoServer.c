@@ -49,10 +49,8 @@ enum {
     READ_BLOCK_ENDS = 0xC1,
 };
 
-static RTS_UI16 get_crc(const RTS_UI8 *data, RTS_UI32 size)
+static RTS_UI16 get_crc(RTS_UI32 crc, const RTS_UI8 *data, RTS_UI32 size)
 {
-    RTS_UI32 crc = 0;
-
     for (; size > 0; size--) {
         crc ^= (RTS_UI32)*data++ << 8;
         for (RTS_UI32 bit = 0; bit < 8; bit++)
@@ -92,6 +90,62 @@ static void end_by(CANOPEN_SLAVE *slave, RTS_UI32 abort)
     slave->counters.last_abort = abort;
 }
 
+/* ---- a program ---- */
+
+#if CANOPEN_PROGRAM_DOWNLOAD
+/* A program has more bytes than there is room for: parts of it are passed on. */
+static bool is_stream(const SDO_SERVER *server)
+{
+    return server->object.where == CANOPEN_PROGRAM_OBJECT && server->object.place == PROGRAM_DATA;
+}
+
+static RTS_UI32 begin_stream(CANOPEN_SLAVE *slave)
+{
+    SDO_SERVER *server = &slave->server;
+
+    server->passed_on = 0;
+    server->crc = 0;
+    return slave->program->begin(server->has_size, server->size);
+}
+
+static RTS_UI32 pass_on(CANOPEN_SLAVE *slave)
+{
+    SDO_SERVER *server = &slave->server;
+    RTS_UI32 size = server->done;
+
+    server->crc = get_crc(server->crc, server->data, size);
+    server->passed_on += size;
+    server->done = 0;
+    return slave->program->write(server->data, size);
+}
+
+static RTS_UI32 end_stream(CANOPEN_SLAVE *slave)
+{
+    SDO_SERVER *server = &slave->server;
+    RTS_UI32 abort = pass_on(slave);
+
+    if (abort == 0 && server->has_size && server->size != server->passed_on)
+        abort = SDO_ABORT_LENGTH;
+    return abort == 0 ? slave->program->end() : abort;
+}
+
+#define crc_before(server) (is_stream(server) ? (server)->crc : 0u)
+#define replies_later(abort) ((abort) == CANOPEN_REPLIES_LATER)
+#else
+#define is_stream(server) false
+#define begin_stream(slave) 0
+#define pass_on(slave) 0
+#define end_stream(slave) 0
+#define crc_before(server) 0
+#define replies_later(abort) false
+#endif
+
+/* Bytes that `data` may have. */
+static RTS_UI32 get_room(const SDO_SERVER *server)
+{
+    return is_stream(server) ? CANOPEN_DEVICE_SDO / SEGMENT * SEGMENT : server->object.size;
+}
+
 /* ---- the beginning ---- */
 
 static RTS_UI32 begin(CANOPEN_SLAVE *slave, const RTS_UI8 *data)
@@ -114,6 +168,8 @@ static RTS_UI32 write_value(CANOPEN_SLAVE *slave, RTS_UI32 now_ms)
 {
     SDO_SERVER *server = &slave->server;
 
+    if (is_stream(server))
+        return end_stream(slave);
     if (server->has_size && server->size != server->done)
         return SDO_ABORT_LENGTH;
     return CanopenAccessWrite(slave, &server->object, server->data, server->done, now_ms);
@@ -127,8 +183,9 @@ static void write_expedited(CANOPEN_SLAVE *slave, const RTS_UI8 *data, RTS_UI32 
     if ((data[0] & HAS_SIZE) == 0 && server->object.size < size)
         size = server->object.size;
     memcpy(server->data, data + 4, size);
-    server->done = size;
-    RTS_UI32 abort = write_value(slave, now_ms);
+    RTS_UI32 abort = CanopenAccessWrite(slave, &server->object, server->data, size, now_ms);
+    if (replies_later(abort))
+        return;
     if (abort != 0)
         end_by(slave, abort);
     else
@@ -136,10 +193,14 @@ static void write_expedited(CANOPEN_SLAVE *slave, const RTS_UI8 *data, RTS_UI32 
 }
 
 /* Checks the size that a client says before it sends the value. */
-static RTS_UI32 note_size(SDO_SERVER *server, bool has_size, RTS_UI32 size)
+static RTS_UI32 note_size(CANOPEN_SLAVE *slave, bool has_size, RTS_UI32 size)
 {
+    SDO_SERVER *server = &slave->server;
+
     server->has_size = has_size;
     server->size = size;
+    if (is_stream(server))
+        return begin_stream(slave);
     return CanopenAccessCheck(&server->object, has_size ? size : server->object.size);
 }
 
@@ -153,7 +214,7 @@ static void begin_write(CANOPEN_SLAVE *slave, const RTS_UI8 *data, RTS_UI32 now_
         return;
     }
     if (abort == 0)
-        abort = note_size(server, (data[0] & HAS_SIZE) != 0, BytesGet32(data + 4));
+        abort = note_size(slave, (data[0] & HAS_SIZE) != 0, BytesGet32(data + 4));
     if (abort != 0) {
         end_by(slave, abort);
         return;
@@ -206,13 +267,15 @@ static void take_segment(CANOPEN_SLAVE *slave, const RTS_UI8 *data, RTS_UI32 now
         abort = SDO_ABORT_COMMAND;
     else if ((data[0] & SDO_TOGGLE) != server->toggle)
         abort = SDO_ABORT_TOGGLE;
-    else if (server->done + size > server->object.size)
+    else if (server->done + size > get_room(server))
         abort = SDO_ABORT_TOO_LONG;
     if (abort == 0) {
         memcpy(server->data + server->done, data + 1, size);
         server->done += size;
         if ((data[0] & IS_LAST) != 0)
             abort = write_value(slave, now_ms);
+        else if (is_stream(server))
+            abort = pass_on(slave);
     }
     if (abort != 0) {
         end_by(slave, abort);
@@ -248,7 +311,8 @@ static void give_segment(CANOPEN_SLAVE *slave, const RTS_UI8 *data)
 /* So many segments as there is room for. */
 static RTS_UI8 get_block(const SDO_SERVER *server)
 {
-    RTS_UI32 left = server->object.size > server->done ? server->object.size - server->done : 0;
+    RTS_UI32 room = get_room(server);
+    RTS_UI32 left = room > server->done ? room - server->done : 0;
     RTS_UI32 segments = (left + SEGMENT - 1) / SEGMENT;
 
     if (segments == 0)
@@ -262,7 +326,7 @@ static void begin_block_write(CANOPEN_SLAVE *slave, const RTS_UI8 *data)
     RTS_UI32 abort = begin(slave, data);
 
     if (abort == 0)
-        abort = note_size(server, (data[0] & BLOCK_HAS_SIZE) != 0, BytesGet32(data + 4));
+        abort = note_size(slave, (data[0] & BLOCK_HAS_SIZE) != 0, BytesGet32(data + 4));
     if (abort != 0) {
         end_by(slave, abort);
         return;
@@ -276,6 +340,12 @@ static void begin_block_write(CANOPEN_SLAVE *slave, const RTS_UI8 *data)
 static void reply_to_block(CANOPEN_SLAVE *slave)
 {
     SDO_SERVER *server = &slave->server;
+    RTS_UI32 abort = is_stream(server) && !server->is_last ? pass_on(slave) : 0;
+
+    if (abort != 0) {
+        end_by(slave, abort);
+        return;
+    }
     RTS_UI8 *data = reply(slave, WRITE_BLOCK_DONE);
 
     data[1] = server->sequence;
@@ -298,7 +368,7 @@ static void take_block_segment(CANOPEN_SLAVE *slave, const RTS_UI8 *data)
         return;
     }
     if (sequence == server->sequence + 1u && !server->is_last) {
-        if (server->done >= server->object.size) {
+        if (server->done >= get_room(server)) {
             end_by(slave, SDO_ABORT_TOO_LONG);
             return;
         }
@@ -322,7 +392,7 @@ static void end_block_write(CANOPEN_SLAVE *slave, const RTS_UI8 *data, RTS_UI32 
         return;
     }
     server->done -= unused;
-    if (server->has_crc && BytesGet16(data + 1) != get_crc(server->data, server->done))
+    if (server->has_crc && BytesGet16(data + 1) != get_crc(crc_before(server), server->data, server->done))
         abort = SDO_ABORT_CRC;
     if (abort == 0)
         abort = write_value(slave, now_ms);
@@ -406,7 +476,7 @@ static void take_block_reply(CANOPEN_SLAVE *slave, const RTS_UI8 *data)
         RTS_UI32 unused = (segments == 0 ? 1 : segments) * SEGMENT - server->size;
         server->state = SERVER_BLOCK_READ_END;
         BytesPut16(reply(slave, (RTS_UI8)(READ_BLOCK_ENDS | unused << 2)) + 1,
-                   server->has_crc ? get_crc(server->data, server->size) : 0);
+                   server->has_crc ? get_crc(0, server->data, server->size) : 0);
         return;
     }
     if (data[2] == 0 || data[2] > MOST_SEGMENTS) {

@@ -437,6 +437,11 @@ static bool is_anothers(const COMM_CLIENT *client)
            downloader.client->session.id == downloader.session;
 }
 
+bool AppSrvHasDownload(void)
+{
+    return downloader.client != NULL && is_anothers(NULL);
+}
+
 typedef struct {
     RTS_UI32 flags;
     RTS_UI32 offset;

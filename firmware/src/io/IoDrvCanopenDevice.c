@@ -44,6 +44,30 @@ static struct {
 static const ICmpIoDrv functions;
 static IO_DRIVER driver = {.functions = &functions};
 
+#if CANOPEN_PROGRAM_DOWNLOAD
+static const CANOPEN_PROGRAM *program; /* NULL: the manager cannot replace it */
+
+void IoDrvCanopenDeviceSetProgram(const CANOPEN_PROGRAM *functions_of_it)
+{
+    program = functions_of_it;
+}
+
+RTS_UI32 IoDrvCanopenDeviceMakeReply(CAN_FRAME *frame)
+{
+    const CANOPEN_SLAVE *slave = &device.slave;
+
+    memset(frame, 0, sizeof(*frame));
+    frame->id = CANOPEN_SDO_REPLY + (RTS_UI32)slave->node;
+    frame->size = CANOPEN_PDO_SIZE;
+    frame->data[0] = SDO_WRITE_DONE;
+    BytesPut16(frame->data + 1, slave->server.object.index);
+    frame->data[3] = slave->server.object.sub;
+    return device.network;
+}
+#else
+#define program NULL
+#endif
+
 static const CAN_FILTER filters[] = {{0, 0, false}}; /* all frames of 11 bits */
 
 static const IoDrvInfo *get_info(void)
@@ -158,6 +182,11 @@ static RTS_RESULT describe(CANOPEN_SLAVE *slave)
     slave->first_node = (RTS_UI8)number(CANOPEN_DEVICE_NODE);
     slave->heartbeat_ms = (RTS_UI16)number(CANOPEN_DEVICE_HEARTBEAT);
     slave->serial = get_serial();
+#if CANOPEN_PROGRAM_DOWNLOAD
+    slave->program = program;
+#endif
+    if ((slave->flags & CANOPEN_DEVICE_DOWNLOAD) != 0 && program == NULL)
+        return refuse("this firmware has no program download; leave out 'download'.");
     if (number(CANOPEN_DEVICE_NODE) > CANOPEN_MAX_NODE || number(CANOPEN_DEVICE_HEARTBEAT) > MAX_MS)
         return refuse("its node number or heartbeat cannot be.");
     if (slave->values_size > CANOPEN_DEVICE_DATA)

@@ -24,7 +24,15 @@ from dataclasses import dataclass, field, replace
 from plctool.core import ffi, lib
 from plctool.files import Pos
 from plctool.iec.types import BYTE, UDINT, ArrayType, Elementary, StringType, SubrangeType, Type, base_of
-from plctool.io.canopen.data_types import DATA_TYPES, UNSIGNED8, UNSIGNED32, VISIBLE_STRING, DataType, type_named
+from plctool.io.canopen.data_types import (
+    DATA_TYPES,
+    DOMAIN,
+    UNSIGNED8,
+    UNSIGNED32,
+    VISIBLE_STRING,
+    DataType,
+    type_named,
+)
 from plctool.io.canopen.eds import MAX_PDO_BITS
 from plctool.io.canopen.manager import MAX_NODE, take_number
 from plctool.io.canopen.profile import (
@@ -55,6 +63,14 @@ INVALID, NO_REMOTE = 0x8000_0000, 0x4000_0000
 FIRST_RPDO, FIRST_TPDO = 0x200, 0x180
 PDO_STEP = 0x100
 ON_CHANGE, LAST_SYNC = 255, 240
+REASON = 0x5FFF  # why an image was refused
+_PROGRAM_PLACES = (
+    (0x1F50, lib.PROGRAM_DATA, DOMAIN, 1, "wo"),
+    (0x1F51, lib.PROGRAM_CONTROL, UNSIGNED8, 1, "rw"),
+    (0x1F56, lib.PROGRAM_IDENTIFICATION, UNSIGNED32, 4, "ro"),
+    (0x1F57, lib.PROGRAM_STATUS, UNSIGNED32, 4, "ro"),
+    (REASON, lib.PROGRAM_REASON, VISIBLE_STRING, 63, "ro"),
+)
 _DEVICE_TYPE, _NAME, _HARDWARE, _SOFTWARE, _IDENTITY, _SERVER = 0x1000, 0x1008, 0x1009, 0x100A, 0x1018, 0x1200
 _FIRST_OBJECT, _LAST_OBJECT = 0x2000, 0xBFFF
 _KEY = re.compile(r"([0-9A-Fa-f]{4})(?::([0-9A-Fa-f]{1,2}))?")
@@ -163,6 +179,13 @@ class CanopenSlave(Connector):
         self._add(index, sub, VISIBLE_STRING, _READ, where=where, size=len(data), place=len(self.texts))
         self.texts += data
 
+    def add_program(self) -> None:
+        """The objects by which a manager replaces the program (CanopenProgram.h)."""
+        for index, what, kind, size, access in _PROGRAM_PLACES:
+            flags = _READ * ("r" in access) | _WRITE * ("w" in access)
+            where = int(lib.CANOPEN_PROGRAM_OBJECT)
+            self._add(index, 1, kind, flags, where=where, size=size, place=int(what))
+
     def _add(self, index: int, sub: int, kind: DataType, access: int, *, where: int, size: int, place: int) -> None:
         self.objects[index, sub] = {
             "index": index, "sub": sub, "type": kind.code, "access": access, "where": where, "size": size,
@@ -190,7 +213,7 @@ class CanopenSlave(Connector):
         first = value.sub if value.sub is not None else int(is_array)
         for number in range(elements):
             sub = first + number
-            if (value.index, sub) in self.objects:
+            if (value.index, sub) in self.objects or (value.index == REASON and (REASON, 1) in self.objects):
                 mistakes.error(value.pos, f"the object {value.index:04X}:{sub:02X} is there already")
                 return place
             self._add(
@@ -352,7 +375,14 @@ def read_canopen_device(table: Table, context: Context) -> list[Connector]:
     made.node = table.number("node", 1, MAX_NODE, required=None if lss else 9) or 0
     take_number(table, context.nodes.setdefault(network, {}), made.node, f"this PLC as {made.name}")
     heartbeat = table.duration_us("heartbeat", *_DURATION_US) or 0
-    flags = int(lib.CANOPEN_DEVICE_STORE) * table.flag("store", True) | int(lib.CANOPEN_DEVICE_LSS) * lss
+    download = table.flag("download")
+    flags = (
+        int(lib.CANOPEN_DEVICE_STORE) * table.flag("store", True)
+        | int(lib.CANOPEN_DEVICE_LSS) * lss
+        | int(lib.CANOPEN_DEVICE_DOWNLOAD) * download
+    )
+    if download:
+        made.add_program()
     for number, value, name in (
         (lib.CANOPEN_DEVICE_NETWORK, network, "network"),
         (lib.CANOPEN_DEVICE_NODE, made.node, "node"),

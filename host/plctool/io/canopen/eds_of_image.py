@@ -10,7 +10,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError
 from plctool.image.file import Image
 from plctool.io.canopen.data_types import DATA_TYPES
-from plctool.io.canopen.device import DRIVER
+from plctool.io.canopen.device import DRIVER, REASON
 from plctool.io.canopen.eds import BIT_RATES, TYPE_ARRAY, TYPE_RECORD, TYPE_VAR
 from plctool.io.canopen.profile import dynamic_channels, names_of, segment_at
 from plctool.io.configuration import ConnectorEntry, configuration_of_image
@@ -29,12 +29,15 @@ _NAMES = {
     0x1014: "COB-ID EMCY", 0x1015: "Inhibit time EMCY", 0x1016: "Consumer heartbeat time",
     0x1017: "Producer heartbeat time", 0x1018: "Identity object", 0x1020: "Verify configuration",
     0x1029: "Error behaviour", 0x1200: "SDO server parameter",
+    0x1F50: "Program data", 0x1F51: "Program control", 0x1F56: "Program software identification",
+    0x1F57: "Flash status identification", REASON: "Why the program was refused",
 }  # fmt: skip
 _SUB_NAMES = {
     (0x1010, 1): "All", (0x1010, 2): "Communication", (0x1010, 3): "Application",
     (0x1011, 1): "All", (0x1011, 2): "Communication", (0x1011, 3): "Application",
     (0x1018, 1): "Vendor-ID", (0x1018, 2): "Product code", (0x1018, 3): "Revision number", (0x1018, 4): "Serial number",
     (0x1020, 1): "Configuration date", (0x1020, 2): "Configuration time", (0x1029, 1): "Communication error",
+    (0x1F50, 1): "Program", (0x1F51, 1): "Program", (0x1F56, 1): "Program", (0x1F57, 1): "Program",
     (0x1200, 1): "COB-ID client to server", (0x1200, 2): "COB-ID server to client",
 }  # fmt: skip
 _PDO_SUBS = {
@@ -187,6 +190,8 @@ class _Writer:
             return "const"
         if not entry.access & lib.CANOPEN_ACCESS_WRITE:
             return "ro"
+        if not entry.access & lib.CANOPEN_ACCESS_READ:
+            return "wo"
         return "rww" if entry.access & lib.CANOPEN_ACCESS_RPDO else "rw"
 
     def _default(self, entry: Any) -> str:
@@ -197,7 +202,7 @@ class _Writer:
             return f"$NODEID+0x{place:X}"
         if where == lib.CANOPEN_TEXT:
             return self._texts[place : place + int(entry.size)].decode("ascii").rstrip("\0")
-        if where == lib.CANOPEN_IN_VALUES or entry.index == 0x1018:
+        if where in (lib.CANOPEN_IN_VALUES, lib.CANOPEN_PROGRAM_OBJECT) or entry.index == 0x1018:
             return ""
         stores = bool(self._number(lib.CANOPEN_DEVICE_FLAGS) & lib.CANOPEN_DEVICE_STORE)
         special = {

@@ -7,10 +7,12 @@ from plctool.cli.commands.canopen.lss import add_lss
 from plctool.cli.commands.canopen.messages import add_emcy, add_pdo
 from plctool.cli.commands.canopen.nodes import add_nmt, add_scan
 from plctool.cli.commands.canopen.objects import add_sdo, add_watch
+from plctool.cli.commands.canopen.program import add_download
 from plctool.cli.parser import Parser
 
 
 def canopen_arguments(command: Parser) -> None:
     action = command.adder_of_actions()
-    for add in (add_check, add_eds_of_image, add_scan, add_nmt, add_sdo, add_emcy, add_pdo, add_watch, add_lss):
+    checks = (add_check, add_eds_of_image)
+    for add in (*checks, add_scan, add_nmt, add_sdo, add_emcy, add_pdo, add_watch, add_lss, add_download):
         add(action)
