@@ -44,7 +44,7 @@ enum {
     MASTER_WHY_HALTED = 'q',    /* stopped for the loss of another node */
 };
 
-enum { CANOPEN_SDO_BUFFER = 64 }; /* bytes that can be read of an identity */
+enum { CANOPEN_SDO_BUFFER = 8 }; /* bytes that can be read of an identity, which has four */
 enum { EXPECTED_TYPE, EXPECTED_VENDOR, EXPECTED_PRODUCT, EXPECTED_REVISION, EXPECTED_COUNT };
 
 /* Counters in the order of CANOPEN_PARAM_BOOTS .. */

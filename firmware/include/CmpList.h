@@ -57,17 +57,17 @@
 #if HAS_CmpTraceMgr && TRACE_BUFFER == 0
 #error "HAS_CmpTraceMgr: set TRACE_BUFFER, the bytes that traces may use, in rts_config_port.h."
 #endif
-#if HAS_CmpCan && CAN_MAX_USERS == 0
-#error "HAS_CmpCan: set CAN_MAX_USERS, the users of a controller, in rts_config_port.h."
+#if HAS_CmpCan && !CAN_SHARED
+#error "HAS_CmpCan: set CAN_SHARED to 1 in rts_config_port.h."
 #endif
-#if CAN_MAX_USERS > 0 && HAS_CmpBlkDrvCan && !HAS_CmpCan
-#error "HAS_CmpBlkDrvCan: with CAN_MAX_USERS it needs HAS_CmpCan in cmp_list.c."
+#if CAN_SHARED && HAS_CmpBlkDrvCan && !HAS_CmpCan
+#error "HAS_CmpBlkDrvCan: with CAN_SHARED it needs HAS_CmpCan in cmp_list.c."
 #endif
 #if HAS_IecCan && (CAN_MAX_RECEIVERS == 0 || !HAS_CmpCan)
 #error "HAS_IecCan: set CAN_MAX_RECEIVERS in rts_config_port.h, and HAS_CmpCan in cmp_list.c."
 #endif
-#if HAS_IoDrvCanopen && (CANOPEN_MAX_DEVICES == 0 || !HAS_IecCan)
-#error "HAS_IoDrvCanopen: set CANOPEN_MAX_DEVICES in rts_config_port.h, and HAS_IecCan in cmp_list.c."
+#if HAS_IoDrvCanopen && (CANOPEN_MAX_DEVICES == 0 || !HAS_CmpCan)
+#error "HAS_IoDrvCanopen: set CANOPEN_MAX_DEVICES in rts_config_port.h, and HAS_CmpCan in cmp_list.c."
 #endif
 #if HAS_IoDrvCanopenDevice && (CANOPEN_DEVICE_DATA == 0 || !HAS_CmpCan)
 #error "HAS_IoDrvCanopenDevice: set CANOPEN_DEVICE_DATA in rts_config_port.h, and HAS_CmpCan in cmp_list.c."

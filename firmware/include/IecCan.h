@@ -23,10 +23,6 @@ enum {
 };
 
 #ifndef RTS_CFFI
-/* Another component sends or receives this identifier, so programs must not send it: `reserves` says so. One at a
- * time; NULL: none. */
-void IecCanSetReserved(bool (*reserves)(RTS_UI32 network, RTS_UI32 id));
-
 /* From main: frames wait for its next pass, or filters do. */
 bool IecCanWaits(void);
 

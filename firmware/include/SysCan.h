@@ -97,7 +97,7 @@ typedef bool (*PF_CAN_URGENT)(RTS_UI32 index, const CAN_FRAME *frame);
 
 /* From now on the port shows each 11-bit frame to `handler` when it arrives: in the interrupt of the controller, on Linux
  * in a thread that receives, in the simulator at the time of the frame; where there is none of these, in SysCanReceive.
- * NULL: not any more; the handler does not run after that. Only where CAN_MAX_USERS is not 0. */
+ * NULL: not any more; the handler does not run after that. Only with CAN_SHARED. */
 void SysCanSetUrgent(RTS_UI32 index, PF_CAN_URGENT handler);
 
 /* Takes the oldest received frame; ERR_NOTHING_TO_DO when there is none. */

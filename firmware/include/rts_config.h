@@ -538,10 +538,10 @@
 #define CAN_FD 0
 #endif
 
-/* Users that share a CAN controller (CmpCan.h): the block driver, CANopen, frames of programs. 0: the block driver has
- * it for itself, which takes no flash. */
-#ifndef CAN_MAX_USERS
-#define CAN_MAX_USERS 0
+/* 1: several users share a CAN controller (CmpCan.h): the block driver, CANopen, frames of programs, components of a port.
+ * 0: the block driver has it for itself, which takes no flash. */
+#ifndef CAN_SHARED
+#define CAN_SHARED 0
 #endif
 
 /* Controllers that are shared, each with room for so many 11-bit frames that wait to be sent (24 bytes each, 80 with

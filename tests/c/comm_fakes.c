@@ -63,7 +63,7 @@ RTS_UI32 SysTimeGetMs(void)
     return fakes.now_ms;
 }
 
-#if COMM_CAN_TESTED && CAN_MAX_USERS > 0
+#if COMM_CAN_TESTED && CAN_SHARED
 void SysTimeWantPass(RTS_UI32 ms)
 {
     RTS_UNUSED(ms);
@@ -701,7 +701,7 @@ void fakes_hook(CMP_HOOK hook)
         CmpNameServiceServer_Hook,
         CmpRouterEmbedded_Hook,
         CmpBlkDrvSimpleCom_Hook,
-#if COMM_CAN_TESTED && CAN_MAX_USERS > 0
+#if COMM_CAN_TESTED && CAN_SHARED
         CmpCan_Hook,
 #endif
 #if COMM_CAN_TESTED

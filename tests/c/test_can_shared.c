@@ -46,7 +46,8 @@ static void note_bus(RTS_UI32 index, bool off)
 }
 
 static CAN_FILTER filter[40];
-static CAN_USER user = {filter, 1, take_urgent, take, note_bus};
+static CAN_USER user = {
+    .filters = filter, .filter_count = 1, .take_urgent = take_urgent, .take = take, .note_bus = note_bus};
 
 static void start(RTS_UI32 id, RTS_UI32 mask, bool extended)
 {
@@ -182,14 +183,38 @@ static void users_notice_bus_off_once(void)
     end();
 }
 
-static void a_third_user_has_no_place(void)
+enum { USERS = 9 };
+
+static bool reserves(RTS_UI32 index, RTS_UI32 id)
 {
-    static CAN_USER third = {NULL, 0, NULL, NULL, NULL};
+    CHECK_EQUAL(index, 0);
+    return id == 0x123;
+}
+
+static void there_may_be_any_number_of_users(void)
+{
+    static CAN_USER users[USERS];
 
     start(0x180, 0x780, false); /* beside the block driver */
-    CHECK_EQUAL(CanAttach(0, &third), ERR_NOMEMORY);
-    CHECK_EQUAL(CanAttach(1, &third), ERR_DEVICE);
-    CanDetach(0, &third);
+    for (RTS_UI32 i = 0; i < USERS; i++) {
+        users[i] = (CAN_USER){.filters = filter, .filter_count = 1, .take = take, .reserves = i == 2 ? reserves : NULL};
+        CHECK_EQUAL(CanAttach(0, &users[i]), ERR_OK);
+        CHECK_EQUAL(CanAttach(0, &users[i]), ERR_DUPLICATE);
+        CHECK_EQUAL(CanAttach(1, &users[i]), ERR_DEVICE);
+    }
+    send_to_device(0x181, false);
+    can_pass(1);
+    CHECK_EQUAL(seen.laters, 1 + USERS);
+    CHECK(CanIsReserved(0, 0x123) && !CanIsReserved(0, 0x124));
+    for (RTS_UI32 i = 0; i < USERS; i += 2)
+        CanDetach(0, &users[i]);
+    CanDetach(0, &users[0]); /* is not there any more */
+    CHECK(!CanIsReserved(0, 0x123));
+    send_to_device(0x182, false);
+    can_pass(1);
+    CHECK_EQUAL(seen.laters, 1 + USERS + 1 + USERS / 2);
+    for (RTS_UI32 i = 1; i < USERS; i += 2)
+        CanDetach(0, &users[i]);
     end();
 }
 
@@ -209,7 +234,7 @@ int main(void)
     RUN(an_11_bit_frame_goes_before_those_of_29_bits);
     RUN(an_11_bit_frame_without_room_waits_and_keeps_others_waiting);
     RUN(users_notice_bus_off_once);
-    RUN(a_third_user_has_no_place);
+    RUN(there_may_be_any_number_of_users);
     RUN(a_closed_controller_sends_nothing);
     return test_result();
 }

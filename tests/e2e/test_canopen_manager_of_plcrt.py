@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import can
-import canopen
 import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from canopen_programs import BLOCKS, SOURCE, VALVES, write_guarded_program, write_program
+from canopen_nodes import NODE, ForeignNode
+from canopen_programs import BLOCKS, SOURCE, write_guarded_program, write_program
 
 from plctool import connect
 from plctool.device import Plc
@@ -21,33 +21,6 @@ from plctool.link.canbus import open_bus
 from plctool.testing.can_hub import CanHub
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.waiting import eventually
-
-NODE = 9
-
-
-class ForeignNode:
-    """A node on the bus while the context lasts."""
-
-    def __init__(self, path: str) -> None:
-        self._bus = open_bus(f"slcan:{path}", 500000, 0)
-        self._network = canopen.Network(bus=self._bus)
-        self.node = canopen.LocalNode(NODE, str(VALVES))
-        self.outputs: list[bytes] = []
-
-    def __enter__(self) -> ForeignNode:
-        self._network.connect()
-        self._network.add_node(self.node)
-        self._network.subscribe(0x200 + NODE, lambda cob, data, time: self.outputs.append(bytes(data)))
-        self.node.nmt.state = "INITIALISING"
-        self.node.nmt.state = "PRE-OPERATIONAL"
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.node.nmt.stop_heartbeat()
-        self._network.disconnect()
-
-    def send_inputs(self, data: bytes) -> None:
-        self._network.send_message(0x180 + NODE, data)
 
 
 @pytest.fixture
@@ -74,7 +47,7 @@ def plc(hub: CanHub, tmp_path: Path, tool: Any, source: str) -> Iterator[Plc]:
 
 def test_foreign_node_is_brought_into_operation_lost_and_regained(hub: CanHub, plc: Plc) -> None:
     for round_ in range(2):
-        with ForeignNode(hub.paths[2]) as foreign:
+        with ForeignNode(f"slcan:{hub.paths[2]}") as foreign:
             eventually(lambda: plc.read("Valves.ok"))
             assert foreign.node.nmt.state == "OPERATIONAL"
             assert foreign.node.sdo[0x2001].raw == 700
@@ -93,9 +66,8 @@ def test_foreign_node_is_brought_into_operation_lost_and_regained(hub: CanHub, p
 class GuardedNode(ForeignNode):
     """A node that replies to guarding requests, which python canopen does not."""
 
-    def __init__(self, path: str, eds: Path) -> None:
-        super().__init__(path)
-        self.node = canopen.LocalNode(NODE, str(eds))
+    def __init__(self, link: str, eds: Path) -> None:
+        super().__init__(link, eds)
         self._toggle = 0
 
     def __enter__(self) -> GuardedNode:
@@ -120,7 +92,7 @@ def test_foreign_node_is_guarded(hub: CanHub, tmp_path: Path, tool: Any) -> None
     with Plcrt(tmp_path / "flash", *options), connect(f"can:slcan:{hub.paths[1]}?node=5") as plc:
         plc.flash(image)
         for _ in range(2):
-            with GuardedNode(hub.paths[2], program.with_name("valves.eds")) as foreign:
+            with GuardedNode(f"slcan:{hub.paths[2]}", program.with_name("valves.eds")) as foreign:
                 eventually(lambda: plc.read("Valves.ok"))
                 assert (foreign.node.sdo[0x100C].raw, foreign.node.sdo[0x1017].raw) == (100, 0)
             eventually(lambda: not plc.read("Valves.ok"))
@@ -171,7 +143,7 @@ def do(plc: Plc, block: str, **inputs: Any) -> tuple[bool, int]:
 
 @pytest.mark.parametrize("source", [BLOCKS])
 def test_program_reads_writes_and_commands_a_foreign_node(hub: CanHub, plc: Plc) -> None:
-    with ForeignNode(hub.paths[2]) as foreign:
+    with ForeignNode(f"slcan:{hub.paths[2]}") as foreign:
         eventually(lambda: plc.read("Valves.ok"))
         assert do(plc, "r4", DEVICE=NODE, INDEX=0x2001) == (True, 0)
         assert (plc.read("Main.r4.DATA[1]"), plc.read("Main.r4.DATA[2]")) == (700 & 0xFF, 700 >> 8)
@@ -193,7 +165,7 @@ def test_program_reads_writes_and_commands_a_foreign_node(hub: CanHub, plc: Plc)
 def test_tool_reads_and_writes_objects_of_a_node_through_the_controller(hub: CanHub, plc: Plc, tool: Any) -> None:
     link = ("--can", f"slcan:{hub.paths[1]}", "--node", "5")
     plc.close()
-    with ForeignNode(hub.paths[2]) as foreign:
+    with ForeignNode(f"slcan:{hub.paths[2]}") as foreign:
         eventually(lambda: foreign.node.nmt.state == "OPERATIONAL")
         read = tool("io", "param", "get", "Valves", "2001:00", *link)
         assert (read.status, read.out.strip()) == (0, "Valves 2001:00 = 700"), read.err

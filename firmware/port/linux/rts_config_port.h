@@ -55,7 +55,7 @@
 #define TCP_BUFFER_SIZE 16384
 #define CAN_FD 1
 #define CAN_BLOCK_SIZE 0 /* the kernel has room */
-#define CAN_MAX_USERS 4
+#define CAN_SHARED 1
 #define CANOPEN_MAX_DEVICES 127
 #define CANOPEN_MAX_PDOS 1024
 #define CANOPEN_MAX_CALLS 16

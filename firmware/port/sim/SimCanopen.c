@@ -146,7 +146,7 @@ static void send_state(const NODE *node)
 
 static void send_input(NODE *node, RTS_UI32 pdo, RTS_I64 now_ns)
 {
-    const CANOPEN_PDO *described = &setup()->pdos[pdo].pdo;
+    const CANOPEN_PDO_STATE *described = &setup()->pdos[pdo];
     RTS_UI32 parameters = find_tpdo(node, described->cob);
     RTS_UI32 event_ms = parameters != 0 ? number_of(node, parameters, EVENT_TIMER) : 0;
 
@@ -154,7 +154,7 @@ static void send_input(NODE *node, RTS_UI32 pdo, RTS_I64 now_ns)
     bool is_synchronous = (described->flags & CANOPEN_PDO_SYNC) != 0;
     pdos[pdo].event_ns = event_ms != 0 && !is_synchronous ? now_ns + event_ms * NS_PER_MS : NEVER;
     if (parameters != 0)
-        send(described->cob, pdos[pdo].data, described->size);
+        send(described->cob, pdos[pdo].data, CanopenPdoSize(described));
 }
 
 static void send_inputs(NODE *node, bool of_sync, bool all, RTS_I64 now_ns)
@@ -163,7 +163,7 @@ static void send_inputs(NODE *node, bool of_sync, bool all, RTS_I64 now_ns)
     RTS_UI32 first = (RTS_UI32)(device->pdos - setup()->pdos);
 
     for (RTS_UI32 i = first; i < first + device->pdo_count && node->state == NODE_OPERATIONAL; i++) {
-        RTS_UI32 flags = setup()->pdos[i].pdo.flags;
+        RTS_UI32 flags = setup()->pdos[i].flags;
         bool is_synchronous = (flags & CANOPEN_PDO_SYNC) != 0;
         if ((flags & CANOPEN_PDO_OUTPUT) != 0 || is_synchronous != of_sync)
             continue;
@@ -338,9 +338,9 @@ static void take_output(NODE *node, const CAN_FRAME *frame)
     RTS_UI32 first = (RTS_UI32)(device->pdos - setup()->pdos);
 
     for (RTS_UI32 i = first; i < first + device->pdo_count && node->state == NODE_OPERATIONAL; i++) {
-        const CANOPEN_PDO *pdo = &setup()->pdos[i].pdo;
-        if (pdo->cob == frame->id && (pdo->flags & CANOPEN_PDO_OUTPUT) != 0 && frame->size >= pdo->size)
-            memcpy(pdos[i].data, frame->data, pdo->size);
+        const CANOPEN_PDO_STATE *pdo = &setup()->pdos[i];
+        if (pdo->cob == frame->id && (pdo->flags & CANOPEN_PDO_OUTPUT) != 0 && frame->size >= CanopenPdoSize(pdo))
+            memcpy(pdos[i].data, frame->data, CanopenPdoSize(pdo));
     }
 }
 
@@ -422,7 +422,8 @@ static RTS_UI32 find_pdo(const IoConfigConnector *connector, const SIM_IO_PLACE 
     const CANOPEN_PDO_STATE *state = CanopenFindPdo(setup(), connector, place->parameter);
 
     *result = state != NULL ? ERR_OK : ERR_NOT_SUPPORTED;
-    if (state != NULL && (place->bits > 8u * state->pdo.size || place->bit > 8u * state->pdo.size - place->bits))
+    if (state != NULL &&
+        (place->bits > 8u * CanopenPdoSize(state) || place->bit > 8u * CanopenPdoSize(state) - place->bits))
         *result = ERR_OUT_OF_LIMITS;
     return state != NULL ? (RTS_UI32)(state - setup()->pdos) : CANOPEN_MAX_PDOS;
 }
@@ -437,7 +438,7 @@ RTS_RESULT SimCanopenSet(const IoConfigConnector *connector, const SIM_IO_PLACE 
         RTS_UI8 *byte = &pdos[pdo].data[at / 8];
         *byte = (RTS_UI8)((*byte & ~(1u << at % 8)) | (data[i / 8] >> i % 8 & 1u) << at % 8);
         pdos[pdo].changed = true;
-        if ((setup()->pdos[pdo].pdo.flags & (CANOPEN_PDO_SYNC | CANOPEN_PDO_OUTPUT)) == 0)
+        if ((setup()->pdos[pdo].flags & (CANOPEN_PDO_SYNC | CANOPEN_PDO_OUTPUT)) == 0)
             pdos[pdo].event_ns = SimNow(); /* at once */
     }
     return result;

@@ -5,11 +5,12 @@
  */
 #include "CmpCan.h"
 
-#if CAN_MAX_USERS > 0
+#if CAN_SHARED
 
 #include <string.h>
 
 #include "CanWatch.h"
+#include "SysAtomic.h"
 #include "SysLock.h"
 #include "SysTime.h"
 
@@ -19,7 +20,7 @@ typedef struct {
     bool open;
     bool has_urgent; /* an 11-bit frame passes the filters */
     CAN_WATCH watch;
-    CAN_USER *users[CAN_MAX_USERS]; /* NULL: free */
+    CAN_USER *first_user;
     CAN_BUS_COUNTERS counters;
     RTS_UI32 first; /* of the frames that wait, under SysLock */
     RTS_UI32 count;
@@ -28,10 +29,10 @@ typedef struct {
 
 static CONTROLLER controllers[CAN_CONTROLLERS];
 
-#define FOR_EACH_USER(controller, user)                                                                       \
-    for (CAN_USER **place_ = (controller)->users, *user = NULL; place_ < (controller)->users + CAN_MAX_USERS; \
-         place_++)                                                                                            \
-        if ((user = *(CAN_USER *volatile *)place_) != NULL)
+/* The context of the port reads it while main changes it: a user that is detached keeps its `next`. */
+#define NEXT(place) (*(CAN_USER *volatile *)&(place))
+#define FOR_EACH_USER(controller, user) \
+    for (CAN_USER *user = NEXT((controller)->first_user); user != NULL; user = NEXT(user->next))
 
 /* ---- sending ---- */
 
@@ -180,12 +181,14 @@ RTS_RESULT CanUpdateFilters(RTS_UI32 index)
 
 /* ---- users ---- */
 
+/* Where the list leads to the user; NULL: the end of the list. */
 static CAN_USER **find_place(CONTROLLER *controller, const CAN_USER *user)
 {
-    for (RTS_UI32 i = 0; i < CAN_MAX_USERS; i++)
-        if (controller->users[i] == user)
-            return &controller->users[i];
-    return NULL;
+    CAN_USER **place = &controller->first_user;
+
+    while (*place != user && *place != NULL)
+        place = &(*place)->next;
+    return place;
 }
 
 static RTS_RESULT open_controller(RTS_UI32 index, CONTROLLER *controller)
@@ -207,13 +210,15 @@ RTS_RESULT CanAttach(RTS_UI32 index, CAN_USER *user)
 {
     if (index >= CAN_CONTROLLERS || index >= SysCanGetCount())
         return ERR_DEVICE;
-    CAN_USER **place = find_place(&controllers[index], NULL);
-    if (place == NULL)
-        return ERR_NOMEMORY;
+    CAN_USER **place = find_place(&controllers[index], user);
+    if (*place != NULL)
+        return ERR_DUPLICATE;
     RTS_RESULT result = open_controller(index, &controllers[index]);
     if (result != ERR_OK)
         return result;
-    *place = user;
+    user->next = NULL;
+    SysAtomicFence();
+    NEXT(*place) = user;
     result = CanUpdateFilters(index);
     if (result != ERR_OK)
         CanDetach(index, user);
@@ -223,17 +228,22 @@ RTS_RESULT CanAttach(RTS_UI32 index, CAN_USER *user)
 void CanDetach(RTS_UI32 index, CAN_USER *user)
 {
     CAN_USER **place = index < CAN_CONTROLLERS ? find_place(&controllers[index], user) : NULL;
-    bool is_used = false;
 
-    if (place == NULL)
+    if (place == NULL || *place == NULL)
         return;
-    *place = NULL;
-    FOR_EACH_USER (&controllers[index], other)
-        is_used = true;
-    if (is_used)
+    NEXT(*place) = user->next;
+    if (controllers[index].first_user != NULL)
         (void)CanUpdateFilters(index);
     else
         close_controller(index, &controllers[index]);
+}
+
+bool CanIsReserved(RTS_UI32 index, RTS_UI32 id)
+{
+    FOR_EACH_USER (&controllers[index], user)
+        if (user->reserves != NULL && user->reserves(index, id))
+            return true;
+    return false;
 }
 
 /* ---- the bus ---- */

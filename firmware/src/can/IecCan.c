@@ -79,8 +79,6 @@ static struct {
     RECEIVER receivers[CAN_MAX_RECEIVERS];
 } raw;
 
-static bool (*is_reserved_elsewhere)(RTS_UI32 network, RTS_UI32 id);
-
 #define FOR_EACH_RECEIVER(receiver) \
     for (RECEIVER *receiver = raw.receivers; receiver < raw.receivers + CAN_MAX_RECEIVERS; receiver++)
 #define FOR_EACH_SENDING(sending) \
@@ -99,11 +97,6 @@ static RTS_UI32 slot_of(RTS_I32 number)
     return (RTS_UI32)number % SLOTS - 1;
 }
 
-void IecCanSetReserved(bool (*reserves)(RTS_UI32 network, RTS_UI32 id))
-{
-    is_reserved_elsewhere = reserves;
-}
-
 static bool is_of_tools(RTS_UI32 network, RTS_UI32 id)
 {
     return ((id ^ raw.address[network].base) & CAN_BASE_MASK) == 0;
@@ -119,8 +112,7 @@ static RTS_I32 check_frame(RTS_UI8 network, const CAN_FRAME *frame)
         return CAN_ERROR_NO_NETWORK;
     if (!CanIsFrame(frame))
         return CAN_ERROR_INVALID;
-    if (extended ? is_of_tools(network, frame->id)
-                 : is_reserved_elsewhere != NULL && is_reserved_elsewhere(network, frame->id))
+    if (extended ? is_of_tools(network, frame->id) : CanIsReserved(network, frame->id))
         return CAN_ERROR_RESERVED;
     return 0;
 }
@@ -429,7 +421,7 @@ static void attach(void)
 {
     for (RTS_UI32 i = 0; i < CAN_CONTROLLERS && i < SysCanGetCount(); i++) {
         SysCanGetAddress(i, &raw.address[i]);
-        raw.users[i] = (CAN_USER){raw.filters[i], 0, take_urgent, take, NULL};
+        raw.users[i] = (CAN_USER){.filters = raw.filters[i], .take_urgent = take_urgent, .take = take};
         raw.attached[i] = CanAttach(i, &raw.users[i]) == ERR_OK;
     }
 }

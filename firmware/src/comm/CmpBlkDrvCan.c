@@ -83,7 +83,7 @@ static void get_filters(CAN_FILTER *filters)
     filters[2] = (CAN_FILTER){can.own.base | can.own.node, CAN_BASE_MASK | CAN_ADDRESS_MASK, true}; /* its own number */
 }
 
-#if CAN_MAX_USERS > 0
+#if CAN_SHARED
 static CAN_FILTER own_filters[FILTERS];
 
 static void take_shared(RTS_UI32 index, const CAN_FRAME *frame, RTS_UI32 now_ms)
@@ -99,7 +99,7 @@ static void note_bus(RTS_UI32 index, bool off)
         note_off();
 }
 
-static CAN_USER user = {own_filters, FILTERS, NULL, take_shared, note_bus};
+static CAN_USER user = {.filters = own_filters, .filter_count = FILTERS, .take = take_shared, .note_bus = note_bus};
 
 static RTS_RESULT open_controller(void)
 {

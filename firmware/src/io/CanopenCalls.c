@@ -87,12 +87,6 @@ typedef struct {
     RTS_UI8 data[EMCY_SIZE];
 } EMERGENCY;
 
-/* A node may still reply to a transfer that was given up. */
-typedef struct {
-    bool may_reply;
-    RTS_UI32 until_ms;
-} QUIET;
-
 RTS_STATIC_ASSERT(CANOPEN_MAX_CALLS < SLOTS && EMERGENCIES < SLOTS, slots_fit_into_numbers);
 
 static struct {
@@ -101,8 +95,8 @@ static struct {
     RTS_UI32 sequence;
     RTS_UI32 lost[CAN_CONTROLLERS]; /* an emergency had no room, and no block knows */
     EMERGENCY emergencies[CAN_CONTROLLERS][EMERGENCIES];
-    QUIET quiet[CAN_CONTROLLERS][NODES];
-    CALL calls[CANOPEN_MAX_CALLS + 1]; /* the last one is that of tools */
+    RTS_UI32 quiet_until_ms[CAN_CONTROLLERS][NODES]; /* it may still reply to a transfer that was given up; 0: no */
+    CALL calls[CANOPEN_MAX_CALLS + 1];               /* the last one is that of tools */
 } all;
 
 static RTS_UI32 taken; /* slots ever */
@@ -257,7 +251,7 @@ static RTS_UI8 canopen_free(RTS_I32 number)
 
 static RTS_UI8 state_of(const CANOPEN_LINE *line, RTS_UI8 node)
 {
-    const CANOPEN_DEVICE *device = node <= CANOPEN_MAX_NODE ? line->by_node[node] : NULL;
+    const CANOPEN_DEVICE *device = node <= CANOPEN_MAX_NODE ? CanopenFindNode(line, node) : NULL;
 
     if (node == 0 || node == line->own_node)
         return line->was_off ? STATE_NOT_AVAILABLE : STATE_OPERATIONAL;
@@ -428,30 +422,30 @@ bool CanopenCallsTake(RTS_UI32 network, const CAN_FRAME *frame, RTS_UI32 now_ms)
         SdoClientTake(&call->sdo, frame, now_ms);
         return true;
     }
-    bool was_late = all.quiet[network][node].may_reply;
-    all.quiet[network][node].may_reply = false;
+    bool was_late = all.quiet_until_ms[network][node] != 0;
+    all.quiet_until_ms[network][node] = 0;
     return was_late;
 }
 
 /* The node may reply nevertheless, and to the next transfer of the same object by mistake. */
 static void be_quiet(const CALL *call, RTS_UI32 now_ms)
 {
-    all.quiet[call->network][call->node] = (QUIET){true, now_ms + call->sdo.timeout_ms};
+    all.quiet_until_ms[call->network][call->node] = (now_ms + call->sdo.timeout_ms) | 1u;
 }
 
 static bool is_quiet(const CALL *call, RTS_UI32 now_ms)
 {
-    QUIET *quiet = &all.quiet[call->network][call->node];
+    RTS_UI32 *until_ms = &all.quiet_until_ms[call->network][call->node];
 
-    if (quiet->may_reply && (RTS_I32)(now_ms - quiet->until_ms) >= 0)
-        quiet->may_reply = false;
-    return quiet->may_reply;
+    if (*until_ms != 0 && (RTS_I32)(now_ms - *until_ms) >= 0)
+        *until_ms = 0;
+    return *until_ms != 0;
 }
 
 /* Nothing else is on its way to the node, and nothing was sent before. */
 static bool is_next(const CALL *call, RTS_UI32 now_ms)
 {
-    const CANOPEN_DEVICE *device = all.setup->lines[call->network].by_node[call->node];
+    const CANOPEN_DEVICE *device = CanopenFindNode(&all.setup->lines[call->network], call->node);
 
     if (is_quiet(call, now_ms) || (device != NULL && CanopenNodeIsAsked(&device->node)))
         return false;
@@ -482,7 +476,7 @@ static bool is_own(const CALL *call)
 
 static void begin(CALL *call, RTS_UI32 now_ms)
 {
-    const CANOPEN_DEVICE *device = all.setup->lines[call->network].by_node[call->node];
+    const CANOPEN_DEVICE *device = CanopenFindNode(&all.setup->lines[call->network], call->node);
     RTS_UI32 timeout_ms = device != NULL ? device->node.sdo.timeout_ms : DEFAULT_TIMEOUT_MS;
 
     call->sdo.timeout_ms = call->timeout_ms != 0 ? call->timeout_ms : timeout_ms;
@@ -601,7 +595,7 @@ void CanopenCallsPoll(bool is_running, RTS_UI32 now_ms)
         all.setup->devices[i].node.is_asked_elsewhere = false;
     FOR_EACH_CALL(call)
     {
-        CANOPEN_DEVICE *device = all.setup->lines[call->network].by_node[call->node];
+        CANOPEN_DEVICE *device = CanopenFindNode(&all.setup->lines[call->network], call->node);
         if (device != NULL && is_at_it(call))
             device->node.is_asked_elsewhere = true;
     }
@@ -657,7 +651,7 @@ static RTS_UI8 network_of(const CANOPEN_DEVICE *device)
 {
     RTS_UI8 network = 0;
 
-    while (all.setup->lines[network].by_node[device->node.node] != device)
+    while (CanopenFindNode(&all.setup->lines[network], device->node.node) != device)
         network++; /* one of them has it: it is used */
     return network;
 }

@@ -38,6 +38,42 @@ static bool is_pdo_good(const CANOPEN_PDO *pdo)
     return pdo->cob > CANOPEN_SYNC && pdo->cob < 0x800 && pdo->size >= 1 && pdo->size <= CANOPEN_PDO_SIZE;
 }
 
+/* Returns where the identifier is in the list of inputs, or belongs. */
+static RTS_UI32 place_of(const CANOPEN_LINE *line, RTS_UI32 cob)
+{
+    RTS_UI32 first = 0;
+    RTS_UI32 count = line->input_count;
+
+    while (count > 0) {
+        RTS_UI32 half = count / 2;
+        if (line->pdos[line->inputs[first + half]].cob < cob) {
+            first += half + 1;
+            count -= half + 1;
+        } else {
+            count = half;
+        }
+    }
+    return first;
+}
+
+CANOPEN_PDO_STATE *CanopenFindInput(const CANOPEN_LINE *line, RTS_UI32 cob)
+{
+    RTS_UI32 place = place_of(line, cob);
+    CANOPEN_PDO_STATE *state = place < line->input_count ? line->pdos + line->inputs[place] : NULL;
+
+    return state != NULL && state->cob == cob ? state : NULL;
+}
+
+static void add_input(CANOPEN_SETUP *setup, CANOPEN_LINE *line, RTS_UI32 cob)
+{
+    RTS_UI32 place = place_of(line, cob);
+
+    memmove(line->inputs + place + 1, line->inputs + place, (line->input_count - place) * sizeof(*line->inputs));
+    line->inputs[place] = (RTS_UI16)setup->pdo_count;
+    line->input_count++;
+    setup->input_count++;
+}
+
 static RTS_RESULT add_pdo(CANOPEN_SETUP *setup, CANOPEN_LINE *line, CANOPEN_DEVICE *device, const CANOPEN_PDO *pdo)
 {
     CANOPEN_PDO_STATE *state = &setup->pdos[setup->pdo_count];
@@ -46,12 +82,15 @@ static RTS_RESULT add_pdo(CANOPEN_SETUP *setup, CANOPEN_LINE *line, CANOPEN_DEVI
     if (setup->pdo_count == CANOPEN_MAX_PDOS)
         return IoMgrConfigRefuse(device->connector, ERR_NOMEMORY, "this device has room for %u PDOs.",
                                  (unsigned)CANOPEN_MAX_PDOS);
-    if (!is_pdo_good(pdo) || (is_input && line->by_cob[pdo->cob] != NULL))
+    if (!is_pdo_good(pdo) || (is_input && CanopenFindInput(line, pdo->cob) != NULL))
         return IoMgrConfigRefuse(device->connector, ERR_PARAMETER, "PDO %u cannot have the identifier 0x%X.",
                                  (unsigned)device->pdo_count, (unsigned)pdo->cob);
-    state->pdo = *pdo;
+    state->cob = pdo->cob & 0x7FFu;
+    state->last = (pdo->size - 1u) & 7u;
+    state->flags = pdo->flags & 3u;
+    state->within_ms = is_input ? pdo->deadline_ms : pdo->event_ms;
     if (is_input)
-        line->by_cob[pdo->cob] = state;
+        add_input(setup, line, pdo->cob);
     setup->pdo_count++;
     device->pdo_count++;
     return ERR_OK;
@@ -97,7 +136,7 @@ static RTS_RESULT add_device(CANOPEN_SETUP *setup, CANOPEN_LINE *line, const IoC
     if (setup->device_count == CANOPEN_MAX_DEVICES)
         return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "this device has room for %u CANopen nodes.",
                                  (unsigned)CANOPEN_MAX_DEVICES);
-    if (node < 1 || node > CANOPEN_MAX_NODE || node == line->own_node || line->by_node[node] != NULL)
+    if (node < 1 || node > CANOPEN_MAX_NODE || node == line->own_node || line->by_node[node] != 0)
         return IoMgrConfigRefuse(connector, ERR_PARAMETER, "it cannot have the node number %u.", (unsigned)node);
     if (number(connector, CANOPEN_PARAM_TIMEOUT, DEFAULT_TIMEOUT_MS) - 1 >= MAX_MS ||
         number(connector, CANOPEN_PARAM_HEARTBEAT, 0) > MAX_MS || number(connector, CANOPEN_PARAM_GUARD, 0) > MAX_MS ||
@@ -108,9 +147,9 @@ static RTS_RESULT add_device(CANOPEN_SETUP *setup, CANOPEN_LINE *line, const IoC
     device->required = number(connector, CANOPEN_PARAM_REQUIRED, 0) != 0;
     device->on_lost = (RTS_UI8)number(connector, CANOPEN_PARAM_ON_LOST, CANOPEN_LOST_CONTINUE);
     device->node.node = (RTS_UI8)node;
-    line->by_node[node] = device;
     setup->device_count++;
     line->device_count++;
+    line->by_node[node] = (RTS_UI8)line->device_count;
     RTS_RESULT result = describe(&device->node, connector);
     if (result == ERR_OK)
         result = add_pdos(setup, line, device);
@@ -150,6 +189,8 @@ static RTS_RESULT add_line(CANOPEN_SETUP *setup, const IO_DRIVER *driver, const 
     if (!read_sync(&line->sync, connector))
         return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its SYNC cannot be.");
     line->devices = setup->devices + setup->device_count;
+    line->pdos = setup->pdos;
+    line->inputs = setup->inputs + setup->input_count;
     setup->line_count++;
     for (RTS_UI32 i = index + 1; result == ERR_OK && (child = IoMgrConfigGetConnector(i)) != NULL; i++) {
         if (child->parent == index && IoMgrConfigIsMine(child, driver))

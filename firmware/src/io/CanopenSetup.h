@@ -15,18 +15,34 @@
 /* A firmware without CANopen may compile this. */
 #define CANOPEN_ROOM(count) ((count) > 0 ? (count) : 1)
 
-/* Who receives writes one of two copies, then `number`; a task reads the newer one. Inputs have only that, outputs only
- * what follows. */
+/* A PDO (CANOPEN_PDO) in 28 bytes. Who receives an input writes one of two copies, then `number`; a task reads the newer
+ * one. */
 typedef struct {
-    CANOPEN_PDO pdo;
-    RTS_UI32 number; /* of receptions */
-    RTS_UI32 received_ms;
-    RTS_UI8 in[2][CANOPEN_PDO_SIZE];
-    RTS_UI8 out[CANOPEN_PDO_SIZE];
-    RTS_UI8 sent[CANOPEN_PDO_SIZE];
-    RTS_UI32 sent_run; /* in which run of the node `sent` was */
-    RTS_UI32 sent_ms;
+    RTS_UI32 cob : 11;
+    RTS_UI32 last : 3;       /* its last byte: CanopenPdoSize */
+    RTS_UI32 flags : 2;      /* CANOPEN_PDO_* */
+    RTS_UI32 within_ms : 16; /* outputs: sent at least so often; inputs: the node is lost without it; 0: neither */
+    union {
+        struct {
+            RTS_UI32 number; /* of receptions */
+            RTS_UI32 received_ms;
+            RTS_UI8 data[2][CANOPEN_PDO_SIZE];
+        } in;
+        struct {
+            RTS_UI8 data[CANOPEN_PDO_SIZE];
+            RTS_UI8 sent[CANOPEN_PDO_SIZE];
+            RTS_UI32 sent_run; /* in which run of the node `sent` was */
+            RTS_UI32 sent_ms;
+        } out;
+    } of;
 } CANOPEN_PDO_STATE;
+
+RTS_STATIC_ASSERT(sizeof(CANOPEN_PDO_STATE) == 28, a_pdo_takes_28_bytes);
+
+static inline RTS_UI32 CanopenPdoSize(const CANOPEN_PDO_STATE *state)
+{
+    return state->last + 1u;
+}
 
 /* Handles that are not in use are RTS_INVALID_HANDLE. */
 typedef struct {
@@ -72,22 +88,35 @@ struct CANOPEN_LINE {
     CANOPEN_DEVICE *devices;
     RTS_UI32 device_count;
     CAN_USER user;
-    CANOPEN_DEVICE *by_node[CANOPEN_MAX_NODE + 1];
-    CANOPEN_PDO_STATE *by_cob[0x800]; /* inputs */
+    RTS_UI8 by_node[CANOPEN_MAX_NODE + 1]; /* the number of its device, from 1 on; 0: there is none */
+    CANOPEN_PDO_STATE *pdos;               /* of the setup */
+    RTS_UI16 *inputs;                      /* numbers of those that are received, by their identifiers */
+    RTS_UI32 input_count;
 };
 
 typedef struct {
     RTS_UI32 line_count;
     RTS_UI32 device_count;
     RTS_UI32 pdo_count;
+    RTS_UI32 input_count;
     CANOPEN_LINE lines[CAN_CONTROLLERS];
     CANOPEN_DEVICE devices[CANOPEN_ROOM(CANOPEN_MAX_DEVICES)];
     CANOPEN_PDO_STATE pdos[CANOPEN_ROOM(CANOPEN_MAX_PDOS)];
+    RTS_UI16 inputs[CANOPEN_ROOM(CANOPEN_MAX_PDOS)];
 } CANOPEN_SETUP;
 
 /* The PDO of a channel, NULL: none. */
 CANOPEN_PDO_STATE *CanopenFindPdo(CANOPEN_SETUP *setup, const IoConfigConnector *connector, RTS_UI32 parameter);
 CANOPEN_DEVICE *CanopenFindDevice(CANOPEN_SETUP *setup, const IoConfigConnector *connector);
+
+/* The device with a node number, 0..127, NULL: none that is in use. */
+static inline CANOPEN_DEVICE *CanopenFindNode(const CANOPEN_LINE *line, RTS_UI32 node)
+{
+    return line->by_node[node] != 0 ? line->devices + line->by_node[node] - 1 : NULL;
+}
+
+/* The input with an identifier, NULL: none. In any context. */
+CANOPEN_PDO_STATE *CanopenFindInput(const CANOPEN_LINE *line, RTS_UI32 cob);
 
 #if ONLINE_CHANGE
 /* Leads all pointers into the configuration on (IoDrvFollowConfiguration). */

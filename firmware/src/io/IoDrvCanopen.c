@@ -17,7 +17,6 @@
 #include "CanopenSync.h"
 #include "CmpIoMgrEmbedded.h"
 #include "CmpLog.h"
-#include "IecCan.h"
 #include "SysAtomic.h"
 #include "SysLock.h"
 #include "SysTime.h"
@@ -65,18 +64,18 @@ static bool send(void *owner, const CAN_FRAME *frame)
 /* In the context of the port. */
 static bool take_urgent(RTS_UI32 index, const CAN_FRAME *frame)
 {
-    CANOPEN_PDO_STATE *state = setup.lines[index].by_cob[frame->id & 0x7FF];
+    CANOPEN_PDO_STATE *state = CanopenFindInput(&setup.lines[index], frame->id);
 
     if (frame->id == CANOPEN_SYNC && (frame->flags & CAN_FLAG_REMOTE) == 0)
         CanopenSyncTake(&setup.lines[index]);
     if (state == NULL || (frame->flags & CAN_FLAG_REMOTE) != 0)
         return false;
-    if (frame->size < state->pdo.size)
+    if (frame->size < CanopenPdoSize(state))
         return false; /* main counts it */
-    RTS_UI32 next = state->number + 1;
-    memcpy(state->in[next % 2], frame->data, state->pdo.size);
-    SysAtomicStore(&state->received_ms, SysTimeGetMs());
-    SysAtomicStore(&state->number, next);
+    RTS_UI32 next = state->of.in.number + 1;
+    memcpy(state->of.in.data[next % 2], frame->data, CANOPEN_PDO_SIZE); /* a frame has as many, wanted or not */
+    SysAtomicStore(&state->of.in.received_ms, SysTimeGetMs());
+    SysAtomicStore(&state->of.in.number, next);
     return true;
 }
 
@@ -90,11 +89,12 @@ static void count_short(const CANOPEN_LINE *line, const CANOPEN_PDO_STATE *state
 static void take(RTS_UI32 index, const CAN_FRAME *frame, RTS_UI32 now_ms)
 {
     const CANOPEN_LINE *line = &setup.lines[index];
-    CANOPEN_DEVICE *device = line->by_node[frame->id & CANOPEN_NODE_MASK];
+    CANOPEN_DEVICE *device = CanopenFindNode(line, frame->id & CANOPEN_NODE_MASK);
+    const CANOPEN_PDO_STATE *input = CanopenFindInput(line, frame->id);
 
-    if (line->by_cob[frame->id & 0x7FF] != NULL) {
-        if (frame->size < line->by_cob[frame->id & 0x7FF]->pdo.size)
-            count_short(line, line->by_cob[frame->id & 0x7FF]);
+    if (input != NULL) {
+        if (frame->size < CanopenPdoSize(input))
+            count_short(line, input);
     } else if (!CanopenCallsTake(index, frame, now_ms) && device != NULL) {
         CanopenNodeTake(&device->node, frame, now_ms);
     }
@@ -110,12 +110,12 @@ static bool is_reserved(RTS_UI32 network, RTS_UI32 id)
     if (line->connector == NULL)
         return false;
     for (RTS_UI32 i = 0; i < setup.pdo_count; i++)
-        if (setup.pdos[i].pdo.cob == id)
+        if (setup.pdos[i].cob == id)
             return true;
     return id == CANOPEN_NMT || id == CANOPEN_SYNC ||
            ((function == CANOPEN_SDO_REPLY || function == CANOPEN_SDO_REQUEST || function == CANOPEN_HEARTBEAT ||
              function == CANOPEN_EMCY) &&
-            (line->by_node[node] != NULL || node == line->own_node));
+            (line->by_node[node] != 0 || node == line->own_node));
 }
 
 /* ---- configuration ---- */
@@ -150,15 +150,19 @@ static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConf
 
     if (CanopenFindDevice(&setup, connector) == NULL)
         return ERR_OK; /* an optional one that was refused */
-    if (state == NULL || ((state->pdo.flags & CANOPEN_PDO_OUTPUT) != 0) != (type == IO_MAP_OUTPUTS) ||
-        channel->parameter_bit + channel->bits > 8u * state->pdo.size)
+    if (state == NULL || ((state->flags & CANOPEN_PDO_OUTPUT) != 0) != (type == IO_MAP_OUTPUTS) ||
+        channel->parameter_bit + channel->bits > 8u * CanopenPdoSize(state))
         return IoMgrConfigRefuse(connector, ERR_PARAMETER, "a channel is not in its PDOs.");
     return ERR_OK;
 }
 
 static RTS_RESULT attach(CANOPEN_LINE *line)
 {
-    line->user = (CAN_USER){filters, RTS_COUNT(filters), take_urgent, take, NULL};
+    line->user = (CAN_USER){.filters = filters,
+                            .filter_count = RTS_COUNT(filters),
+                            .take_urgent = take_urgent,
+                            .take = take,
+                            .reserves = is_reserved};
     RTS_RESULT result = CanAttach(line->network, &line->user);
     line->attached = result == ERR_OK;
     if (!line->attached)
@@ -173,7 +177,7 @@ static void leave_out_refused(CANOPEN_LINE *line)
     for (CANOPEN_DEVICE *device = line->devices; device < line->devices + line->device_count; device++) {
         device->used = IoMgrConfigIsMine(device->connector, &driver);
         if (!device->used)
-            line->by_node[device->node.node] = NULL;
+            line->by_node[device->node.node] = 0;
     }
 }
 
@@ -203,18 +207,18 @@ static void read_newest(const CANOPEN_PDO_STATE *state, RTS_UI8 *data)
     RTS_UI32 tries = 0;
 
     do {
-        number = SysAtomicLoad(&state->number);
-        memcpy(data, state->in[number % 2], CANOPEN_PDO_SIZE);
+        number = SysAtomicLoad(&state->of.in.number);
+        memcpy(data, state->of.in.data[number % 2], CANOPEN_PDO_SIZE);
         SysAtomicFence();
-    } while (SysAtomicLoad(&state->number) != number && ++tries < READ_TRIES);
+    } while (SysAtomicLoad(&state->of.in.number) != number && ++tries < READ_TRIES);
 }
 
 static void copy_output(const IoConfigConnector *connector, const IoConfigChannelMap *channel, CANOPEN_PDO_STATE *state)
 {
     if (SysAtomicLoad(&CanopenFindDevice(&setup, connector)->line->is_safe) != 0)
-        IoMgrCopySafeOutputLE(channel, state->out);
+        IoMgrCopySafeOutputLE(channel, state->of.out.data);
     else
-        IoMgrCopyOutputLE(channel, state->out);
+        IoMgrCopyOutputLE(channel, state->of.out.data);
 }
 
 static void copy(const IoConfigConnectorMap *map, bool is_output)
@@ -261,24 +265,24 @@ static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
 
 static bool is_due(const CANOPEN_PDO_STATE *state, const RTS_UI8 *out, RTS_UI32 run, RTS_UI32 now_ms)
 {
-    if ((state->pdo.flags & CANOPEN_PDO_SYNC) != 0 || state->sent_run != run)
+    if ((state->flags & CANOPEN_PDO_SYNC) != 0 || state->of.out.sent_run != run)
         return true;
-    return memcmp(out, state->sent, state->pdo.size) != 0 ||
-           (state->pdo.event_ms != 0 && now_ms - state->sent_ms >= state->pdo.event_ms);
+    return memcmp(out, state->of.out.sent, CanopenPdoSize(state)) != 0 ||
+           (state->within_ms != 0 && now_ms - state->of.out.sent_ms >= state->within_ms);
 }
 
 static void send_output(CANOPEN_LINE *line, CANOPEN_PDO_STATE *state, RTS_UI32 run, RTS_UI32 now_ms)
 {
-    CAN_FRAME frame = {.id = state->pdo.cob, .size = state->pdo.size};
+    CAN_FRAME frame = {.id = state->cob, .size = (RTS_UI8)CanopenPdoSize(state)};
     RTS_UI32 lock = SysLockEnter();
 
-    memcpy(frame.data, state->out, state->pdo.size);
+    memcpy(frame.data, state->of.out.data, CANOPEN_PDO_SIZE);
     SysLockLeave(lock);
     if (!is_due(state, frame.data, run, now_ms) || !send(line, &frame))
         return;
-    memcpy(state->sent, frame.data, state->pdo.size);
-    state->sent_run = run;
-    state->sent_ms = now_ms;
+    memcpy(state->of.out.sent, frame.data, CANOPEN_PDO_SIZE);
+    state->of.out.sent_run = run;
+    state->of.out.sent_ms = now_ms;
 }
 
 static RTS_RESULT start_bus_cycle(const IoConfigConnector *connector)
@@ -292,7 +296,7 @@ static RTS_RESULT start_bus_cycle(const IoConfigConnector *connector)
         FOR_EACH_DEVICE (line, device) {
             RTS_UI32 run = SysAtomicLoad(&device->runs);
             for (RTS_UI32 i = 0; i < device->pdo_count && run != 0; i++)
-                if ((device->pdos[i].pdo.flags & CANOPEN_PDO_OUTPUT) != 0)
+                if ((device->pdos[i].flags & CANOPEN_PDO_OUTPUT) != 0)
                     send_output(line, &device->pdos[i], run, now_ms);
         }
     }
@@ -309,10 +313,10 @@ static RTS_UI32 get_deadline_ms(const CANOPEN_DEVICE *device, RTS_UI32 now_ms, b
     *has_all = true;
     for (RTS_UI32 i = 0; i < device->pdo_count; i++) {
         const CANOPEN_PDO_STATE *state = &device->pdos[i];
-        if ((state->pdo.flags & CANOPEN_PDO_OUTPUT) != 0 || state->pdo.deadline_ms == 0)
+        if ((state->flags & CANOPEN_PDO_OUTPUT) != 0 || state->within_ms == 0)
             continue;
-        RTS_UI32 since_ms = now_ms - SysAtomicLoad(&state->received_ms);
-        RTS_UI32 left_ms = since_ms < state->pdo.deadline_ms ? state->pdo.deadline_ms - since_ms : 0;
+        RTS_UI32 since_ms = now_ms - SysAtomicLoad(&state->of.in.received_ms);
+        RTS_UI32 left_ms = since_ms < state->within_ms ? state->within_ms - since_ms : 0;
         *has_all = *has_all && left_ms != 0;
         wait_ms = left_ms < wait_ms ? left_ms : wait_ms;
     }
@@ -441,7 +445,8 @@ static void poll_device(CANOPEN_LINE *line, CANOPEN_DEVICE *device, RTS_UI32 now
     CanopenNodePoll(&device->node, send, line, now_ms);
     if (!ran && device->node.state == MASTER_RUNS)
         for (RTS_UI32 i = 0; i < device->pdo_count; i++)
-            SysAtomicStore(&device->pdos[i].received_ms, now_ms); /* its time begins */
+            if ((device->pdos[i].flags & CANOPEN_PDO_OUTPUT) == 0)
+                SysAtomicStore(&device->pdos[i].of.in.received_ms, now_ms); /* its time begins */
     (void)get_deadline_ms(device, now_ms, &has_all);
     if (!has_all)
         CanopenNodeLose(&device->node, MASTER_WHY_LATE, now_ms);
@@ -627,7 +632,6 @@ RTS_RESULT IoDrvCanopen_Hook(CMP_HOOK hook)
     if (hook == CH_INIT2)
         return IoMgrRegisterInstance(&driver);
     if (hook == CH_INIT3) {
-        IecCanSetReserved(is_reserved);
         CanopenCallsBegin(&setup, send);
         return CanopenCallsRegister();
     }

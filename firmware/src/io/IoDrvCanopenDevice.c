@@ -255,7 +255,11 @@ static void follow_inputs(void)
 
 static RTS_RESULT attach(void)
 {
-    device.user = (CAN_USER){filters, RTS_COUNT(filters), take_urgent, take, note_bus};
+    device.user = (CAN_USER){.filters = filters,
+                             .filter_count = RTS_COUNT(filters),
+                             .take_urgent = take_urgent,
+                             .take = take,
+                             .note_bus = note_bus};
     device.is_running = true;
     RTS_RESULT result = CanAttach(device.network, &device.user);
     device.is_running = result == ERR_OK;

@@ -68,7 +68,7 @@ RTS_RESULT SysCanSend(RTS_UI32 index, const CAN_FRAME *frame)
     return is_open ? SlcanSend(&slcan, frame) : ERR_DEVICE;
 }
 
-#if CAN_MAX_USERS > 0
+#if CAN_SHARED
 static PF_CAN_URGENT urgent;
 
 void SysCanSetUrgent(RTS_UI32 index, PF_CAN_URGENT handler)

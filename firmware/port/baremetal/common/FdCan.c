@@ -213,7 +213,7 @@ RTS_RESULT SysCanReceive(RTS_UI32 index, CAN_FRAME *frame)
     return CanRxTake(&controllers[index].rx, frame) ? ERR_OK : ERR_NOTHING_TO_DO;
 }
 
-#if CAN_MAX_USERS > 0
+#if CAN_SHARED
 /* The interrupt is above main: the handler does not run while main is here. */
 void SysCanSetUrgent(RTS_UI32 index, PF_CAN_URGENT handler)
 {

@@ -7,14 +7,17 @@
 #ifndef RTS_CONFIG_SIZE_H
 #define RTS_CONFIG_SIZE_H
 
+#ifndef RTS_CONFIG_NAME /* that of the configuration with a manager has all of this */
 #define RTS_CONFIG_NAME "canopen"
+#define SCHED_MAX_EXTERNAL_EVENTS 0
+#define IO_MAX_CONNECTORS 4
+#endif
 #define APP_CRASH_TEXT_SIZE 1
 #define APP_MAX_TASKS 3
 #define NETSERVER_MESSAGE_SIZE 576
 #define COMM_MAX_CLIENTS 2
 #define COMM_ENDPOINTS 1
 #define EVENT_MAX_CALLBACKS 0
-#define SCHED_MAX_EXTERNAL_EVENTS 0
 #define APP_REFUSAL_TEXT_SIZE 96
 #define APP_UNPACK_SIZE 4096
 #define COM_QUEUE_SIZE 540
@@ -22,7 +25,7 @@
 #define CAN_RX_SESSIONS 2
 #define CAN_TX_SESSIONS 2
 #define CAN_BLOCK_SIZE 16 /* 27 bytes each: less than BOARD_UART_RX_SIZE */
-#define CAN_MAX_USERS 2
+#define CAN_SHARED 1
 #define CANOPEN_DEVICE_DATA 256
 #define CANOPEN_DEVICE_SDO 128
 #define CANOPEN_DEVICE_PDOS 4
@@ -32,7 +35,6 @@
 #define RTS_MAIN_STACK_SIZE 2848
 #define LOG_TEXT_SIZE 48
 #define CYCLE_OWN_PHASES 1
-#define IO_MAX_CONNECTORS 4
 #define APP_INPUT_SIZE 512
 #define APP_OUTPUT_SIZE 256
 
