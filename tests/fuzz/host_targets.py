@@ -25,11 +25,15 @@ from plctool.core import lib
 from plctool.debug.symbols import SymbolTable
 from plctool.device import Plc
 from plctool.errors import DeviceError, LinkError, UsageError
+from plctool.files import Pos
 from plctool.gateway.frames import Decoder, Frame, FrameError, Kind, Reply, Request, encode
 from plctool.image.board import find_board
 from plctool.image.file import describe_image, parse_image
 from plctool.image.production import describe_production, production_pieces, write_production
-from plctool.io.canopen.eds import read_eds
+from plctool.io.canopen.dcf import NodeOf, dcf_of, writes_of_dcf
+from plctool.io.canopen.eds import load_eds, read_eds
+from plctool.io.canopen.nodelist import ListedNode, nodelist_text, read_nodelist
+from plctool.io.mistakes import Mistakes
 from plctool.link import bintag, file_services, io_services, l7, router, services, simplecom
 from plctool.link.connection import PATIENCE, Connection
 from plctool.link.session import Session
@@ -263,6 +267,22 @@ def eds(data: bytes) -> None:
         read_eds("a.eds", data)
 
 
+def nodelist(data: bytes) -> None:
+    """A nodelist.cpj, and a DCF, which a description takes and another one is made of."""
+    with suppress(UsageError):
+        read_nodelist("nodelist.cpj", data)
+        found = read_eds("a.dcf", data)
+        writes = list(writes_of_dcf(found, 5, Mistakes()))
+        dcf_of(found, writes, NodeOf("b.dcf", "a.eds", 5, "A", 0, "Bus", 500))
+
+
+def node_files() -> Iterator[bytes]:
+    eds = load_eds(ROOT / "examples/canopen/valves.eds")
+    writes = [(0x1017, 0, b"\xc8\0"), (0x2000, 0, b"text"), (0x1A00, 3, bytes(4))]
+    yield dcf_of(eds, writes, NodeOf("b.dcf", "a.eds", 5, "A", 0, "Bus", 500)).encode()
+    yield nodelist_text("Bus", [ListedNode(5, Pos("", 1, 1), "A", "a.dcf")]).encode()
+
+
 def project(data: bytes) -> None:
     """plc.toml and its link."""
     file = in_file("plc.toml", data)
@@ -371,6 +391,7 @@ TARGETS = {
     "production": Target(production, production_files),
     "sources": Target(sources, source_files),
     "eds": Target(eds, files("examples/canopen/*.eds", "tests/canopen/*.eds")),
+    "nodelist": Target(nodelist, node_files),
     "m4": Target(m4, m4_files),
     "project": Target(project, project_files),
     "library": Target(library, library_files),

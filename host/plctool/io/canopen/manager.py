@@ -28,6 +28,7 @@ from plctool.errors import UsageError
 from plctool.files import check_inside
 from plctool.iec.types import BYTE, LREAL, REAL, UDINT, ArrayType, StringType, Type
 from plctool.io.canopen.data_types import Value
+from plctool.io.canopen.dcf import heartbeat_ms, writes_of_dcf
 from plctool.io.canopen.eds import WRITABLE, Eds, load_eds
 from plctool.io.canopen.eds import Entry as EdsEntry
 from plctool.io.canopen.pdo_layout import FREE_COBS, Direction, Item, Layout, lay_out
@@ -63,6 +64,7 @@ class CanopenLine(Connector):
     faults = ("cut",)
     node: int = 0
     sync: bool = False
+    network: int = 0
     nodes: dict[int, str] = field(default_factory=dict)
     free_cobs: list[int] = field(default_factory=lambda: list(FREE_COBS))
 
@@ -78,6 +80,7 @@ class CanopenDevice(Connector):
     }
 
     node: int = 0
+    eds: Eds | None = None
     writes: list[tuple[int, int, bytes]] = field(default_factory=list)
 
     def add(self, number: int, value: int, name: str = "") -> None:
@@ -93,6 +96,7 @@ def read_canopen(table: Table, context: Context) -> list[Connector]:
     """A network and its nodes."""
     line = read_connector(CanopenLine, table, DRIVER, default_name="canopen")
     network = table.number("network", 0, 15, 0) or 0
+    line.network = network
     line.takes = f"the CAN network {network}"
     line.node = table.number("node", 1, MAX_NODE) or 0
     sync = _read_sync(table, line.name)
@@ -148,11 +152,11 @@ def _read_sync(table: Table, line: str) -> Sync:
 
 def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
     made = read_connector(CanopenDevice, table, DRIVER, parent=line)
-    _read_number(made, table, line)
-    eds = _read_eds(table)
+    eds = made.eds = _read_eds(table)
+    _read_number(made, table, line, eds)
     timeout = table.duration_us("timeout", *_DURATION_US, 1_000_000) or 1_000_000
     table.only_one("guard", "heartbeat")
-    heartbeat = table.duration_us("heartbeat", *_DURATION_US, _DEFAULT_HEARTBEAT_US) or _DEFAULT_HEARTBEAT_US
+    heartbeat = table.duration_us("heartbeat", *_DURATION_US) or _default_heartbeat_us(eds, made.node)
     guard = _read_guard(table)
     _add_losses(made, table)
     every = table.duration_us("every", 1000, _DURATION_US[1])
@@ -177,6 +181,7 @@ def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
     made.add_bytes(int(lib.CANOPEN_PARAM_EXPECTED), _expected(eds), "expected")
     if heartbeat:
         made.writes.append((_HEARTBEAT, 0, (heartbeat // 1000).to_bytes(2, "little")))
+    made.writes += writes_of_dcf(eds, made.node, table.mistakes)
     if settings is not None:
         made.writes += _settings(settings, eds, table.mistakes)
     _add_pdos(made, eds, channels, table, line, bool(synchronous), every)
@@ -185,8 +190,22 @@ def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
     return made
 
 
-def _read_number(made: CanopenDevice, table: Table, line: CanopenLine) -> None:
-    made.node = table.number("node", 1, MAX_NODE, required=5) or 0
+def _default_heartbeat_us(eds: Eds | None, node: int) -> int:
+    """That of a DCF, if a node can have it."""
+    period_us = 1000 * (heartbeat_ms(eds, node) or 0) if eds is not None else 0
+    return period_us if _DURATION_US[0] <= period_us <= _DURATION_US[1] else _DEFAULT_HEARTBEAT_US
+
+
+def _read_number(made: CanopenDevice, table: Table, line: CanopenLine, eds: Eds | None) -> None:
+    """The number of a node, which its DCF may give."""
+    known = eds.commissioning.node if eds is not None and eds.commissioning is not None else None
+    made.node = table.number("node", 1, MAX_NODE, known, required=5 if known is None else None) or 0
+    if known is not None and made.node != known:
+        assert eds is not None
+        name = Path(eds.file).name
+        table.error(
+            f"{name} is of node {known} (DeviceComissioning), not {made.node}; use one of node {made.node}", "node"
+        )
     take_number(table, line.nodes, made.node, made.name)
 
 
@@ -240,7 +259,9 @@ def _add_losses(made: CanopenDevice, table: Table) -> None:
 
 
 def _read_eds(table: Table) -> Eds | None:
-    name = table.text("eds", required="valves.eds")
+    table.only_one("eds", "dcf")
+    key = "dcf" if table.raw("dcf") is not None else "eds"
+    name = table.text(key, required="valves.eds")
     if name is None:
         return None
     folder = Path(table.pos.file).parent
@@ -248,12 +269,12 @@ def _read_eds(table: Table) -> Eds | None:
         check_inside(folder / name, folder)
         eds = load_eds(folder / name)
     except UsageError as error:
-        table.error(str(error).rstrip("."), "eds")
+        table.error(str(error).rstrip("."), key)
         return None
     if eds.has_errors:
         first = next(f for f in eds.findings.found if f.severity == "error")
         message = f"{name} has errors, the first in line {first.pos.line}: {first.message.rstrip('.')}"
-        table.error(f"{message}; 'plctool canopen check' shows all", "eds")
+        table.error(f"{message}; 'plctool canopen check' shows all", key)
         return None
     return eds
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from plctool.cli.commands.canopen.eds import add_check, add_eds_of_image
+from plctool.cli.commands.canopen.exchange import add_export, add_import
 from plctool.cli.commands.canopen.lss import add_lss
 from plctool.cli.commands.canopen.messages import add_emcy, add_pdo
 from plctool.cli.commands.canopen.nodes import add_nmt, add_scan
@@ -13,6 +14,6 @@ from plctool.cli.parser import Parser
 
 def canopen_arguments(command: Parser) -> None:
     action = command.adder_of_actions()
-    checks = (add_check, add_eds_of_image)
-    for add in (*checks, add_scan, add_nmt, add_sdo, add_emcy, add_pdo, add_watch, add_lss, add_download):
+    offline = (add_check, add_eds_of_image, add_export, add_import)
+    for add in (*offline, add_scan, add_nmt, add_sdo, add_emcy, add_pdo, add_watch, add_lss, add_download):
         add(action)
