@@ -106,6 +106,20 @@ def test_ten_changes_in_a_row_lose_no_cycle(tmp_path: Path) -> None:
         assert plc.tasks()[0].overruns == 0
 
 
+def test_member_that_moves_between_two_others_keeps_its_value(tmp_path: Path) -> None:
+    """`a` and `b` stay as far from each other as they were; `m` is where nothing was between them."""
+    block = "FUNCTION_BLOCK Block VAR {} END_VAR m := m; a := a; b := b; END_FUNCTION_BLOCK\n"
+    members = "m : DINT := 51; removed : DINT; a : SINT := 36; b : LINT := 8;", "a : SINT; m : DINT; b : LINT;"
+    texts = [program("block();", "VAR block : Block; END_VAR", block.format(text)) for text in members]
+    result = built(tmp_path, texts[0])
+    with Simulator(result.image, result.symbols) as plc:
+        plc.run_for(20)
+        result = built(tmp_path, texts[1], result.symbols)
+        plc.add_symbols(result.symbols)
+        plc.change(result.image)
+        assert plc.read("Main.block") == {"a": 36, "m": 51, "b": 8}
+
+
 def test_many_changes_in_a_row_lose_nothing(tmp_path: Path) -> None:
     """10 000 of them: make changes."""
     summary = many_changes.run(tmp_path, 12, 5)

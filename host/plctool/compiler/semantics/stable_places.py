@@ -10,7 +10,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from bisect import insort
+from bisect import bisect_left, insort
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -85,8 +85,10 @@ class Match:
         self.misfit = self.misfit or part.misfit
 
     def joined(self) -> Match:
-        """The same with runs as long as possible."""
+        """The same with runs as long as possible: over room where the old type has nothing, and the new one has nothing
+        that is kept."""
         gone = sorted(self.gone, key=lambda g: g.offset)
+        starts = sorted(run.to for run in self.runs)
         runs: list[Run] = []
         at = 0
         for run in sorted(set(self.runs)):
@@ -94,6 +96,7 @@ class Match:
                 at += 1
             last = runs[-1] if runs else run
             between = at < len(gone) and gone[at].offset < run.source
+            between = between or bisect_left(starts, last.to + last.size) < bisect_left(starts, run.to)
             if runs and run.source - last.source == run.to - last.to and not between:
                 runs[-1] = Run(last.source, last.to, max(last.size, run.source + run.size - last.source))
             else:
