@@ -1,4 +1,4 @@
-"""Random online changes in a row, each checked against a download of the same program: `make changes`.
+"""Random online changes in a row, each checked against a download of the same image: `make changes`.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -21,6 +21,7 @@ from plctool.compiler.image.build import BuildResult
 from plctool.image.file import parse_image
 
 MOST_LINES = 20  # else the program grows for ever
+MEASURED = 5  # each so many changes the program is compiled as for a download, too, and its room compared
 
 
 class Summary(NamedTuple):
@@ -41,8 +42,6 @@ def run(folder: Path, count: int, seed: int, tell: Callable[[int, float], None] 
     source, room = random_source(random), 0.0
     result = built(folder, source.text)
     largest = size_of(result)
-    fresh_folder = folder / "fresh"
-    fresh_folder.mkdir(exist_ok=True)
     with Simulator(result.image, result.symbols) as plc:
         for done in range(count):
             plc.run_for(10 * random.randrange(1, 5))
@@ -50,22 +49,23 @@ def run(folder: Path, count: int, seed: int, tell: Callable[[int, float], None] 
             source = edited(random, source, 100 * (done + 1))
             source = Source(source.lines[:MOST_LINES], source.members[:MOST_LINES], source.step)
             result = built(folder, source.text, plc.symbols())
-            fresh = built(fresh_folder, source.text)
             assert result.change is not None and result.change.problems == [], result.change
             plc.add_symbols(result.symbols)
             plc.change(result.image)
-            check(plc, fresh, before, had, source)
+            check(plc, result, before, had, source)
             assert plc.tasks()[0].cycles >= cycles and plc.tasks()[0].overruns == 0
-            largest = max(largest, size_of(fresh))
-            room = max(room, size_of(result) / largest)
+            if done % MEASURED == 0:
+                largest = max(largest, size_of(built(folder, source.text)))
+                room = max(room, size_of(result) / largest)
             tell(done + 1, room)
     return Summary(count, room)
 
 
-def check(plc: Simulator, fresh: BuildResult, before: dict[str, Any], had: dict[str, str], source: Source) -> None:
-    """Each variable has what it had, as far as its type allows that, and new ones what a download gives them."""
+def check(plc: Simulator, result: BuildResult, before: dict[str, Any], had: dict[str, str], source: Source) -> None:
+    """Each variable has what it had, as far as its type allows that, and new ones what a download of the same image
+    gives them."""
     now = values(plc)
-    with Simulator(fresh.image, fresh.symbols, start=False) as other:
+    with Simulator(result.image, result.symbols, start=False) as other:
         other.restart()
         initial = values(other)
     for name, value in initial.items():

@@ -105,7 +105,8 @@ def _other_tasks(had: SymbolTable, has: SymbolTable) -> set[int]:
 
 def _removed_variables(had: SymbolTable, has: SymbolTable) -> list[Symbol]:
     """The variables that the new program does not have, or has at another place."""
-    return [s for name, s in had.variables.items() if not _is_at(has, name, s.place)]
+    places = {name.casefold(): symbol.place for name, symbol in has.variables.items()}
+    return [s for name, s in had.variables.items() if places.get(name.casefold()) != s.place]
 
 
 @dataclass(frozen=True)
