@@ -32,16 +32,28 @@ class TestBoard(Changing):
             plc.flash(result.image)
             yield plc
 
-    def test_ten_changes_lose_no_cycle_of_the_task(self, plc, tmp_path):
-        """None is due and does not begin: that would be an overrun, and the program would count less than its task."""
+
+def test_ten_changes_lose_no_cycle_of_the_task(make_board, tmp_path):
+    """A cycle that is due and does not begin would be an overrun, and the program would count less than its task.
+
+    The clock counts instructions: with others, a busy host that lets QEMU wait makes the timers late.
+    """
+    first = built(tmp_path, program(), None, TARGET)
+    board = make_board("full")
+    board.power_on("exact")
+    with Plc(Connection(board.line())) as plc:
+        plc.add_symbols(first.symbols)
+        plc.flash(first.image)
         for n in range(10):
-            self.change(plc, tmp_path, program(f"{BODY} fixed := {n};"))
-        values = plc.sample(["Main.n"]).values
+            result = built(tmp_path, program(f"{BODY} fixed := {n};"), plc.symbols(), TARGET)
+            plc.add_symbols(result.symbols)
+            plc.change(result.image)
+        before = plc.read("Main.n")
+        eventually(lambda: plc.read("Main.n") > before)
+        plc.stop()
         (task,) = plc.tasks()
         assert task.overruns == 0
-        assert values["Main.n"] <= task.cycles
-        (info,) = plc.tasks()
-        assert abs(plc.read("Main.n") - info.cycles) < 20
+        assert plc.read("Main.n") == task.cycles > before
 
 
 def test_power_off_right_after_a_change_keeps_retain_values(make_board, tmp_path):
