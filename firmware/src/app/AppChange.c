@@ -53,6 +53,31 @@ static const CDL_CHANGE_STEP *first_step(const CHANGE *change)
     return (const CDL_CHANGE_STEP *)(const void *)(change->code + change->image->change.offset);
 }
 
+/* What a kind of step has. */
+enum {
+    IS_COPIED = 1,
+    IS_LED = 2, /* pointers lead on by it */
+    IS_POINTERS = 4,
+    IS_FROM = 8, /* a place in the image that runs */
+    IS_TO = 16,  /* a place in the one that is to run next */
+};
+static const RTS_UI8 traits[] = {
+    IS_COPIED | IS_LED | IS_FROM | IS_TO, /* MOVE */
+    IS_LED | IS_FROM | IS_TO,             /* FOLLOW */
+    IS_LED | IS_FROM,                     /* GONE */
+    IS_POINTERS | IS_FROM,                /* LEAD */
+    IS_POINTERS | IS_FROM,                /* FORGET */
+    IS_COPIED | IS_FROM | IS_TO,          /* COPY */
+    IS_TO,                                /* CLEAR */
+    IS_TO,                                /* PUT */
+    IS_TO,                                /* SIGN */
+};
+
+static bool has(const CDL_CHANGE_STEP *step, RTS_UI32 trait)
+{
+    return (traits[step->kind] & trait) != 0;
+}
+
 static RTS_UI32 data_size(const CDL_CHANGE_STEP *step)
 {
     return step->kind == CDL_CHANGE_PUT ? (step->size + 3) & ~(RTS_UI32)3 : 0;
@@ -68,42 +93,21 @@ static bool is_in_area(const APP_IMAGE *image, RTS_UI32 area, RTS_UI32 offset, R
     return area < APP_AREA_CODE && offset <= image->area_size[area] && size <= image->area_size[area] - offset;
 }
 
-static bool is_led(const CDL_CHANGE_STEP *step)
-{
-    return step->kind <= CDL_CHANGE_GONE;
-}
-
-static bool is_pointers(const CDL_CHANGE_STEP *step)
-{
-    return step->kind == CDL_CHANGE_LEAD || step->kind == CDL_CHANGE_FORGET;
-}
-
-static bool is_copied(const CDL_CHANGE_STEP *step)
-{
-    return step->kind == CDL_CHANGE_MOVE || step->kind == CDL_CHANGE_COPY;
-}
-
-/* Checks the place that a step has in the image that runs. */
-static bool is_from(const CHANGE *change, const CDL_CHANGE_STEP *step)
-{
-    RTS_UI32 area = step->kind == CDL_CHANGE_FOLLOW ? step->from_area & ~(RTS_UI32)CDL_CHANGE_OBJECTS : step->from_area;
-
-    return is_in_area(&change->old, area, step->from, step->size);
-}
-
 static bool is_step(const CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI32 left)
 {
-    if (is_pointers(step))
-        return step->to >= APP_POINTER_SIZE && (step->area & ~CDL_CHANGE_OBJECTS) == 0 && is_from(change, step);
-    if (step->kind == CDL_CHANGE_GONE)
-        return is_from(change, step);
-    if (step->kind > CDL_CHANGE_SIGN || !is_in_area(change->image, step->area, step->to, step->size))
+    RTS_UI32 area = step->from_area;
+
+    if (step->kind > CDL_CHANGE_SIGN || data_size(step) > left)
         return false;
-    if (is_copied(step) || step->kind == CDL_CHANGE_FOLLOW)
-        return is_from(change, step);
-    if (step->kind == CDL_CHANGE_SIGN)
-        return step->to > 0;
-    return step->kind != CDL_CHANGE_PUT || data_size(step) <= left;
+    if (step->kind == CDL_CHANGE_FOLLOW)
+        area &= ~(RTS_UI32)CDL_CHANGE_OBJECTS;
+    if (has(step, IS_FROM) && !is_in_area(&change->old, area, step->from, step->size))
+        return false;
+    if (has(step, IS_TO))
+        return is_in_area(change->image, step->area, step->to, step->size) &&
+               (step->kind != CDL_CHANGE_SIGN || step->to > 0);
+    return !has(step, IS_POINTERS) ||
+           (step->to >= APP_POINTER_SIZE && (step->area & ~(RTS_UI32)CDL_CHANGE_OBJECTS) == 0);
 }
 
 /* True if a step that leads pointers on is after the previous one. */
@@ -131,9 +135,11 @@ static bool are_steps(CHANGE *change)
     for (step = first_step(change); left > 0; step = next_step(step)) {
         if (left < sizeof *step || !is_step(change, step, left - (RTS_UI32)sizeof *step))
             return false;
-        if (is_led(step) && !is_in_order(change, step))
-            return false;
-        change->led += is_led(step);
+        if (has(step, IS_LED)) {
+            if (!is_in_order(change, step))
+                return false;
+            change->led++;
+        }
         left -= (RTS_UI32)sizeof *step + data_size(step);
     }
     return true;
@@ -149,12 +155,6 @@ static RTS_UI8 *source_of(const CDL_CHANGE_STEP *step)
 static RTS_UI8 *target_of(const CDL_CHANGE_STEP *step)
 {
     return AppAreasGet(step->area) + step->to;
-}
-
-/* The areas may be anywhere in memory, so the place is compared with the one that the area has. */
-static bool leads_to(uintptr_t pointer, const RTS_UI8 *place, RTS_UI32 size)
-{
-    return pointer - (uintptr_t)place < size;
 }
 
 /* Returns the step whose part of the image that ran a pointer leads to; NULL: none. */
@@ -188,133 +188,100 @@ static const CDL_CHANGE_STEP *follow(const CHANGE *change, uintptr_t pointer, RT
     return step != NULL ? step : find_step(change, address->area, address->offset);
 }
 
-static bool is_gone(const CDL_CHANGE_STEP *step, const AREA_ADDRESS *address)
+/* Returns where a pointer is to lead. 0: nowhere, or to what is gone. */
+static uintptr_t lead_on(const CHANGE *change, uintptr_t pointer, RTS_UI32 objects, AREA_ADDRESS *address)
 {
-    return address->area == APP_AREA_CODE || (step != NULL && step->kind == CDL_CHANGE_GONE);
+    const CDL_CHANGE_STEP *step = follow(change, pointer, objects, address);
+
+    if (address->area == APP_AREA_CODE || (step != NULL && step->kind == CDL_CHANGE_GONE))
+        return 0;
+    return step == NULL ? pointer : pointer - (uintptr_t)source_of(step) + (uintptr_t)target_of(step);
 }
 
-/* Calls `handle` with each pointer of a step. */
-static void for_pointers(CHANGE *change, const CDL_CHANGE_STEP *step,
-                         void (*handle)(CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI8 *at))
+/* Returns where a pointer led before. The areas may be anywhere in memory, so it is compared with the places that they
+ * have. */
+static uintptr_t lead_back(const CHANGE *change, uintptr_t pointer, RTS_UI32 objects)
+{
+    const CDL_CHANGE_STEP *step = first_step(change);
+    const CDL_CHANGE_STEP *end = step + change->led;
+    uintptr_t found = pointer;
+
+    for (; step < end; step++) {
+        RTS_UI32 own = step->from_area & CDL_CHANGE_OBJECTS;
+        uintptr_t distance = pointer - (uintptr_t)target_of(step);
+        if (step->kind == CDL_CHANGE_GONE || distance >= step->size || (own & ~objects) != 0)
+            continue;
+        found = (uintptr_t)source_of(step) + distance;
+        if (own == objects)
+            break;
+    }
+    return found;
+}
+
+/* ---- what steps do ---- */
+
+typedef enum { WRITE, WRITE_BACK, CHECK_POINTERS, LEAD_ON, LEAD_BACK } WORK;
+
+static void note_dangling(CHANGE *change, const CDL_CHANGE_STEP *step, const RTS_UI8 *at, const AREA_ADDRESS *gone)
+{
+    if (step->kind == CDL_CHANGE_FORGET || change->dangles)
+        return;
+    change->dangles = true;
+    change->gone = *gone;
+    change->dangling.area = step->from_area;
+    change->dangling.offset = (RTS_UI32)(at - AppAreasGet(step->from_area));
+}
+
+static void handle_pointer(CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI8 *at, WORK work)
+{
+    AREA_ADDRESS address;
+    uintptr_t pointer;
+    uintptr_t led;
+
+    memcpy(&pointer, at, sizeof pointer);
+    led = work == LEAD_BACK ? lead_back(change, pointer, step->area) : lead_on(change, pointer, step->area, &address);
+    if (work != CHECK_POINTERS)
+        memcpy(at, &led, sizeof led);
+    else if (led == 0 && pointer != 0)
+        note_dangling(change, step, at, &address);
+}
+
+static void handle_pointers(CHANGE *change, const CDL_CHANGE_STEP *step, WORK work)
 {
     RTS_UI32 at;
 
     for (at = 0; at < step->size && step->size - at >= APP_POINTER_SIZE; at += step->to) {
-        handle(change, step, source_of(step) + at);
+        handle_pointer(change, step, source_of(step) + at, work);
         if (step->size - at < step->to)
             break;
     }
 }
 
-static void check_pointer(CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI8 *at)
+static void write_step(const CDL_CHANGE_STEP *step)
 {
-    const CDL_CHANGE_STEP *found;
-    uintptr_t pointer;
+    RTS_UI8 *to = target_of(step);
 
-    if (step->kind == CDL_CHANGE_FORGET || change->dangles)
-        return;
-    memcpy(&pointer, at, sizeof pointer);
-    found = follow(change, pointer, step->area, &change->gone);
-    if (!is_gone(found, &change->gone))
-        return;
-    change->dangles = true;
-    change->dangling.area = step->from_area;
-    change->dangling.offset = (RTS_UI32)(at - AppAreasGet(step->from_area));
-}
-
-static void lead_pointer(CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI8 *at)
-{
-    const CDL_CHANGE_STEP *found;
-    AREA_ADDRESS address;
-    uintptr_t pointer;
-
-    memcpy(&pointer, at, sizeof pointer);
-    found = follow(change, pointer, step->area, &address);
-    if (is_gone(found, &address))
-        pointer = 0;
-    else if (found != NULL)
-        pointer = pointer - (uintptr_t)source_of(found) + (uintptr_t)target_of(found);
-    memcpy(at, &pointer, sizeof pointer);
-}
-
-/* Returns the step that has led a pointer to where it is; NULL: none. */
-static const CDL_CHANGE_STEP *find_back(const CHANGE *change, uintptr_t pointer, RTS_UI32 objects)
-{
-    const CDL_CHANGE_STEP *found = NULL;
-    const CDL_CHANGE_STEP *step = first_step(change);
-    RTS_UI32 i;
-
-    for (i = 0; i < change->led; i++, step++) {
-        RTS_UI32 own = step->from_area & CDL_CHANGE_OBJECTS;
-        if (step->kind == CDL_CHANGE_GONE || !leads_to(pointer, target_of(step), step->size))
-            continue;
-        if (own == objects)
-            return step;
-        if (own == 0)
-            found = step;
-    }
-    return found;
-}
-
-static void lead_back(CHANGE *change, const CDL_CHANGE_STEP *step, RTS_UI8 *at)
-{
-    const CDL_CHANGE_STEP *found;
-    uintptr_t pointer;
-
-    memcpy(&pointer, at, sizeof pointer);
-    found = find_back(change, pointer, step->area);
-    if (found != NULL)
-        pointer = pointer - (uintptr_t)target_of(found) + (uintptr_t)source_of(found);
-    memcpy(at, &pointer, sizeof pointer);
-}
-
-/* ---- what steps do ---- */
-
-static void check_step(CHANGE *change, const CDL_CHANGE_STEP *step)
-{
-    if (is_pointers(step))
-        for_pointers(change, step, check_pointer);
-}
-
-static void lead_on(CHANGE *change, const CDL_CHANGE_STEP *step)
-{
-    if (is_pointers(step))
-        for_pointers(change, step, lead_pointer);
-}
-
-static void write_step(CHANGE *change, const CDL_CHANGE_STEP *step)
-{
-    RTS_UNUSED(change);
-    if (is_copied(step))
-        memmove(target_of(step), source_of(step), step->size);
-    else if (step->kind == CDL_CHANGE_CLEAR)
-        memset(target_of(step), 0, step->size);
+    if (has(step, IS_COPIED))
+        memmove(to, source_of(step), step->size);
     else if (step->kind == CDL_CHANGE_PUT)
-        memcpy(target_of(step), step + 1, step->size);
-    else if (step->kind == CDL_CHANGE_SIGN)
-        memset(target_of(step), target_of(step)[-1] & 0x80 ? 0xFF : 0, step->size);
+        memcpy(to, step + 1, step->size);
+    else if (step->kind >= CDL_CHANGE_CLEAR)
+        memset(to, step->kind == CDL_CHANGE_SIGN && (to[-1] & 0x80) != 0 ? 0xFF : 0, step->size);
 }
 
-static void copy_back(CHANGE *change, const CDL_CHANGE_STEP *step)
+static void for_steps(CHANGE *change, WORK work)
 {
-    RTS_UNUSED(change);
-    if (is_copied(step))
-        memmove(source_of(step), target_of(step), step->size);
-}
+    const CDL_CHANGE_STEP *step = first_step(change);
+    const RTS_UI8 *end = (const RTS_UI8 *)step + change->image->change.size;
 
-static void follow_back(CHANGE *change, const CDL_CHANGE_STEP *step)
-{
-    if (is_pointers(step))
-        for_pointers(change, step, lead_back);
-}
-
-static void for_steps(CHANGE *change, void (*handle)(CHANGE *change, const CDL_CHANGE_STEP *step))
-{
-    const RTS_UI8 *end = (const RTS_UI8 *)first_step(change) + change->image->change.size;
-    const CDL_CHANGE_STEP *step;
-
-    for (step = first_step(change); (const RTS_UI8 *)step < end; step = next_step(step))
-        handle(change, step);
+    for (; (const RTS_UI8 *)step < end; step = next_step(step)) {
+        if (has(step, IS_POINTERS) && work >= CHECK_POINTERS)
+            handle_pointers(change, step, work);
+        else if (work == WRITE)
+            write_step(step);
+        else if (work == WRITE_BACK && has(step, IS_COPIED))
+            memmove(source_of(step), target_of(step), step->size);
+    }
 }
 
 /* ---- checks ---- */
@@ -323,7 +290,7 @@ static RTS_RESULT check_state(const APP_IMAGE *image, APP_REFUSAL *refusal)
 {
     AppHandlePendingException();
     if (AppGetState() == AS_NONE || !AppIsInitialised() || AppHasException())
-        return APP_REFUSE(refusal, ERR_INVALID_STATE, "No program runs that could change; download it.");
+        return APP_REFUSE(refusal, ERR_INVALID_STATE, "No program runs; download one.");
 #if BP_MAX > 0
     if (AppBpIsHalted())
         return APP_REFUSE(refusal, ERR_INVALID_STATE, "A debugger has halted the program; let it go on first.");
@@ -387,11 +354,11 @@ static bool begin(void *arg)
 
     change->fails = has_failed();
     if (!change->fails)
-        for_steps(change, check_step);
+        for_steps(change, CHECK_POINTERS);
     if (change->fails || change->dangles)
         return false;
-    for_steps(change, lead_on);
-    for_steps(change, write_step);
+    for_steps(change, LEAD_ON);
+    for_steps(change, WRITE);
     AppExchange(change->image, change->code, &change->tables);
     change->pause_ns = (RTS_UI32)(SysTimeGetNs() - start_ns);
     return true;
@@ -401,8 +368,8 @@ static bool go_back(void *arg)
 {
     CHANGE *change = arg;
 
-    for_steps(change, copy_back);
-    for_steps(change, follow_back);
+    for_steps(change, WRITE_BACK);
+    for_steps(change, LEAD_BACK);
     AppExchange(&change->old, change->old_code, &change->tables);
     return true;
 }
@@ -451,7 +418,7 @@ static RTS_RESULT exchange(CHANGE *change, APP_REFUSAL *refusal)
     if (result == ERR_TIMEOUT)
         return APP_REFUSE(refusal, result, "A task takes too long for its cycle; try again.");
     if (change->fails)
-        return APP_REFUSE(refusal, ERR_INVALID_STATE, "The program has failed; see its log, and download it.");
+        return APP_REFUSE(refusal, ERR_INVALID_STATE, "The program has failed; see its log.");
     if (change->dangles)
         return APP_REFUSE(refusal, ERR_INVALID_REFERENCE,
                           "A pointer (area %u, %u) leads to what is removed (area %u, %u).", U(change->dangling.area),

@@ -8,6 +8,7 @@
  */
 #include "AppLife.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "../cycle/AppAreas.h"
@@ -225,10 +226,8 @@ const APP_TABLES *AppGetTables(void)
 
 static bool is_same_task(const CDL_TASK *a, const CDL_TASK *b)
 {
-    CDL_TASK moved = *a;
-
-    moved.entry_offset = b->entry_offset;
-    return memcmp(&moved, b, sizeof moved) == 0;
+    return memcmp(a, b, offsetof(CDL_TASK, entry_offset)) == 0 &&
+           memcmp(&a->event_area, &b->event_area, sizeof *a - offsetof(CDL_TASK, event_area)) == 0;
 }
 
 RTS_UI32 AppFindKeptTasks(const APP_IMAGE *image, const APP_TABLES *tables)

@@ -206,49 +206,30 @@ static bool is_other(RTS_UI32 task, RTS_UI32 kept)
     return (kept >> task & 1) == 0;
 }
 
-/* An event of a task to come has no timer yet. */
-void SchedStopOthers(RTS_UI32 kept)
-{
-    RTS_UI32 i;
-
-    for (i = 0; i < APP_MAX_TASKS; i++) {
-        if (i >= schedule.count)
-            schedule.timer[i] = RTS_INVALID_HANDLE;
-        else if (is_other(i, kept))
-            (void)SysTimerStop(schedule.timer[i]);
-    }
-}
-
-void SchedStartOthers(RTS_UI32 kept)
-{
-    RTS_UI32 i;
-
-    for (i = 0; i < schedule.count && schedule.started; i++) {
-        if (is_other(i, kept) && schedule.timer[i] != RTS_INVALID_HANDLE)
-            (void)SysTimerStart(schedule.timer[i]);
-    }
-}
-
-static void delete_others(RTS_UI32 kept)
+static void for_others(RTS_UI32 kept, RTS_RESULT (*act)(RTS_HANDLE timer))
 {
     RTS_UI32 i;
 
     for (i = 0; i < schedule.count; i++) {
         if (is_other(i, kept))
-            (void)SysTimerDelete(schedule.timer[i]);
+            (void)act(schedule.timer[i]);
     }
-    schedule.count = 0;
-    schedule.background_count = 0;
 }
 
-static RTS_RESULT add_and_start(const CDL_TASK *task)
+/* An event of a task to come has no timer yet. */
+void SchedStopOthers(RTS_UI32 kept)
 {
-    RTS_UI32 index = schedule.count;
-    RTS_RESULT result = add_task(task);
+    RTS_UI32 i;
 
-    if (result == ERR_OK && schedule.started && schedule.timer[index] != RTS_INVALID_HANDLE)
-        result = SysTimerStart(schedule.timer[index]);
-    return result;
+    for (i = schedule.count; i < APP_MAX_TASKS; i++)
+        schedule.timer[i] = RTS_INVALID_HANDLE;
+    for_others(kept, SysTimerStop);
+}
+
+void SchedStartOthers(RTS_UI32 kept)
+{
+    if (schedule.started)
+        for_others(kept, SysTimerStart);
 }
 
 RTS_RESULT SchedChangeOthers(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI32 kept)
@@ -256,11 +237,13 @@ RTS_RESULT SchedChangeOthers(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI32 kep
     RTS_RESULT result = ERR_OK;
     RTS_UI32 i;
 
-    delete_others(kept);
+    for_others(kept, SysTimerDelete);
+    schedule.count = 0;
+    schedule.background_count = 0;
     for (i = 0; i < count; i++) {
         RTS_RESULT added = ERR_OK;
         if (is_other(i, kept)) {
-            added = add_and_start(&tasks[i]);
+            added = add_task(&tasks[i]);
         } else {
             schedule.count++;
             schedule.background_count += callback_of(tasks[i].kind) == NULL;
@@ -268,6 +251,7 @@ RTS_RESULT SchedChangeOthers(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI32 kep
         if (added != ERR_OK)
             result = added;
     }
+    SchedStartOthers(kept);
     return result;
 }
 #endif

@@ -186,29 +186,32 @@ static RTS_INLINE void set_bus_cycle(DEVICE *device, const IoConfigConnector *co
         device->flags |= BUS_CYCLE;
 }
 
-void IoDevicesReset(const CDL_TASK *tasks, RTS_UI32 task_count)
+/* `fresh`: with the flags of the configuration; else only the bus cycles are others. */
+static void set_flags(const CDL_TASK *tasks, RTS_UI32 task_count, bool fresh)
 {
     RTS_UI32 fastest = find_fastest(tasks, task_count);
     RTS_UI32 i;
 
-    memset(devices, 0, sizeof devices);
     for (i = 0; i < IoTablesCountConnectors(); i++) {
         const IoConfigConnector *connector = IoMgrConfigGetConnector(i);
-        devices[i].flags = connector->flags;
+        if (fresh)
+            devices[i].flags = connector->flags;
+        else
+            devices[i].flags &= ~(0xFFu << BUS_TASK_SHIFT | BUS_CYCLE | BUS_WAITS);
         set_bus_cycle(&devices[i], connector, fastest);
     }
+}
+
+void IoDevicesReset(const CDL_TASK *tasks, RTS_UI32 task_count)
+{
+    memset(devices, 0, sizeof devices);
+    set_flags(tasks, task_count, true);
 }
 
 #if ONLINE_CHANGE
 void IoDevicesFollow(const CDL_TASK *tasks, RTS_UI32 task_count)
 {
-    RTS_UI32 fastest = find_fastest(tasks, task_count);
-    RTS_UI32 i;
-
-    for (i = 0; i < IoTablesCountConnectors(); i++) {
-        devices[i].flags &= ~(0xFFu << BUS_TASK_SHIFT | BUS_CYCLE | BUS_WAITS);
-        set_bus_cycle(&devices[i], IoMgrConfigGetConnector(i), fastest);
-    }
+    set_flags(tasks, task_count, false);
 }
 #endif
 

@@ -62,63 +62,28 @@ typedef struct {
     RTS_UI32 type;
 } CHANNEL;
 
-/* Returns the end of the bits from `bit` on that a channel of a map has as well, at the same place; `bit`: none. */
-static RTS_UI32 find_end(const IoConfigChannelMap *map, RTS_UI32 count, const IoConfigChannelMap *wanted, RTS_UI32 bit)
-{
-    for (; count > 0; count--, map++) {
-        if (map->parameter == wanted->parameter && map->flags == wanted->flags &&
-            bit - map->parameter_bit < map->bits &&
-            map->area_bit - map->parameter_bit == wanted->area_bit - wanted->parameter_bit)
-            return map->parameter_bit + map->bits;
-    }
-    return bit;
-}
+/* What is looked for: the bits of a channel from `bit` on. */
+typedef struct {
+    const IO_TABLES *tables;
+    CHANNEL channel;
+    RTS_UI32 bit;
+} SEARCH;
 
-static RTS_UI32 find_end_in(const IO_TABLES *tables, const CHANNEL *wanted, RTS_UI32 bit)
+/* Calls `handle` with the channels of a configuration, until it returns false; returns false then. */
+static bool for_channels(const IO_TABLES *tables, bool (*handle)(SEARCH *search, const CHANNEL *channel),
+                         SEARCH *search)
 {
     const IoConfigTaskMap *task = IoTablesTaskMapsOf(tables);
     const IoConfigTaskMap *end = task + tables->head->task_maps;
-    RTS_UI32 found = bit;
-
-    for (; task < end && found == bit; task++) {
-        const IoConfigConnectorMap *map = tables->connector_maps + task->first_connector_map;
-        RTS_UI32 left = task->type == wanted->type ? task->connector_map_count : 0;
-        for (; left > 0 && found == bit; left--, map++) {
-            if (map->connector == wanted->connector)
-                found =
-                    find_end(tables->channel_maps + map->first_channel_map, map->channel_map_count, wanted->map, bit);
-        }
-    }
-    return found;
-}
-
-/* True if each bit of a channel is one of a channel in `tables`: neighbours may be one channel there. */
-static bool has_channel(const IO_TABLES *tables, const CHANNEL *channel)
-{
-    RTS_UI32 bit = channel->map->parameter_bit;
-    RTS_UI32 end = bit + channel->map->bits;
-    RTS_UI32 next = bit;
-
-    do {
-        bit = next;
-        next = find_end_in(tables, channel, bit);
-    } while (next != bit && next < end);
-    return next != bit;
-}
-
-static bool has_all_channels(const IO_TABLES *tables, const IO_TABLES *wanted)
-{
-    const IoConfigTaskMap *task = IoTablesTaskMapsOf(wanted);
-    const IoConfigTaskMap *end = task + wanted->head->task_maps;
 
     for (; task < end; task++) {
-        const IoConfigConnectorMap *map = wanted->connector_maps + task->first_connector_map;
+        const IoConfigConnectorMap *map = tables->connector_maps + task->first_connector_map;
         RTS_UI32 maps = task->connector_map_count;
         for (; maps > 0; maps--, map++) {
-            CHANNEL channel = {wanted->channel_maps + map->first_channel_map, map->connector, task->type};
+            CHANNEL channel = {tables->channel_maps + map->first_channel_map, map->connector, task->type};
             RTS_UI32 left = map->channel_map_count;
             for (; left > 0; left--, channel.map++) {
-                if (!has_channel(tables, &channel))
+                if (!handle(search, &channel))
                     return false;
             }
         }
@@ -126,24 +91,41 @@ static bool has_all_channels(const IO_TABLES *tables, const IO_TABLES *wanted)
     return true;
 }
 
-static RTS_SIZE size_of(const IO_TABLES *tables)
+/* False if a channel has the bit that is looked for, at the same place: the next one is looked for then. */
+static bool misses(SEARCH *search, const CHANNEL *channel)
 {
-    return (RTS_SIZE)(tables->data + tables->head->data_size - (const RTS_UI8 *)tables->head);
+    const IoConfigChannelMap *map = channel->map;
+    const IoConfigChannelMap *wanted = search->channel.map;
+
+    if (channel->connector != search->channel.connector || channel->type != search->channel.type ||
+        map->parameter != wanted->parameter || map->flags != wanted->flags ||
+        search->bit - map->parameter_bit >= map->bits ||
+        map->area_bit - map->parameter_bit != wanted->area_bit - wanted->parameter_bit)
+        return true;
+    search->bit = map->parameter_bit + map->bits;
+    return false;
 }
 
-/* Most changes leave all as it is: comparing channels takes longer. */
-static bool is_same(const IO_TABLES *a, const IO_TABLES *b)
+/* True if each bit of a channel is one of a channel in the tables: neighbours may be one channel there. */
+static bool has_channel(SEARCH *search, const CHANNEL *channel)
 {
-    return size_of(a) == size_of(b) && memcmp(a->head, b->head, size_of(a)) == 0;
+    search->channel = *channel;
+    search->bit = channel->map->parameter_bit;
+    do {
+        if (for_channels(search->tables, misses, search))
+            return false;
+    } while (search->bit - channel->map->parameter_bit < channel->map->bits);
+    return true;
 }
 
 bool IoTablesCanFollow(const IO_CONFIG *config)
 {
     const IO_TABLES *loaded = IoTablesGet();
+    SEARCH search = {.tables = loaded};
     IO_TABLES other;
 
     IO_TABLES_FIND(other, config, IoTablesTaskMapsOf(&other));
-    return is_same(loaded, &other) || (has_same_devices(loaded, &other) && has_all_channels(loaded, &other));
+    return has_same_devices(loaded, &other) && for_channels(&other, has_channel, &search);
 }
 
 /* ---- following ---- */

@@ -131,16 +131,9 @@ static RTS_RESULT check_images(const LOADER *l, RTS_UI32 size)
 
 #if ONLINE_CHANGE
 /* What it says is checked when it is to be done (AppChange.c): a start takes no notice of it. */
-static RTS_RESULT read_change(LOADER *l, RTS_UI32 size)
-{
-    CDL_CHANGE *change = &l->image->change;
-
-    if (size != sizeof *change)
-        return refuse(l, ERR_SIZE_MISMATCH, "The online change has %u bytes; build again.", U(size));
-    return LoaderReadNext(l, change, sizeof *change);
-}
+#define read_change(l) LoaderReadNext(l, &(l)->image->change, sizeof(CDL_CHANGE))
 #else
-#define read_change(l, size) ((RTS_RESULT)ERR_OK)
+#define read_change(l) ((RTS_RESULT)ERR_OK)
 #endif
 
 static RTS_RESULT check_blob(LOADER *l)
@@ -162,8 +155,8 @@ static RTS_RESULT check_blob(LOADER *l)
         result = check_kept(l, blob.size);
     else if (blob.id == CDL_BLOB_IMAGES)
         result = check_images(l, blob.size);
-    else if (ONLINE_CHANGE && blob.id == CDL_BLOB_CHANGE)
-        result = read_change(l, blob.size);
+    else if (ONLINE_CHANGE && blob.id == CDL_BLOB_CHANGE && blob.size == sizeof(CDL_CHANGE))
+        result = read_change(l);
     else if (blob.id == CDL_BLOB_IO && AppIoGet() != NULL)
         result = LoaderFindIo(l, blob.size);
     else if (blob.id >= CDL_BLOB_REQUIRED)
