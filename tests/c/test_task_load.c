@@ -114,6 +114,29 @@ static void the_load_is_that_of_the_last_window_only(void)
     CHECK(about(TaskLoadGet(2), 0));
 }
 
+static void an_online_change_begins_the_load_again(void)
+{
+    IEC_TASK_INFO info;
+    APP_REFUSAL refusal;
+
+    begin(1000, 20000, 0);
+    run();
+    CHECK(about(TaskLoadGet(0), 10) && about(TaskLoadGet(1), 20));
+    while (spec.code_size % 4 != 0)
+        emit_ret(&spec);
+    spec.change = (CDL_CHANGE){image_crc(&image), CDL_CHANGE_NO_INIT, here(&spec), 0};
+    build_image(&image, &spec);
+    cycle_us[1] = 0;
+    CHECK_EQUAL(send_part(&image, image.size), ERR_OK);
+    CHECK_EQUAL(AppDownloadChange(&refusal), ERR_OK);
+    CHECK_EQUAL(CMCallHook(CH_COMM_CYCLE), ERR_OK);
+    CHECK_EQUAL(TaskLoadGet(0), 0);
+    CHECK_EQUAL(TaskLoadGet(1), 0);
+    CHECK(IecTaskGetInfo(0, &info) == ERR_OK && info.cycles > 2 * TASK_LOAD_WINDOW_MS / 10 / 2); /* statistics go on */
+    run();
+    CHECK(about(TaskLoadGet(0), 10) && TaskLoadGet(1) == 0); /* nothing of the cycles before */
+}
+
 static void a_stopped_program_takes_nothing(void)
 {
     begin(1000, 20000, 0);
@@ -199,6 +222,7 @@ int main(void)
     NEEDS_X86_64;
     RUN(each_task_has_its_load_and_all_have_the_sum);
     RUN(the_load_is_that_of_the_last_window_only);
+    RUN(an_online_change_begins_the_load_again);
     RUN(a_stopped_program_takes_nothing);
     RUN(a_program_above_the_limit_ends_and_names_the_task_that_takes_the_most);
     RUN(a_program_at_the_limit_runs_on_and_a_short_peak_is_forgiven);
