@@ -172,18 +172,24 @@ def test_back_is_the_program_before_with_the_values_of_now(project: Path, plcrt:
     newer = program(BODY + " more := 5;", before="VAR_GLOBAL more : INT := 3; END_VAR" + BLOCKS)
     (project / "main.st").write_text(newer.replace("STRING[20]", "STRING[60]"))
     tool.ok(*flash)
-    tool.ok("write", "--tcp", plcrt.tcp, "Main.fixed=70", f"Main.text='{'x' * 40}'")
+    tool.ok("write", "--tcp", plcrt.tcp, "Main.fixed=70", "Main.kept=77", f"Main.text='{'x' * 40}'")
     plan = tool.ok(*flash, "--back", "--dry-run")
     assert (plan["removed"], len(plan["retyped"]), plan["problems"]) == (["more"], 1, [])
     done = tool(*flash, "--back")
     assert done.status == 0 and done.out.startswith("back to the program with CRC "), done.err
+    assert "  lost, since only the newer program has it: more\n" in done.out
     assert values() == {"Main.fixed": 70, "Main.text": "before"}  # which is shorter again
     assert tool("read", "--tcp", plcrt.tcp, "more").status == 2
     assert (project / "main.st").read_text() == newer.replace("STRING[20]", "STRING[60]")
     assert tool("status", "--tcp", plcrt.tcp).out.splitlines()[0] == first.splitlines()[0]
+    plcrt.stop(signal.SIGKILL)  # which is a power cut, before anything else was saved
+    plcrt.start()
+    flash = ("flash", "--online-change", "--tcp", plcrt.tcp)
+    assert tool.ok("read", "--tcp", plcrt.tcp, "Main.kept", "Main.fixed")["values"] == {"Main.kept": 77, "Main.fixed": 7}
     tool.ok("write", "--tcp", plcrt.tcp, "Main.fixed=71")
     tool.ok(*flash, "--back")  # the newer one again
-    assert tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed", "more")["values"] == {"Main.fixed": 71, "more": 5}
+    read = tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed", "Main.kept", "more")["values"]
+    assert read == {"Main.fixed": 71, "Main.kept": 77, "more": 5}
     for path in (project / "cache").rglob("*.src"):
         path.unlink()
     done = tool(*flash, "--back")

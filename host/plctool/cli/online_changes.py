@@ -89,12 +89,13 @@ def _impossible(problems: list[str]) -> str:
 
 
 def change_text(document: dict[str, Any]) -> str:
-    """What a change does, in lines."""
+    """What a change does, in lines. On the way back, values of what only the newer program has are lost."""
+    kinds = _KINDS | ({"removed": "lost, since only the newer program has it"} if "back" in document else {})
     lines = [
         f"online change of {document['base']}: {counted(document['kept'], 'variable')} kept, "
         f"{len(document['new'])} new, {len(document['removed'])} removed; {document['written']} bytes are written"
     ]
-    for kind, title in _KINDS.items():
+    for kind, title in kinds.items():
         lines += [f"  {title}: {name}" for name in document[kind][:_SHOWN]]
         if len(document[kind]) > _SHOWN:
             lines.append(f"  {title}: and {len(document[kind]) - _SHOWN} more")
