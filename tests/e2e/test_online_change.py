@@ -185,7 +185,10 @@ def test_back_is_the_program_before_with_the_values_of_now(project: Path, plcrt:
     plcrt.stop(signal.SIGKILL)  # which is a power cut, before anything else was saved
     plcrt.start()
     flash = ("flash", "--online-change", "--tcp", plcrt.tcp)
-    assert tool.ok("read", "--tcp", plcrt.tcp, "Main.kept", "Main.fixed")["values"] == {"Main.kept": 77, "Main.fixed": 7}
+    assert tool.ok("read", "--tcp", plcrt.tcp, "Main.kept", "Main.fixed")["values"] == {
+        "Main.kept": 77,
+        "Main.fixed": 7,
+    }
     tool.ok("write", "--tcp", plcrt.tcp, "Main.fixed=71")
     tool.ok(*flash, "--back")  # the newer one again
     read = tool.ok("read", "--tcp", plcrt.tcp, "Main.fixed", "Main.kept", "more")["values"]
