@@ -48,6 +48,8 @@ if [ "$1" = --editors ] || [ "$1" = --node ]; then
     command -v npm >/dev/null || set -- "$@" npm
     [ "$editors" = --node ] || command -v nvim >/dev/null || set -- "$@" neovim
     [ "$editors" = --node ] || command -v emacs >/dev/null || set -- "$@" emacs-nox
+    [ "$editors" = --node ] || ls -d /usr/share/emacs/site-lisp/elpa-src/dap-mode-* >/dev/null 2>&1 ||
+        set -- "$@" elpa-dap-mode
     [ $# = 0 ] || install "$@" || {
         echo "Missing: $*. Install them, on Debian with: sudo apt-get install $*" >&2
         exit 1

@@ -8,8 +8,8 @@
 ;;; Commentary:
 
 ;; (load "editors/emacs/plctool.el") gives files of Structured Text a mode with highlighting, M-x compile (plctool
-;; check), M-x plctool-format, and, with Eglot and Dape, the language server and the debug adapter of plctool.  Where
-;; Emacs has tree-sitter and the parser of editors/tree-sitter-iecst is installed, it highlights.
+;; check), M-x plctool-format, and, with Eglot, the language server of plctool, with Dape or dap-mode its debug adapter.
+;; Where Emacs has tree-sitter and the parser of editors/tree-sitter-iecst is installed, it highlights.
 
 ;;; Code:
 
@@ -118,6 +118,14 @@
   (add-to-list 'dape-configs
                `(plctool modes (iecst-mode) command ,plctool-command command-args ("dap")
                          :type "plctool" :request "launch" :program dape-cwd)))
+
+(with-eval-after-load 'dap-mode
+  (dap-register-debug-provider
+   "plctool"
+   (lambda (settings) (plist-put settings :dap-server-path (list plctool-command "dap"))))
+  (dap-register-debug-template
+   "plctool: debug this file in the simulator"
+   '(:type "plctool" :request "launch" :program "${file}")))
 
 (provide 'plctool)
 ;;; plctool.el ends here

@@ -1,4 +1,4 @@
-"""Emacs with editors/emacs/plctool.el, in batch mode: the mode, its faces, formatting, and errors of `compile`."""
+"""Emacs with editors/emacs/plctool.el, in batch mode: the mode, faces, formatting, errors of `compile`, and dap-mode."""
 
 from __future__ import annotations
 
@@ -11,8 +11,13 @@ from pathlib import Path
 
 import pytest
 
+sys.path.append(str(Path(__file__).parents[1]))
+
+from breakpoints import FILE, PROGRAM
+
 ROOT = Path(__file__).resolve().parents[2]
 EMACS = shutil.which("emacs")
+ELPA = Path(os.environ.get("ELPA_TESTED", "/usr/share/emacs/site-lisp/elpa-src"))
 
 pytestmark = pytest.mark.skipif(EMACS is None, reason="Emacs is not installed; make test-editors installs it")
 
@@ -81,3 +86,37 @@ def test_errors_of_check_are_found_in_their_lines(tmp_path: Path) -> None:
       (let ((location (compilation--message->loc (get-text-property (point) 'compilation-message))))
         (princ (list (compilation--loc->line location) (compilation--loc->col location)))))"""
     assert run(tmp_path, found).startswith("(2 ")
+
+
+DEBUGGING = """
+(dolist (folder (directory-files "ELPA" t "^[a-z]")) (add-to-list 'load-path folder))
+(setq load-prefer-newer t dap-auto-configure-features nil dap-auto-show-output nil)
+(require 'dap-mode)
+(defun frames (session) (gethash 1 (dap--debug-session-thread-stack-frames session)))
+(defun say (session)
+  (while (not (frames session)) (accept-process-output nil 0.05))
+  (seq-doseq (frame (frames session)) (princ (format "%s:%s " (gethash "name" frame) (gethash "line" frame))))
+  (princ "\n"))
+(find-file "FILE")
+(goto-char (point-min)) (forward-line 14) (dap-breakpoint-add)
+(dap-debug (list :type "plctool" :request "launch" :name "test" :program buffer-file-name))
+(let ((session (dap--cur-session)))
+  (say session)
+  (let ((frame (gethash "id" (elt (frames session) 0))))
+    (princ (format "%s\n" (gethash "result" (dap-request session "evaluate" :expression "step * 10" :frameId frame)))))
+  (dap-step-in session) (say session)
+  (dap-step-out session) (say session)
+  (dap-disconnect session))
+"""
+
+
+@pytest.mark.skipif(
+    not list(ELPA.glob("dap-mode-*")), reason="dap-mode is not installed; make test-editors installs it"
+)
+def test_dap_mode_debugs_a_program(tmp_path: Path) -> None:
+    """A client of others: it halts at a breakpoint, shows the calls, evaluates, and steps into a function and out."""
+    (tmp_path / FILE).write_text(PROGRAM)
+    (tmp_path / "main.st").write_text("")
+    said = run(tmp_path, DEBUGGING.replace("ELPA", str(ELPA)).replace("FILE", FILE))
+    halted = "Counter:15 Main:25 "
+    assert said.splitlines() == [halted, "10", f"Add:4 {halted}", halted]
