@@ -1,4 +1,4 @@
-"""Emacs with editors/emacs/plctool.el, in batch mode: the mode, faces, formatting, errors of `compile`, and dap-mode."""
+"""Emacs with editors/emacs/plctool.el, in batch mode: mode, faces, formatting, errors of `compile`, and dap-mode."""
 
 from __future__ import annotations
 
