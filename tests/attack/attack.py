@@ -16,6 +16,7 @@ from pathlib import Path
 
 from bad_programs import BadPrograms
 from campaign import OUTCOMES, Campaign, Case, Fallen
+from changes import Changes
 from cuts import Calls, Cuts
 from debuggers import Debuggers
 from images import Images
@@ -28,7 +29,7 @@ from watchers import Watchers
 from workshop import Workshop, open_workshop
 
 CAMPAIGNS: tuple[type[Campaign], ...] = (
-    Kills, Cuts, Calls, BadPrograms, Images, Records, Sectors, Debuggers, Watchers, Pages,
+    Kills, Cuts, Calls, BadPrograms, Images, Changes, Records, Sectors, Debuggers, Watchers, Pages,
 )  # fmt: skip
 SHOWN = 10  # failures of a campaign that are printed
 
