@@ -75,6 +75,19 @@ def test_a_halted_program_is_read_by_other_tools(plc: Plc, link: str) -> None:
         assert other.log()
 
 
+def test_a_halted_program_answers_within_20_ms(plc: Plc, link: str) -> None:
+    """The fastest of some replies: a busy machine makes others wait."""
+    plc.breakpoints.set(FILE, 15)
+    halt(plc.breakpoints)
+    with connect(link) as other:
+        times = []
+        for _ in range(50):
+            begin = time.monotonic()
+            assert other.read("Main.cycles") >= 0
+            times.append(time.monotonic() - begin)
+    assert min(times) < 0.02, times
+
+
 def test_a_debugger_that_is_killed_lets_the_machine_go_on(plc: Plc, link: str) -> None:
     debugger = subprocess.Popen([sys.executable, "-c", DEBUGGER, link], stdout=subprocess.PIPE, text=True)
     assert debugger.stdout
