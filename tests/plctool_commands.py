@@ -1,7 +1,8 @@
 """Commands of plctool and of pytest as processes of their own, without the imports, most of a short command's work.
 
 A server, this file as a program, has imported plctool and forks for each command. What that leaves out is the start of
-Python, the imports and the tables of the grammar; `python -m plctool` is tested in tests/cli and tests/docs.
+Python, the imports, the tables of the grammar and the reading of the standard library; `python -m plctool` is tested in
+tests/cli.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import atexit
 import contextlib
 import gc
 import importlib
+import io
 import json
 import os
 import select
@@ -40,6 +42,20 @@ IMPORTED = (
 )
 TARGET = "PLCRT_TARGET"
 """A variable of the environment: the target of a $PLCRT for another processor, which programs are built for then."""
+
+FIRST_PROGRAM = """
+PROGRAM Main
+VAR
+    t : TON;
+END_VAR
+    t(IN := TRUE, PT := T#1S);
+END_PROGRAM
+
+TEST 'the first'
+    ASSERT_TRUE(TRUE);
+END_TEST
+"""
+"""What the server checks and builds before the first command."""
 
 LONGEST = 1 << 18  # bytes of a request; the environment is its greatest part
 
@@ -161,12 +177,23 @@ def _work(request: dict[str, Any], streams: list[int]) -> NoReturn:
     os._exit(status)  # without taking everything down that was imported
 
 
+def _prepare() -> None:
+    """Does what a process does once: imports the module of each command, reads the tables and the standard library."""
+    run = importlib.import_module("plctool.cli.main").main
+    sys.modules["plctool.cli.command_line"].parser()
+    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()) as out:
+        source = Path(folder) / "first.st"
+        source.write_text(FIRST_PROGRAM)
+        for command in (["check", str(source)], ["build", str(source), "-o", str(source.with_suffix(".cdl"))]):
+            if run(command) != 0:
+                sys.exit(f"plctool {command[0]} failed before the first command:\n{out.getvalue()}")
+
+
 def main() -> None:
     for module in IMPORTED:
         importlib.import_module(module)
     build_for_plcrt()
-    sys.modules["plctool.compiler.syntax.tables"].load_tables()
-    sys.modules["plctool.cli.command_line"].parser()  # imports the module of each command
+    _prepare()
     gc.freeze()  # so that the pages stay common to all processes
     with socket.socket(fileno=int(sys.argv[1])) as requests:
         _serve(requests)

@@ -23,6 +23,7 @@ from pathlib import Path
 
 import pytest
 from free_ports import free_port
+from plctool_commands import run_plctool, run_pytest
 
 from plctool.testing.children import ends_with_us
 from plctool.testing.plcrt import find_plcrt
@@ -79,10 +80,7 @@ class Reader:
             self.open_page(words[1:])
             return
         assert words[0] == "plctool", f"this test does not know how to run: {line}"
-        done = subprocess.run(
-            [sys.executable, "-m", "plctool", *words[1:]], cwd=self.folder, env=self.env | environment,
-            stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=180, check=False,
-        )  # fmt: skip
+        done = run_plctool(words[1:], self.folder, self.env | environment, timeout=180)
         assert done.returncode == 0, f"{line}\nexit {done.returncode}\n{done.stdout}{done.stderr}"
 
     def _copy_examples(self) -> None:
@@ -144,16 +142,13 @@ class Reader:
         """A module with test functions goes to pytest, anything else to Python."""
         path = self.folder / "test_example.py"
         path.write_text(code.replace(SHOWN_PORT, self.port))
-        how = ["-m", "pytest", "-q", "-p", "no:cacheprovider", str(path)] if "def test_" in code else [str(path)]
-        done = subprocess.run(
-            [sys.executable, *how],
-            cwd=self.folder,
-            env=self.env,
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
+        if "def test_" in code:
+            done = run_pytest(["-q", "-p", "no:cacheprovider", str(path)], self.folder, self.env, timeout=120)
+        else:
+            done = subprocess.run(
+                [sys.executable, str(path)], cwd=self.folder, env=self.env,
+                capture_output=True, text=True, timeout=120, check=False,
+            )  # fmt: skip
         assert done.returncode == 0, f"{code}\n{done.stdout}{done.stderr}"
 
 
