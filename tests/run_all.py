@@ -3,7 +3,8 @@ line over all.
 
 A process runs for each processor and two more (or --jobs), because many tests wait more than they work. Those with
 the highest priority, which is about their seconds, come first, so that no processor idles while the last long one
-ends. The C tests of a folder, which are short, are one process: a `meson test`.
+ends. The C tests of a folder, which are short, are one process: a `meson test`. Its short Python tests of a board with
+the same environment are one, too: most of their time is the start of Python.
 
 C tests count as one test each; pytest suites are counted by their own tests, from the JUnit files they leave. What a
 process printed is in meson-logs/, and here if it failed.
@@ -27,9 +28,11 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 C_TESTS_SECONDS = 60  # of one folder, about
+SHORT_SECONDS = 20  # shorter tests of a board share a process
 SKIPPED = 77  # exit status, as for meson: there was nothing that could be tested
 LOOK_EVERY = 0.02  # for processes that ended [s]
 MOST_REPEATED = 8  # tests that failed; if there are more, the change has broken something
@@ -177,13 +180,39 @@ def jobs_of(meson: str, build: Path) -> Iterator[Job]:
     """All tests of a build folder."""
     logs, reports = build / "meson-logs", build / "pytest-reports"
     yield c_tests(meson, build, "c")
-    for test in json.loads(subprocess.check_output([meson, "introspect", "--tests", str(build)])):
-        name = test["name"]
-        if any(suite.endswith(":python") for suite in test["suite"]):
-            yield Job(
-                f"{build.name} {name}", test["cmd"], test["priority"], test["timeout"],
-                reports / f"{name}.xml", logs / f"{name}.txt", test["workdir"], test["env"],
-            )  # fmt: skip
+    tests = json.loads(subprocess.check_output([meson, "introspect", "--tests", str(build)]))
+    for group in processes(test for test in tests if _is_in(test, "python")):
+        name = group[0]["name"]
+        report = reports / f"{name}.xml"
+        more = f" and {len(group) - 1} more" if len(group) > 1 else ""
+        yield Job(
+            f"{build.name} {name}{more}", command_of(group, report),
+            sum(test["priority"] for test in group), max(test["timeout"] for test in group),
+            report, logs / f"{name}.txt", group[0]["workdir"], group[0]["env"],
+        )  # fmt: skip
+
+
+def _is_in(test: dict[str, Any], suite: str) -> bool:
+    return any(name.endswith(f":{suite}") for name in test["suite"])
+
+
+def processes(tests: Iterable[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+    """Returns the short tests of a board with the same environment together, any other alone."""
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for test in tests:
+        is_shared = _is_in(test, "target") and test["priority"] < SHORT_SECONDS
+        key = str(sorted(test["env"].items())) if is_shared else test["name"]
+        groups.setdefault(key, []).append(test)
+    return list(groups.values())
+
+
+def command_of(group: list[dict[str, Any]], report: Path) -> list[str]:
+    """Returns the command of a test, or that of pytest with the files of all."""
+    if len(group) == 1:
+        return list(group[0]["cmd"])
+    first, module = group[0]["cmd"], group[0]["cmd"].index("pytest") + 1
+    files = [word for test in group for word in test["cmd"][module:] if not word.startswith("--junit-xml=")]
+    return [*first[:module], *files, f"--junit-xml={report}"]
 
 
 def repetition(done: Done) -> Job:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from run_all import ROOT, Done, Job, repeat, repetition, run
+from run_all import ROOT, Done, Job, command_of, processes, repeat, repetition, run
 
 FOLDER = ROOT / "tests" / "c"  # below tests, but in none of the suites that run beside this one
 
@@ -69,3 +70,19 @@ def test_of_the_c_tests_those_that_failed_are_repeated_by_name(tmp_path: Path) -
     )
     job = Job("build c", ["meson", "test", "-C", "build", "--suite", "c"], 1, 60.0, report, tmp_path / "c.txt")
     assert repetition(Done(job, 1, 0.0, 0.0)).command == ["meson", "test", "-C", "build", "comm_srv"]
+
+
+def target_test(name: str, priority: int = 5, **env: str) -> dict[str, Any]:
+    command = ["python", "-m", "pytest", f"test_{name}.py", f"--junit-xml={name}.xml"]
+    return {"name": name, "suite": ["x:python", "x:target"], "priority": priority, "cmd": command, "env": env}
+
+
+def test_short_tests_of_a_board_with_the_same_environment_are_one_process(tmp_path: Path) -> None:
+    tests = [target_test("a"), target_test("long", 50), target_test("b"), target_test("c", FIRMWARE_CONFIG="full")]
+    commands = [command_of(group, tmp_path / "report.xml") for group in processes(tests)]
+    assert [[word for word in command if word.startswith("test_")] for command in commands] == [
+        ["test_a.py", "test_b.py"],
+        ["test_long.py"],
+        ["test_c.py"],
+    ]
+    assert commands[0][-1] == f"--junit-xml={tmp_path / 'report.xml'}"
