@@ -95,8 +95,14 @@ class Runner:
         entry = FIRMWARE / "port/baremetal" / self.family / "IecCall.c"
         hosted = [*_HOSTED_SOURCES, *(_OF_WINDOWS if self.windows else _OF_LINUX)]
         hosted += _ARM_SOURCES if "arm" in self.compiler else []
-        sources = [*_BARE_SOURCES, entry] if self.bare else hosted
-        subprocess.run([self.compiler, *flags, "-o", program, main, *sources, "-lm"], check=True)
+        sources = [main, *([*_BARE_SOURCES, entry] if self.bare else hosted)]
+        objects = folder / f"{program.name}-objects"
+        objects.mkdir()
+        for number, source in enumerate(sources):  # one at a time, which a cache of compilations needs
+            compiled = [flag for flag in flags if not flag.startswith(("-Wl,", "--oslib", "--crt0", "-static"))]
+            target = objects / f"{number}.o"
+            subprocess.run([*_cache(), self.compiler, *compiled, "-c", "-o", target, source], check=True)
+        subprocess.run([self.compiler, *flags, "-o", program, *sorted(objects.iterdir()), "-lm"], check=True)
         return program
 
     def compile_alone(self, folder: Path, sources: Sequence[Path], *extra: str) -> Path:
@@ -123,6 +129,12 @@ class Runner:
         if done.returncode:
             raise RuntimeError(f"the runner for {self.target} failed: {done.stdout}{done.stderr}")
         return (folder / "results").read_bytes()
+
+
+@cache
+def _cache() -> list[str]:
+    """What comes before a compiler that need not compile again what it compiled before: meson does the same."""
+    return ["ccache"] if shutil.which("ccache") else []
 
 
 @cache
