@@ -11,6 +11,7 @@
 # make test-arm-system  plcrt on Debian's kernel for arm64 in a virtual machine, and a power cut
 # make deb    dist/*.deb for this architecture (ARCHS="amd64 arm64"); make deb-test tries them in a small Debian
 # make test-windows  the simulator for Windows: its C tests, and all programs of tests/st, by Wine
+# make wheels-linux  dist/*.whl for 64-bit and 32-bit Arm and for musl; those for Arm are tried in QEMU's user mode
 # make wheel-windows  dist/*win_amd64.whl; what cannot be tried here is said in the README
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
@@ -38,7 +39,7 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test test-whole test-windows wheel-windows quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak changes fuzz properties habits tree-sitter vsix test-editors all clean
+.PHONY: demo test test-whole test-windows wheel-windows wheels-linux run-wheels-elsewhere quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak changes fuzz properties habits tree-sitter vsix test-editors all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm run-test-arm-system
 VSCODE := editors/vscode
 NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
@@ -92,12 +93,21 @@ test-windows: build-windows/build.ninja build/build.ninja
 	ninja --quiet -C build under_attack
 	TEST_WHOLE=1 PYTHONPATH=host:build/host $(BIN)/python -m pytest tests/same_results -k windows $(ARGS)
 
-wheel-windows: build-windows/build.ninja build/build.ninja
-	$(MESON) compile -C build-windows rts_sim_bus
-	ninja --quiet -C build under_attack
+# For other systems than this one, by their names in packages/make_wheel.py.
+run-wheels-elsewhere: $(VENV)/dev
+	rm -rf dist/local
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist/local .
-	$(BIN)/python packages/make_windows_wheel.py dist/local/*.whl build-windows build/host/_plccore.c dist
+	set -e; for name in $(PLATFORMS); do $(BIN)/python packages/make_wheel.py $$name dist/local/*.whl dist; done
 	rm -r dist/local
+
+wheel-windows:
+	./bootstrap.sh --windows
+	$(MAKE) run-wheels-elsewhere PLATFORMS=x86_64-windows
+
+wheels-linux: $(VENV)/dev
+	$(BIN)/pip install --quiet ziglang
+	$(MAKE) run-wheels-elsewhere PLATFORMS="aarch64-linux armv7-linux x86_64-musl aarch64-musl"
+	$(BIN)/python tests/wheel_elsewhere.py dist/*linux_2_31_*.whl || [ $$? -eq 77 ]
 
 # CAN of a real kernel, in a small Linux of its own; skipped with the reason where that cannot run.
 test-vcan: build/build.ninja

@@ -1,8 +1,8 @@
 """Makes the wheel for another system from that for this one: `make_wheel.py PLATFORM WHEEL OUTPUT`.
 
-WHEEL: for this Linux. What is compiled stays in the folder build-wheel-PLATFORM. Zig's compiler (PyPI: ziglang) has the C libraries of all systems
-but Windows, for which Debian's compiler is used. Python's own library is not needed: modules of the limited interface
-run with every Python from 3.11 on, which has their names.
+WHEEL: for this Linux. What is compiled stays in the folder build-wheel-PLATFORM. Zig's compiler (PyPI: ziglang) has the
+C libraries of other Linux systems; for Windows there is Debian's compiler. Python's own library is not needed: modules
+of the limited interface run with every Python from 3.11 on, which has their names.
 
 Checks what can be checked elsewhere: what the module imports and exports, and for which processor it is.
 """
@@ -24,19 +24,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from elftools.elf.elffile import ELFFile
-from macholib.MachO import MachO
 
 ROOT = Path(__file__).resolve().parents[1]
 SIM = Path("firmware/port/sim")
 PLCRT = Path("firmware/port/linux/plcrt")
 OF_THIS_LINUX = re.compile(r"(^|/)(_plccore\..*\.so|plcrt(\.\d)?)$|\.libs/|\.data/(scripts|data)/")
 ZIG = [sys.executable, "-m", "ziglang"]
+MESON, NINJA = (Path(sys.executable).with_name(name) for name in ("meson", "ninja"))
 MINGW = "x86_64-w64-mingw32-"
 
 # What is part of each system, or of Python.
 OF_WINDOWS = re.compile(r"(python3|KERNEL32|msvcrt|api-ms-win-crt-[\w-]+)\.dll", re.IGNORECASE)
 OF_LINUX = re.compile(r"lib(c|m|pthread|dl|rt)\.so(\.\d+)?|ld-linux[\w-]*\.so\.\d")
-OF_MACOS = re.compile(r"/usr/lib/libSystem\.B\.dylib|@rpath/_plccore\.abi3\.so")
 
 
 @dataclass(frozen=True)
@@ -61,13 +60,12 @@ class Platform:
         return [*ZIG, name, *(["-target", self.target] if name == "cc" else [])]
 
 
-# The C library of Debian 11 and Ubuntu 20.04 is 2.31: plcrt needs functions that are new in it.
+# GNU's C library is that of Debian 11 and Ubuntu 20.04; plcrt needs gettid, which came with 2.30.
 PLATFORMS = {
     "aarch64-linux": Platform("manylinux_2_31_aarch64", "linux", "aarch64", "aarch64-linux-gnu.2.31", "EM_AARCH64"),
     "armv7-linux": Platform("manylinux_2_31_armv7l", "linux", "arm", "arm-linux-gnueabihf.2.31", "EM_ARM"),
     "x86_64-musl": Platform("musllinux_1_2_x86_64", "linux", "x86_64", "x86_64-linux-musl", "EM_X86_64"),
     "aarch64-musl": Platform("musllinux_1_2_aarch64", "linux", "aarch64", "aarch64-linux-musl", "EM_AARCH64"),
-    "arm64-macos": Platform("macosx_11_0_arm64", "darwin", "aarch64", "aarch64-macos.11.0", "ARM64"),
     "x86_64-windows": Platform("win_amd64", "windows", "x86_64", "", "pei-x86-64", "_plccore.pyd"),
 }
 
@@ -112,11 +110,11 @@ def build_firmware(platform: Platform, folder: Path) -> None:
         cross.write_text(cross_file(platform))
     build = folder / "build"
     if not (build / "build.ninja").exists():
-        run("meson", "setup", "--buildtype=release", build, ROOT, "--cross-file", cross)
-    targets = run("ninja", "-C", build, "-t", "targets", "all")
+        run(MESON, "setup", "--buildtype=release", build, ROOT, "--cross-file", cross)
+    targets = run(NINJA, "-C", build, "-t", "targets", "all")
     facts = {str(SIM / path) for path in re.findall(r"libboard_facts_\w+\.a", targets)}
     wanted = [*sorted(facts), str(SIM / "librts_sim_bus.a"), str(SIM / "librts_sim.a")]
-    run("ninja", "-C", build, *wanted, *([str(PLCRT)] if platform.has_plcrt else []))
+    run(NINJA, "-C", build, *wanted, *([str(PLCRT)] if platform.has_plcrt else []))
 
 
 # ---- the module ----
@@ -156,14 +154,7 @@ def system_flags(platform: Platform, module: Path, folder: Path) -> list[str | P
     """How the names of Python are left to it."""
     if platform.system == "windows":
         return ["-static", python_library(module, folder)]
-    return ["-undefined", "dynamic_lookup"] if platform.system == "darwin" else ["-Wl,-z,lazy"]
-
-
-def whole(platform: Platform, archives: list[Path]) -> list[str | Path]:
-    """Flags of the linker that takes each member of archives."""
-    if platform.system == "darwin":
-        return [flag for archive in archives for flag in (f"-Wl,-force_load,{archive}",)]
-    return ["-Wl,--whole-archive", *archives, "-Wl,--no-whole-archive"]
+    return []
 
 
 def link_module(platform: Platform, folder: Path) -> Path:
@@ -171,9 +162,10 @@ def link_module(platform: Platform, folder: Path) -> Path:
     port = folder / "build" / SIM
     boards = compile_c(platform, ROOT / SIM / "SimBoards.c", folder / "boards.o")
     module = compile_c(platform, write_module(platform, folder), folder / "_plccore.o")
-    archives = whole(platform, [port / "librts_sim_bus.a", *sorted(port.glob("libboard_facts_*.a"))])
+    whole = [port / "librts_sim_bus.a", *sorted(port.glob("libboard_facts_*.a"))]
+    archives = ["-Wl,--whole-archive", *whole, "-Wl,--no-whole-archive", port / "librts_sim.a"]
     result = folder / platform.module
-    run(*platform.tool("cc"), "-shared", "-s", "-o", result, module, boards, *archives, port / "librts_sim.a",
+    run(*platform.tool("cc"), "-shared", "-s", "-o", result, module, boards, *archives,
         *system_flags(platform, module, folder), "-pthread", "-lm")  # fmt: skip
     return result
 
@@ -199,13 +191,6 @@ def facts_of_elf(path: Path) -> Facts:
         return Facts(elf["e_machine"], needed, exported)
 
 
-def facts_of_mach_o(path: Path) -> Facts:
-    (header,) = MachO(str(path)).headers
-    needed = {name for _, _, name in header.walkRelocatables()}
-    exported = {name for name in ("PyInit__plccore",) if f"_{name}".encode() in path.read_bytes()}
-    return Facts("ARM64" if header.header.cputype == 0x0100000C else "", needed, exported)
-
-
 def facts_of_pe(path: Path) -> Facts:
     said = run(MINGW + "objdump", "-p", path)
     machine = re.search(r"file format (\S+)", said)
@@ -215,11 +200,8 @@ def facts_of_pe(path: Path) -> Facts:
 
 def check(platform: Platform, path: Path, exports: set[str]) -> None:
     """A file is for its platform, and needs nothing but Python and what each such system has."""
-    reader, known = {
-        "linux": (facts_of_elf, OF_LINUX),
-        "darwin": (facts_of_mach_o, OF_MACOS),
-        "windows": (facts_of_pe, OF_WINDOWS),
-    }[platform.system]
+    is_windows = platform.system == "windows"
+    reader, known = (facts_of_pe, OF_WINDOWS) if is_windows else (facts_of_elf, OF_LINUX)
     facts = reader(path)
     if facts.machine != platform.machine:
         sys.exit(f"{path.name} is for {facts.machine or 'another processor'}, not for {platform.machine}.")

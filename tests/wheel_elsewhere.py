@@ -1,4 +1,4 @@
-"""Tries a wheel for another processor in a Python of Debian for it, by QEMU's user mode: `tests/wheel_elsewhere.py WHEEL...`.
+"""Tries wheels in a Python of Debian for another processor, by QEMU's user mode: `tests/wheel_elsewhere.py WHEEL...`.
 
 Debian's Python is fetched and unpacked in build-wheel-trial, not installed. For 64-bit Arm a program is built, run and
 tested, as tests/wheel.py does; for 32-bit Arm, for which PyPI has no llvmlite, the simulator's module runs. Exit status
