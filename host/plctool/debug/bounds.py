@@ -7,11 +7,12 @@ file, as far as it is a sum of variables that outlive the call.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from typing import Any
 
 from plctool.debug.variables import Symbol
 from plctool.iec.types import ELEMENTARY, ArrayType, StructType, Type
+from plctool.records import dataclass
 
 Read = Callable[[Sequence[Symbol]], Sequence[bytes | None]]
 

@@ -12,7 +12,7 @@ import zlib
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -30,6 +30,7 @@ from plctool.iec.type_descriptions import DescribedTypes, describe
 from plctool.iec.types import ELEMENTARY, ArrayType, OpenArrayType, StructType, Type
 from plctool.image.limits import Need
 from plctool.project import SYMBOL_SUFFIX
+from plctool.records import dataclass
 
 if TYPE_CHECKING:
     from plctool.debug.call_frames import DebugInfo, Scope

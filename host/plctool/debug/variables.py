@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
 
@@ -32,6 +32,7 @@ from plctool.iec.types import (
 )
 from plctool.iec.value_texts import literal, parse_value
 from plctool.iec.values import decode, encode
+from plctool.records import dataclass
 
 _TOKEN = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]*)\]|\.(\d+)|(\^)")
 

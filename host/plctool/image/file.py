@@ -11,7 +11,7 @@ import struct
 import time
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from plctool.files import read_image
 from plctool.iec.areas import Area
 from plctool.image.c_functions import version_text
 from plctool.project import IMAGE_SUFFIX, SYMBOL_SUFFIX
+from plctool.records import dataclass
 
 NO_AREA = int(lib.APP_AREA_NONE)
 DEVICE_VERSION = 0x01000000

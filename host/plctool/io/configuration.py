@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
 from plctool.image.file import Image
+from plctool.records import dataclass
 
 NONE = int(lib.IO_CONFIG_NONE)
 NOWHERE = int(lib.IO_CONFIG_NOWHERE)

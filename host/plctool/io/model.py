@@ -15,7 +15,7 @@ read, for example. Then `configuration.py` writes the tables of IoConfig.h.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from plctool.core import lib
@@ -24,6 +24,7 @@ from plctool.iec.addresses import parse_address
 from plctool.iec.types import BOOL, ArrayType, Type, base_of
 from plctool.io.faults import FAULTS
 from plctool.io.mistakes import Mistakes
+from plctool.records import dataclass
 
 if TYPE_CHECKING:
     from plctool.io.canopen.profile import ProgramFacts

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import PurePath
 from typing import Literal
 
 from plctool.compiler.typed.nodes import Pos
+from plctool.records import dataclass
 
 _OF_OPENPLC = re.compile(r"^\s*CONFIGURATION\s+Config0\s+RESOURCE\s+Res0\s+ON\s+PLC\b", re.MULTILINE)
 _PLCOPEN, _CODESYS = "http://www.plcopen.org/xml/tc6", "http://www.3s-software.com/"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 
 from plctool.compiler.codegen.relocations import thumb_addend
 from plctool.image.targets import Target
+from plctool.records import dataclass
 
 _WRITABLE, _ALLOCATED, _EXECUTABLE = 1, 2, 4
 _DROPPED = (".ARM.exidx", ".ARM.extab", ".eh_frame")

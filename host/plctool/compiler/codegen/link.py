@@ -7,7 +7,6 @@ applied, everything else (writable data, absolute addresses, undefined symbols) 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.elf_object import ElfSymbol, Section, read_object
@@ -31,6 +30,7 @@ from plctool.compiler.typed.nodes import External
 from plctool.errors import UsageError
 from plctool.iec.types import align_up
 from plctool.image.targets import Machine, Target
+from plctool.records import dataclass
 
 _THUMBS = (Machine.THUMB, Machine.THUMB_V6M)
 _STUB_ALIGN = 2  # bytes: instructions of the processors with stubs are of 16 bits, or of two such units

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 from plctool.compiler.codegen.closed import Closed, closed_block
@@ -26,6 +25,7 @@ from plctool.compiler.typed.nodes import Call, FbCall, Parameter, Pou, PouKind, 
 from plctool.compiler.typed.typed_nodes import walk
 from plctool.iec.types import StringType, Type, is_scalar
 from plctool.image.targets import Target
+from plctool.records import dataclass
 
 CONTEXT = "ptr %ctx"  # the argument that hands the context on
 _CONTEXT_IS = "noalias nonnull readonly"

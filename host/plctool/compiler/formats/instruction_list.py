@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from plctool.compiler.formats.il_lines import (
     BITS,
@@ -30,6 +29,7 @@ from plctool.compiler.formats.il_lines import (
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError
 from plctool.compiler.formats.text import Chunk, Listing, Part, Place
 from plctool.compiler.syntax.plain_text import plain_text
+from plctool.records import dataclass
 
 _SIMPLE = re.compile(r"[\w.#%$]+")
 _CALL = re.compile(r"\w\s*\(")

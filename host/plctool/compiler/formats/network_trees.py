@@ -8,12 +8,13 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import NamedTuple
 
 from plctool.compiler.formats.plcopen_body import NotTranslatedError
 from plctool.compiler.formats.text import Chunk, Place
 from plctool.compiler.formats.xml_tree import Element
+from plctool.records import dataclass
 
 _GATES = frozenset(("AND", "OR"))
 

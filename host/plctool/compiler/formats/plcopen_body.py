@@ -5,10 +5,11 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from plctool.compiler.formats.text import Part, Place, Text
 from plctool.compiler.formats.xml_tree import Element
+from plctool.records import dataclass
 
 
 class NotTranslatedError(Exception):

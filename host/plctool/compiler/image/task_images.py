@@ -8,7 +8,7 @@ it, or is taken by the initialisation, no task gets a copy of that area: all wor
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import combinations
 
 from plctool.compiler.syntax.diagnostics import Diagnostics
@@ -35,6 +35,7 @@ from plctool.compiler.typed.typed_nodes import callees, referenced_places, root_
 from plctool.core import lib
 from plctool.iec.areas import Area
 from plctool.iec.types import ArrayType, InterfaceType, PointerType, StructType, Type
+from plctool.records import dataclass
 
 IMAGE_AREAS = (Area.INPUT, Area.OUTPUT)
 _IMAGES = frozenset(IMAGE_AREAS)

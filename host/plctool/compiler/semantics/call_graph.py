@@ -8,7 +8,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from graphlib import CycleError, TopologicalSorter
 
 from plctool.compiler.semantics.generics import bounds_of
@@ -37,6 +37,7 @@ from plctool.compiler.typed.nodes import (
 from plctool.compiler.typed.typed_nodes import callees, walk
 from plctool.iec.areas import Area
 from plctool.iec.types import ArrayType
+from plctool.records import dataclass
 
 # ---- recursion, and programs that several tasks reach ----
 

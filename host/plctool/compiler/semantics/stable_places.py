@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from plctool.compiler.semantics.sfc import RUNNING, STATE, STEP_TYPE
 from plctool.compiler.typed.nodes import Variable
@@ -41,6 +41,7 @@ from plctool.iec.types import (
     Type,
     align_up,
 )
+from plctool.records import dataclass
 
 PLACED_AREAS = (Area.DATA, Area.RETAIN, Area.MEMORY)  # whose variables get their places from `Allocation.place`
 

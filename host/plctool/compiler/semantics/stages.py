@@ -13,7 +13,6 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.compiler.base.source import Source
@@ -27,6 +26,7 @@ from plctool.compiler.syntax.library import Library
 from plctool.compiler.syntax.parser import ParsedText
 from plctool.compiler.typed.nodes import TypedProgram
 from plctool.compiler.typed.online_change import OnlineChange, Previous
+from plctool.records import dataclass
 
 
 @dataclass(frozen=True)

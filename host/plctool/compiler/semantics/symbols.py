@@ -5,7 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 
 from plctool.compiler.base.source import Source
@@ -13,6 +13,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.ast import Section
 from plctool.compiler.typed.nodes import Const, Direction, Initial, Pos, Pou, Variable
 from plctool.iec.types import Elementary, Keep, Kind, PointerType, StructType, Type
+from plctool.records import dataclass
 
 
 class _ErrorType(Type):

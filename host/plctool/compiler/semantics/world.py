@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from zlib import crc32
 
 from plctool.compiler.base.information import NO_INFORMATION, Information
@@ -68,6 +68,7 @@ from plctool.iec.types import (
     StructType,
     Type,
 )
+from plctool.records import dataclass
 
 # ---- bodies that wait for their check ----
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from plctool.files import Pos, check_inside, decode_utf8, is_inside, read_utf8
 from plctool.iec.types import ELEMENTARY
 from plctool.io.tables import Table
 from plctool.project import LIBRARY_FILE
+from plctool.records import dataclass
 
 _STAND_INS = {name.casefold() for name in STAND_INS}
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)

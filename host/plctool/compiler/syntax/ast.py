@@ -6,12 +6,13 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from typing import TypeVar
 
 from plctool.compiler.base.source import Source
 from plctool.iec.literals import LiteralKind as LiteralKind
+from plctool.records import dataclass
 
 N = TypeVar("N")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 from plctool.compiler.base.missing_names import Use, library_of, table
@@ -19,6 +19,7 @@ from plctool.compiler.typed.nodes import Pos
 from plctool.errors import UsageError, counted
 from plctool.errors import did_you_mean as did_you_mean
 from plctool.iec.dialect import OWN, Dialect
+from plctool.records import dataclass
 
 Severity = Literal["error", "warning"]
 

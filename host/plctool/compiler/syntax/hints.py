@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from plctool.compiler.syntax import slips
 from plctool.compiler.syntax.plain_text import is_in_comment
+from plctool.records import dataclass
 
 _TYPE = (
     r"(?P<type>(?:STRING|WSTRING)(?:\s*[\[(]\s*\w+\s*[\])])?|BOOL|BYTE|[LD]?WORD|U?[SDL]?INT|L?REAL|L?TIME|L?DATE|L?TOD|L?DT|"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.compiler.syntax.parser import parse
 from plctool.core import lib
+from plctool.records import dataclass
 
 _FOLDER = Path(__file__).resolve().parents[2] / "stdlib"
 _OPENING = re.compile(

@@ -11,12 +11,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from plctool.files import cache_folder
+from plctool.records import dataclass
 
 _GRAMMAR = Path(__file__).with_name("grammar.lark")
 _VERSION = 1  # of the format of the cache

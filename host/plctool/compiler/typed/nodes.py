@@ -9,7 +9,7 @@ errors and the debugger.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
@@ -17,6 +17,7 @@ from plctool.files import Pos as Pos
 from plctool.iec.areas import Area
 from plctool.iec.types import BYTE, ArrayType, Field, Keep, StructType, Type
 from plctool.image.c_functions import C_FUNCTIONS, VERSION
+from plctool.records import dataclass
 
 if TYPE_CHECKING:
     from plctool.io.model import Description

@@ -6,11 +6,12 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from plctool.compiler.typed.nodes import Pou, Variable
 from plctool.iec.areas import Area
 from plctool.iec.types import StructType, Type
+from plctool.records import dataclass
 
 
 @dataclass(frozen=True)

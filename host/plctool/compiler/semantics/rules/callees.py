@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.rules.arguments import named_function
@@ -21,6 +21,7 @@ from plctool.compiler.syntax.library import without_library
 from plctool.compiler.syntax.slips import FUNCTIONS, REFUSED_CALLS
 from plctool.compiler.typed.nodes import Expr
 from plctool.iec.types import ELEMENTARY, ArrayType, StructType, Type
+from plctool.records import dataclass
 
 Rule = Callable[[ast.Call, Type | None], Expr]
 
