@@ -14,7 +14,7 @@ from import_graph import INTERNALS, MODULES, arrows, drawn, floors, imports, nam
 
 # From the ground up; the packages and modules of one line do not know each other. "" is what `import plctool` gives.
 FLOORS = (
-    ("errors", "printable", "version"),
+    ("errors", "printable", "records", "version"),
     ("core",),
     ("archives", "files", "iec", "project", "settings"),
     ("image",),
@@ -49,6 +49,7 @@ COMPILER_FLOORS = (
     ("compiler.sources",),
     ("compiler.image", "compiler.semantics"),
     ("compiler.export_itf", "compiler.front"),
+    ("compiler.tree_cache",),
 )
 NOT_BELOW = {
     "compiler.semantics": ("compiler.formats", "compiler.plcopen_export", "compiler.codegen"),

@@ -23,8 +23,17 @@ def test_build_keeps_its_code_and_clear_deletes_it(tool: Any, scratch: Path) -> 
     assert shown["objects"] == 1 and shown["bytes"] > 100 and shown["usable"]
     assert Path(shown["folder"]).is_relative_to(scratch)
     assert tool("build", "main.st", "--json").json["crc"] == first["crc"]
-    assert "1 object deleted" in tool("cache", "clear").out
+    assert "1 object and 0 syntax trees deleted" in tool("cache", "clear").out
     assert "0 objects" in tool("cache").out
+
+
+def test_check_keeps_syntax_trees_and_clear_deletes_them(tool: Any, scratch: Path) -> None:
+    source = scratch / "main.st"
+    source.write_text(f"{source.read_text()}(* {'long ' * 300}*)\n")
+    assert tool("check", "main.st").status == 0
+    assert tool("cache", "--json").json["trees"] == 1
+    assert "1 syntax tree deleted" in tool("cache", "clear").out
+    assert tool("cache", "--json").json["trees"] == 0
 
 
 def test_build_without_cache_neither_reads_nor_keeps_code(tool: Any) -> None:

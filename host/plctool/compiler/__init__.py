@@ -209,6 +209,7 @@ def build(request: BuildRequest, python: PythonFunctions | None = None, trees: T
     from plctool.compiler.image.fit import board_meant, check_program_fits
     from plctool.compiler.image.online_change import previous_of
     from plctool.compiler.syntax.diagnostics import render_all
+    from plctool.compiler.tree_cache import trees_of_user
     from plctool.iec.dialect import find_dialect
 
     files = request.files
@@ -232,7 +233,7 @@ def build(request: BuildRequest, python: PythonFunctions | None = None, trees: T
             python=python,
             dialect=system,
             information=files.information,
-            trees=trees,
+            trees=trees or (trees_of_user() if request.cache else None),
             previous=None if request.base is None else previous_of(request.base),
         )
     if checked.program is None:

@@ -153,29 +153,42 @@ def _placed(parsed: Parsed, io: Description | None, guests: Sequence[Guest]) -> 
 # ---- parsing ----
 
 
+KnownTree = tuple[ParsedText, list[tuple[int, str, str]]]
+"""A syntax tree, and the errors in its text: offset, code and message."""
+
+
 class Trees:
     """Syntax trees of sources, for several checks of a program of which a few files change."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[Source, frozenset[str]], tuple[ParsedText, list[tuple[int, str, str]]]] = {}
+        self._known: dict[tuple[Source, frozenset[str]], KnownTree] = {}
 
     def parse(self, source: Source, declared: frozenset[str], diagnostics: Diagnostics) -> ParsedText:
         """Returns the tree of a text, and reports the errors in it. `declared`: what {IF defined(pou: NAME)} finds."""
-        report, reports = diagnostics.at(source).error, list[tuple[int, str, str]]()
-        known = self._known.get((source, declared))
-        if known is not None:
-            for error in known[1]:
+        report = diagnostics.at(source).error
+        tree = self._known.get((source, declared)) or self.find(source, declared)
+        if tree is not None:
+            for error in tree[1]:
                 report(*error)
-            return known[0]
+        else:
+            reports = list[tuple[int, str, str]]()
 
-        def note(offset: int, code: str, message: str) -> None:
-            reports.append((offset, code, message))
-            report(offset, code, message)
+            def note(offset: int, code: str, message: str) -> None:
+                reports.append((offset, code, message))
+                report(offset, code, message)
 
-        text = parse_all(source, note, declared=declared)
-        if not _has_chart(text):  # a chart is changed when its unit is declared
-            self._known[source, declared] = (text, reports)
-        return text
+            tree = parse_all(source, note, declared=declared), reports
+            self.made(source, declared, tree)
+        if not _has_chart(tree[0]):  # a chart is changed when its unit is declared
+            self._known[source, declared] = tree
+        return tree[0]
+
+    def find(self, source: Source, declared: frozenset[str]) -> KnownTree | None:
+        """Returns the tree of a text that another process has parsed."""
+        return None
+
+    def made(self, source: Source, declared: frozenset[str], tree: KnownTree) -> None:
+        """Takes a tree that was parsed in this process."""
 
     def keep(self, sources: Sequence[Source]) -> None:
         """Forgets all trees but those of these sources."""

@@ -15,9 +15,10 @@ from weakref import WeakKeyDictionary
 
 from plctool.compiler import check_with_tests
 from plctool.compiler.base.source import Source
-from plctool.compiler.front import Trees
+from plctool.compiler.front import KnownTree, Trees
 from plctool.compiler.syntax.diagnostics import Diagnostic, Diagnostics
 from plctool.compiler.syntax.parser import ParsedText
+from plctool.compiler.tree_cache import trees_of_user
 from plctool.errors import PlcError
 from plctool.lsp.incremental import Kept, Observer
 from plctool.lsp.project import Project, Snapshot
@@ -52,9 +53,18 @@ class _Job:
 
 
 class _Trees(Trees):
-    """Notes whether a text has syntax errors."""
+    """Notes whether a text has syntax errors. The trees that builds have kept are used; those of what is typed are not
+    kept."""
 
     broken = False
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._of_builds = trees_of_user()
+
+    def find(self, source: Source, declared: frozenset[str]) -> KnownTree | None:
+        """Returns the tree of a text that was built or checked."""
+        return self._of_builds.find(source, declared)
 
     def parse(self, source: Source, declared: frozenset[str], diagnostics: Diagnostics) -> ParsedText:
         before = diagnostics.errors

@@ -1,4 +1,4 @@
-"""`plctool cache`: the compiled code that is kept between builds."""
+"""`plctool cache`: the compiled code and the syntax trees that are kept between builds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from plctool.errors import counted
 def cache_arguments(command: Parser) -> None:
     command.add_argument(
         "what", choices=["show", "clear"], nargs="?", default="show", metavar="show|clear",
-        help="show: where the code is and how much; clear: delete it; default: show",
+        help="show: where compiled code and syntax trees are, and how many; clear: delete them; default: show",
     )  # fmt: skip
     command.set_defaults(action=_cache)
 
@@ -26,21 +26,26 @@ def _cache(args: argparse.Namespace) -> int:
 def cache(*, clear: bool) -> Document:
     """Describes the cache, or empties it. "usable": false where builds do without one."""
     from plctool.compiler.codegen.object_cache import ObjectCache
+    from plctool.compiler.tree_cache import tree_folder
 
-    kept = ObjectCache()
-    document: Document = {"folder": str(kept.folder), "usable": kept.usable(), "cleared": clear}
-    document["objects"], document["bytes"] = kept.clear() if clear else kept.size()
+    objects, trees = ObjectCache(), tree_folder()
+    usable = objects.usable() and trees.usable()
+    document: Document = {"folder": str(objects.folder), "usable": usable, "cleared": clear}
+    counts = [kept.clear() if clear else kept.size() for kept in (objects, trees)]
+    document["objects"], document["trees"] = counts[0][0], counts[1][0]
+    document["bytes"] = sum(size for _, size in counts)
     return document
 
 
 def cache_text(document: dict[str, Any]) -> str:
     """Where the cache is and how large; or why it is not used."""
-    folder, objects = document["folder"], counted(document["objects"], "object")
+    folder = document["folder"]
     if not document["usable"]:
         return (
             f"{folder} is not used: others may write or read it, or it is another user's. Remove it, or name a folder "
             "of your own in XDG_CACHE_HOME."
         )
+    found = f"{counted(document['objects'], 'object')} and {counted(document['trees'], 'syntax tree')}"
     if document["cleared"]:
-        return f"{folder}: {objects} deleted, {document['bytes']} bytes"
-    return f"{folder}: {objects}, {document['bytes']} bytes"
+        return f"{folder}: {found} deleted, {document['bytes']} bytes"
+    return f"{folder}: {found}, {document['bytes']} bytes"

@@ -77,6 +77,8 @@ def _build(args: argparse.Namespace) -> int:
         return EXIT_USAGE if document["problems"] else EXIT_OK
     document, warnings = build(settings)
     output.print_warnings(args, warnings)
+    if not args.json:
+        document["warnings"] = []  # they are printed
     return output.show(args, document, build_text)
 
 
@@ -87,7 +89,8 @@ def _check(args: argparse.Namespace) -> int:
         output.show(args, document, missing_text)
         return EXIT_OK if all(name["stand_in"] for name in document["missing"]) else EXIT_USAGE
     document, texts = check(settings, CheckReports(args.sarif, args.junit))
-    output.show(args, document, lambda d: "\n".join(texts), colours=True)
+    shown = document if args.json else {}  # there may be thousands
+    output.show(args, shown, lambda _: "\n".join(texts), colours=True)
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
 
 
@@ -151,11 +154,18 @@ def missing(settings: Settings) -> Document:
 def _checked(settings: Settings) -> tuple[list[Diagnostic], list[Source], list[Source]]:
     """Every diagnostic of a program, its sources, and all files that diagnostics are about."""
     from plctool.compiler import check_with_tests, io_sources, library_sources
+    from plctool.compiler.tree_cache import trees_of_user
 
     files = settings.files
     sources, libraries = files.load_sources(), files.load_libraries()
     result = check_with_tests(
-        sources, settings.warnings, files.load_io, libraries, settings.dialect, information=files.information
+        sources,
+        settings.warnings,
+        files.load_io,
+        libraries,
+        settings.dialect,
+        trees=trees_of_user() if settings.cache else None,
+        information=files.information,
     )
     return result.diagnostics, sources, [*sources, *io_sources(files.load_io()), *library_sources(libraries)]
 
