@@ -20,7 +20,7 @@ def printable(text: str) -> str:
 
 def one_line(text: str) -> str:
     """A name, value or message as a part of a line: its line breaks and tabs are escapes as well."""
-    return _UNSAFE_IN_LINE.sub(_escape, text)
+    return text if text.isprintable() else _UNSAFE_IN_LINE.sub(_escape, text)
 
 
 def _escape(match: re.Match[str]) -> str:

@@ -19,6 +19,7 @@ _FIRST = re.compile(
     r"\s*(?:[^\W\d]\w*[ \t]*:(?!=)\s*)*((?:(?:LDN?|CALC?N?)[ \t]+[\w%'\"-]|JMP[ \t]+\w+[ \t]*$))",
     re.IGNORECASE | re.MULTILINE,
 )
+_HINT = re.compile(r"[LCJ](?:DN?|ALC?N?|MP)[ \t]", re.IGNORECASE)  # is found faster: it begins with no repetition
 _BOUNDARY = re.compile(
     r"\bEND_\w+\b[ \t]*;?|^[ \t]*(?:PROGRAM|FUNCTION_?BLOCK|FUNCTION|ACTION|METHOD)\b[^\n]*|^[ \t]*(VAR\w*)\b",
     re.IGNORECASE | re.MULTILINE,
@@ -40,7 +41,9 @@ def bodies(plain: str, start: int = 0, end: int | None = None) -> Iterator[tuple
 
 def has_lists(text: str) -> bool:
     """True if a text has a body that is a list of instructions."""
-    return _FIRST.search(text) is not None and any(True for _ in bodies(plain_text(text, strings=True)))
+    if _HINT.search(text) is None or _FIRST.search(text) is None:
+        return False
+    return any(True for _ in bodies(plain_text(text, strings=True)))
 
 
 def statements(text: str, plain: str, span: tuple[int, int], at: Place, findings: Findings) -> list[Part]:
