@@ -16,6 +16,7 @@
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
 # make changes 10 000 random online changes in a row, each checked (ARGS="--count 500 --seed 7")
+# make edits  10 000 random edits in the language server, each compared with a fresh check (ARGS="500 7": edits, seed)
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each (ARGS="--only tcp,lines --seed 7")
 # make vsix   the extension for VS Code, dist/plctool-*.vsix     make test-editors  all tests of editors/
@@ -39,7 +40,7 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test test-whole test-windows wheel-windows wheels-linux run-wheels-elsewhere quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak changes fuzz properties habits tree-sitter vsix test-editors all clean
+.PHONY: demo test test-whole test-windows wheel-windows wheels-linux run-wheels-elsewhere quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak changes edits fuzz properties habits tree-sitter vsix test-editors all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm run-test-arm-system
 VSCODE := editors/vscode
 NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
@@ -185,6 +186,12 @@ changes: build/build.ninja
 	ninja -C build under_attack tests/c/test_app_change
 	CHANGES=10000 TEST_ONLY=many_changes_in_a_row_go_on build/tests/c/test_app_change
 	PYTHONPATH=$(CURDIR):$(CURDIR)/host:$(CURDIR)/tests:$(CURDIR)/build/host $(BIN)/python tests/many_changes.py $(ARGS)
+
+# 10 000 random edits each: the check of bodies alone, and a running server, whose memory is limited.
+edits: build/build.ninja
+	ninja --quiet -C build under_attack
+	PYTHONPATH=.:host:build/host:tests $(BIN)/python tests/lsp/random_edits.py $(ARGS)
+	PYTHONPATH=.:host:build/host:tests $(BIN)/python tests/lsp/many_edits.py $(ARGS)
 
 habits: build/build.ninja
 	@ninja --quiet -C build under_attack

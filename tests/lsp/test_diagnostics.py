@@ -131,10 +131,10 @@ def test_after_random_edits_the_diagnostics_are_those_of_a_fresh_check(folder: P
                 lines[at] = rng.choice(CHANGES)(lines[at])
                 editor.type(name, "\n".join(lines))
             expected, broken = fresh(folder, editor.texts)
-            editor.wait(lambda e=expected, b=broken: _is(editor, e, b), f"the diagnostics are {expected}")
+            editor.wait(lambda e=expected, b=broken: as_expected(editor, e, b), f"the diagnostics are {expected}")
 
 
-def _is(editor: Editor, expected: Found, broken: bool) -> bool:
+def as_expected(editor: Editor, expected: Found, broken: bool) -> bool:
     """True if the editor shows what is expected. While there are syntax errors it may show warnings that still hold,
     which a check does not look for then."""
     found = shown(editor)
