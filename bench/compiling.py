@@ -13,6 +13,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import llvmlite.binding as llvm
+from large_project import NETWORKS, project
 
 from plctool.compiler import build, load_sources, program_files
 from plctool.compiler.codegen.emit import optimised
@@ -52,14 +53,6 @@ CASE count OF
 END_CASE;
 END_FUNCTION_BLOCK
 """
-
-NETWORKS = (
-    "m{k} := (m{a} OR m{k}) AND NOT in{b};",
-    "IF in{b} AND NOT m{a} THEN\n    n{c} := n{c} + {k};\nELSE\n    n{c} := n{d} - 1;\nEND_IF;",
-    "r{c} := r{d} * 0.5 + INT_TO_REAL(n{c});",
-    "CASE n{c} OF\n    0: n{c} := {k};\n    1..9: n{c} := n{d} / 3;\nELSE\n    n{c} := 0;\nEND_CASE;",
-    "FOR j := 0 TO 9 DO\n    a[j] := a[j] + n{c};\nEND_FOR;",
-)
 
 
 def with_main(blocks: list[str], arguments: Callable[[int], str]) -> str:
@@ -155,8 +148,6 @@ def bench_start() -> None:
 
 def bench_change() -> None:
     """One changed block of a project of 100 files, whose other code is in the cache."""
-    from editor_speed import project  # which uses this module
-
     with tempfile.TemporaryDirectory() as name, patch.dict(os.environ, XDG_CACHE_HOME=f"{name}/cache"):
         folder, trees = Path(name) / "project", Trees()
         folder.mkdir()

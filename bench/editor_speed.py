@@ -9,46 +9,16 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from compiling import NETWORKS
+from large_project import BLOCKS, project
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "lsp"))
 
 from editor import Editor, Json
 
-BLOCKS = 98
 FILE = "Block50.st"
 KEYS = 40
 EDITS = 400  # before memory is measured; the figure does not grow after that
 BURST = 10
-
-
-def project(folder: Path) -> None:
-    """Blocks of 100 lines that call each other, types, a global variable, and Main."""
-    names = {prefix: ", ".join(f"{prefix}{x}" for x in range(40)) for prefix in ("in", "m", "n", "r")}
-    for n in range(BLOCKS):
-        body: list[str] = []
-        while len(body) < 86:
-            k = len(body)
-            network = NETWORKS[k % len(NETWORKS)]
-            body += network.format(k=k % 40, a=k * 7 % 40, b=k % 32, c=k * 3 % 40, d=k * 11 % 40).split("\n")
-        chained = n % 7
-        use = f"   other : Block{n - 1};\n" if chained else ""
-        call = "other(in0 := in1, in1 := m3);\nIF other.m0 THEN n1 := 3; END_IF;\n" if chained else ""
-        (folder / f"Block{n}.st").write_text(
-            f"(* A block. *)\nFUNCTION_BLOCK Block{n}\nVAR_INPUT\n    {names['in']} : BOOL; // inputs\nEND_VAR\n"
-            f"VAR_OUTPUT {names['m']} : BOOL; END_VAR\nVAR\n    {names['n']} : INT; {names['r']} : REAL;\n"
-            f"   j : INT; a : ARRAY[0..9] OF DINT; mode : Mode; t : TON;\n{use}END_VAR\n"
-            f"t(IN := in0, PT := T#{n}ms);\n{call}" + "\n".join(body) + "\nEND_FUNCTION_BLOCK\n"
-        )
-    (folder / "types.st").write_text(
-        "TYPE Mode : (Off, Slow, Fast); END_TYPE\nVAR_GLOBAL\n   gCount : DINT;\nEND_VAR\n"
-    )
-    ends = [n for n in range(BLOCKS) if n % 7 == 6 or n == BLOCKS - 1]
-    declared = "".join(f"b{n} : Block{n};\n" for n in ends)
-    calls = "".join(f"b{n}(in0 := TRUE);\n" for n in ends)
-    (folder / "main.st").write_text(
-        f"PROGRAM Main\nVAR\n{declared}END_VAR\n{calls}gCount := gCount + 1;\nEND_PROGRAM\n"
-    )
 
 
 class Session:
