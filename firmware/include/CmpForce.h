@@ -26,7 +26,8 @@
 
 typedef struct {
     APP_PLACE place;
-    RTS_UI64 value; /* in its first `size` bytes */
+    bool is_searched; /* where it is, in each cycle */
+    RTS_UI64 value;   /* in its first `size` bytes */
 } FORCED_VALUE;
 
 /* Checks whether a place can be forced now, on an application that is loaded. MONITORING_ERR_UNSUPPORTED_DATATYPE: its

@@ -60,8 +60,8 @@ void AppEnterSafeState(void);
 
 /* ---- for IecCycle.c ---- */
 
-/* Whether any are registered. */
-bool CyclePhasesExist(void);
+/* A bit for each CYCLE_PHASE that is not empty. */
+RTS_UI32 CyclePhasesGet(void);
 
 extern CYCLE_ENTRY *cycle_phases[];
 

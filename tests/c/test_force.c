@@ -279,7 +279,7 @@ static void forces_end_with_the_variables(void)
     SimStop();
     CHECK_EQUAL(SimStart(), ERR_OK); /* power off and on */
     CHECK_EQUAL(ForceGetCount(), 0);
-    CHECK(!CyclePhasesExist());
+    CHECK_EQUAL(CyclePhasesGet(), 0);
 }
 
 static void phases_are_there_only_while_something_is_forced(void)
@@ -287,17 +287,17 @@ static void phases_are_there_only_while_something_is_forced(void)
     begin_program();
     load();
     for (RTS_UI32 i = 0; i < 3 * CYCLE_MAX_PHASES; i++) {
-        CHECK(!CyclePhasesExist());
+        CHECK_EQUAL(CyclePhasesGet(), 0);
         CHECK_EQUAL(force(APP_AREA_DATA, 0, 4, i), MONITORING_ERR_OK);
         CHECK_EQUAL(force(APP_AREA_DATA, 4, 4, i), MONITORING_ERR_OK);
-        CHECK(CyclePhasesExist());
+        CHECK(CyclePhasesGet() != 0);
         end(APP_AREA_DATA, 0, 4);
-        CHECK(CyclePhasesExist());
+        CHECK(CyclePhasesGet() != 0);
         run_cycle();
         CHECK_EQUAL(read_u32(APP_AREA_DATA, 4), i);
         ForceEndAll();
     }
-    CHECK(!CyclePhasesExist());
+    CHECK_EQUAL(CyclePhasesGet(), 0);
     for (RTS_UI32 i = 0; i < CYCLE_MAX_PHASES; i++) /* forces took no place of those that stay */
         CHECK_EQUAL(CyclePhaseRegister(CYCLE_RECORD, NULL), ERR_OK);
 }
@@ -335,6 +335,40 @@ static void of_two_that_overlap_the_last_one_holds(void)
     CHECK_EQUAL(force(APP_AREA_DATA, 16, 1, 0x33), MONITORING_ERR_OK);
     run_cycle();
     CHECK_EQUAL(read_u32(APP_AREA_DATA, 16), 0x22222233);
+}
+
+/* Values of all sizes, as many as `count` of 4 bytes, one that is reached by way of a pointer, and ones that overlap. */
+static void force_mixed(RTS_UI32 count)
+{
+    APP_PLACE by_pointer = place_of(APP_AREA_DATA, POINTER_AT, 2);
+    RTS_UI32 i;
+
+    by_pointer.pointers = 1;
+    begin_program();
+    load();
+    put_pointer((uintptr_t)at(APP_AREA_RETAIN, 4));
+    CHECK_EQUAL(force(APP_AREA_RETAIN, 0, 1, 0x11), MONITORING_ERR_OK);
+    for (i = 0; i < count; i++)
+        CHECK_EQUAL(force(APP_AREA_DATA, 4 + 4 * i, 4, 1000 + i), MONITORING_ERR_OK);
+    CHECK_EQUAL(force(APP_AREA_RETAIN, 8, 8, 0x0102030405060708), MONITORING_ERR_OK);
+    CHECK_EQUAL(force(APP_AREA_RETAIN, 2, 2, 0x2233), MONITORING_ERR_OK);
+    CHECK_EQUAL(ForceSet(&by_pointer, 0x4455), MONITORING_ERR_OK);
+    CHECK_EQUAL(force(APP_AREA_RETAIN, 5, 1, 0x66), MONITORING_ERR_OK); /* after what the pointer leads to */
+    memset(at(APP_AREA_RETAIN, 0), 0xEE, 16);
+    memset(at(APP_AREA_DATA, 4), 0xEE, 4 * count);
+    run_cycle();
+    for (i = 1; i < count; i++)
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, 4 + 4 * i), 1000 + i);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, 0), 0x2233EE11);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, 4), 0xEEEE6655);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, 8), 0x05060708);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, 12), 0x01020304);
+}
+
+static void values_of_all_sizes_are_forced_together(void)
+{
+    for (RTS_UI32 count = 0; count <= 4; count++)
+        force_mixed(count);
 }
 
 static void what_cannot_be_forced_is_refused(void)
@@ -387,6 +421,7 @@ int main(void)
     RUN(phases_are_there_only_while_something_is_forced);
     RUN(a_full_list_takes_new_values_of_what_it_has);
     RUN(of_two_that_overlap_the_last_one_holds);
+    RUN(values_of_all_sizes_are_forced_together);
     RUN(what_cannot_be_forced_is_refused);
     RUN(the_status_says_that_something_is_forced);
     return test_result();

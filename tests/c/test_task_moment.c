@@ -80,9 +80,9 @@ void AppEnterSafeState(void)
 {
 }
 
-bool CyclePhasesExist(void)
+RTS_UI32 CyclePhasesGet(void)
 {
-    return false;
+    return 0;
 }
 
 CYCLE_ENTRY *cycle_phases[CYCLE_SAFE_STATE + 1];

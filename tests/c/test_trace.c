@@ -470,14 +470,14 @@ static void the_phase_is_there_only_while_something_is_recorded(void)
 {
     begin_program();
     for (RTS_UI32 i = 0; i < 3; i++) {
-        CHECK(!CyclePhasesExist());
+        CHECK_EQUAL(CyclePhasesGet(), 0);
         begin_config(2);
         add(APP_AREA_DATA, 0, 4);
         CHECK_EQUAL(create(), ERR_OK);
-        CHECK(CyclePhasesExist());
+        CHECK(CyclePhasesGet() != 0);
         run_cycles(3);
         CHECK_EQUAL(CMCallHook(CH_COMM_CYCLE), ERR_OK);
-        CHECK(!CyclePhasesExist()); /* it is complete */
+        CHECK_EQUAL(CyclePhasesGet(), 0); /* it is complete */
         CHECK_EQUAL(read_all(), 2);
         CHECK_EQUAL(TraceDelete(id), ERR_OK);
         CHECK_EQUAL(TraceDelete(id), ERR_INVALIDID);
@@ -568,7 +568,7 @@ static void packets_end_with_the_variables(void)
         none = 0;
         CHECK_EQUAL(AppReset(option), ERR_OK);
         CHECK(TraceGetNext(&none, &size) == NULL);
-        CHECK(!CyclePhasesExist());
+        CHECK_EQUAL(CyclePhasesGet(), 0);
     }
     load();
     CHECK_EQUAL(create(), ERR_OK);
@@ -641,7 +641,7 @@ static void what_cannot_be_traced_is_refused(void)
         if (size != config_size())
             CHECK_EQUAL(TraceCreate((const RTS_UI8 *)&config, size, &id, &bad, &error), ERR_SIZE_MISMATCH);
     }
-    CHECK(!CyclePhasesExist());
+    CHECK_EQUAL(CyclePhasesGet(), 0);
     CHECK_EQUAL(create(), ERR_OK);
 }
 

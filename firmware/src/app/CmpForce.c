@@ -20,21 +20,25 @@
 #include "SysAtomic.h"
 #include "SysLock.h"
 
-/* How a value is stored: in one access of so many bytes, or one of these. */
-enum { STORE_END = 0, STORE_BITS = 3, STORE_MISFIT = 5, STORE_SEARCHED = 6 };
-
+/* A value that is where it always is. */
 typedef struct {
-    RTS_UI32 store;
-    RTS_UI8 *at; /* of those that are not searched */
-    FORCED_VALUE forced;
-} ENTRY;
+    RTS_UI8 *at;
+    RTS_UI32 low, high;
+} PUT;
 
 #define NO_TASK 0xFFFFFFFFu
 
+/* The puts are in the order of their sizes, those of 4 bytes first; if they are odd, the last one is there twice. */
+enum { OF_4, OF_8, OF_2, OF_1, SIZES };
+
 static struct {
+    RTS_UI32 puts_of[SIZES];
+    bool has_others; /* than those of 4 bytes */
+    PUT puts[FORCE_MAX + 1];
     RTS_UI32 count;
     RTS_UI32 serial;
-    ENTRY list[FORCE_MAX + 1]; /* after the last one STORE_END */
+    bool has_phases;
+    FORCED_VALUE list[FORCE_MAX];
 } force;
 
 static void put_all(RTS_UI32 task, const IEC_CONTEXT *context);
@@ -44,45 +48,30 @@ static CYCLE_ENTRY after_code = {put_all, NULL};
 
 /* ---- one value ---- */
 
-static RTS_UI32 store_of(const APP_PLACE *place, const RTS_UI8 *at)
+static bool is_aligned(const RTS_UI8 *at, RTS_UI32 size)
 {
-    if (place->mask != PLACE_ALL_BITS)
-        return STORE_BITS;
-    return ((uintptr_t)at & (place->size - 1u)) == 0 ? place->size : STORE_MISFIT;
+    return ((uintptr_t)at & (size - 1u)) == 0;
 }
 
-/* The other bits may be changed by tasks of a higher priority. */
-static void set_bits(RTS_UI8 *at, const FORCED_VALUE *forced)
+/* In one access where the processor can. The other bits may be changed by tasks of a higher priority. */
+static void put(RTS_UI8 *at, const FORCED_VALUE *forced)
 {
-    RTS_UI32 lock = RTS_ONE_CORE ? SysLockEnter() : 0;
+    RTS_UI32 size = forced->place.size;
+    RTS_UI32 lock;
 
-    SysAtomicSetBits(at, forced->place.mask, (RTS_UI8)forced->value);
-    if (RTS_ONE_CORE)
-        SysLockLeave(lock);
-}
-
-/* Inlined where `store` is a constant. */
-static RTS_INLINE void put(RTS_UI32 store, RTS_UI8 *at, const FORCED_VALUE *forced)
-{
-    switch (store) {
-    case 1:
-        *(volatile RTS_UI8 *)at = (RTS_UI8)forced->value;
-        break;
-    case 2:
+    if (forced->place.mask != PLACE_ALL_BITS) {
+        lock = RTS_ONE_CORE ? SysLockEnter() : 0;
+        SysAtomicSetBits(at, forced->place.mask, (RTS_UI8)forced->value);
+        if (RTS_ONE_CORE)
+            SysLockLeave(lock);
+    } else if (size == 2 && is_aligned(at, size)) {
         *(volatile RTS_UI16 *)(void *)at = (RTS_UI16)forced->value;
-        break;
-    case 4:
+    } else if (size == 4 && is_aligned(at, size)) {
         *(volatile RTS_UI32 *)(void *)at = (RTS_UI32)forced->value;
-        break;
-    case 8:
+    } else if (size == 8 && is_aligned(at, size)) {
         *(volatile RTS_UI64 *)(void *)at = forced->value;
-        break;
-    case STORE_BITS:
-        set_bits(at, forced);
-        break;
-    default:
-        memcpy(at, &forced->value, forced->place.size);
-        break;
+    } else {
+        memcpy(at, &forced->value, size);
     }
 }
 
@@ -114,59 +103,62 @@ static RTS_NOINLINE void search_and_put(RTS_UI32 task, const FORCED_VALUE *force
 
     if (find(&forced->place, &address, &at) != MONITORING_ERR_OK || !may_put(address.area))
         return;
-    put(store_of(&forced->place, at), at, forced);
+    put(at, forced);
     if (task == NO_TASK || !is_image(address.area))
         return;
     at = AppImageGetCopy(task, address.area, address.offset, size);
     if (at != NULL)
-        put(store_of(&forced->place, at), at, forced);
+        put(at, forced);
 }
 
 /* ---- the cycle ---- */
 
-/* A run of entries that are stored the same way costs a few instructions for each. */
-#define PUT_RUN(kind)                             \
-    case kind:                                    \
-        do                                        \
-            put(kind, entry->at, &entry->forced); \
-        while ((++entry)->store == (kind));       \
-        break
+#define PUT_ALL_OF(row, type, value)                         \
+    for (left = force.puts_of[row]; left != 0; left--, to++) \
+    *(volatile type *)(void *)to->at = (type)(value)
+
+static RTS_NOINLINE void put_others(RTS_UI32 task)
+{
+    const PUT *to = &force.puts[force.puts_of[OF_4]];
+    RTS_UI32 left, i;
+
+    PUT_ALL_OF(OF_8, RTS_UI64, (RTS_UI64)to->high << 32 | to->low);
+    PUT_ALL_OF(OF_2, RTS_UI16, to->low);
+    PUT_ALL_OF(OF_1, RTS_UI8, to->low);
+    for (i = 0; i < force.count; i++) {
+        if (force.list[i].is_searched)
+            search_and_put(task, &force.list[i]);
+    }
+}
 
 /* Before and after the code of each task. At most some us for 16 values, unless pointers lead to them. */
 static void put_all(RTS_UI32 task, const IEC_CONTEXT *context)
 {
     RTS_UI32 lock = RTS_ONE_CORE ? 0 : SysLockEnter();
-    const ENTRY *entry = force.list;
+    RTS_UI32 left = force.puts_of[OF_4];
+    const PUT *to = force.puts;
 
     RTS_UNUSED(context);
-    while (entry->store != STORE_END) {
-        switch (entry->store) {
-            PUT_RUN(1);
-            PUT_RUN(2);
-            PUT_RUN(4);
-        case STORE_SEARCHED:
-            search_and_put(task, &entry->forced);
-            entry++;
-            break;
-        default:
-            put(entry->store, entry->at, &entry->forced);
-            entry++;
-            break;
-        }
+    if (left != 0) {
+        do { /* in pairs and counted down: less than four instructions each on a Cortex-M3 */
+            *(volatile RTS_UI32 *)(void *)to[0].at = to[0].low;
+            *(volatile RTS_UI32 *)(void *)to[1].at = to[1].low;
+            to += 2;
+        } while ((left -= 2) != 0);
     }
+    if (force.has_others)
+        put_others(task);
     if (!RTS_ONE_CORE)
         SysLockLeave(lock);
 }
 
 /* ---- the list ---- */
 
-/* Whether a task works on a copy of it, may do so after an online change, or may change it after the safe state. */
-static bool needs_search(const APP_PLACE *place)
+/* True if a task works on a copy of it, may do so after an online change, or may change it after the safe state. */
+static bool is_copied(const APP_PLACE *place)
 {
     RTS_UI32 task;
 
-    if (place->pointers > 0)
-        return true;
     if (!is_image(place->area))
         return false;
     for (task = 0; task < IecTaskGetCount(); task++) {
@@ -174,6 +166,27 @@ static bool needs_search(const APP_PLACE *place)
             return true;
     }
     return !RTS_ONE_CORE || ONLINE_CHANGE;
+}
+
+static bool may_overlap(const APP_PLACE *a, const APP_PLACE *b)
+{
+    return a->pointers > 0 ||
+           (a->area == b->area && a->offset[0] < b->offset[0] + b->size && b->offset[0] < a->offset[0] + a->size);
+}
+
+/* True if the place is not always the same, cannot be stored in one access, or one that was forced before may be part of
+ * it: the puts come first, in any order. */
+static bool needs_search(const APP_PLACE *place)
+{
+    RTS_UI32 i;
+
+    if (place->pointers > 0 || place->mask != PLACE_ALL_BITS || is_copied(place))
+        return true;
+    for (i = 0; i < force.count; i++) {
+        if (may_overlap(&force.list[i].place, place))
+            return true;
+    }
+    return !is_aligned(AppGetAreaAddress(place->area, place->offset[0], place->size), place->size);
 }
 
 MON_RESULT ForceCheck(const APP_PLACE *place)
@@ -194,7 +207,7 @@ static RTS_UI32 index_of(const APP_PLACE *place)
 {
     RTS_UI32 i = 0;
 
-    while (i < force.count && !is_same(&force.list[i].forced.place, place))
+    while (i < force.count && !is_same(&force.list[i].place, place))
         i++;
     return i;
 }
@@ -214,14 +227,51 @@ static void remove_place(const APP_PLACE *place)
     force.count--;
 }
 
-/* Registers the phases when there are values, and only then. */
-static void note_change(bool had_some)
+static RTS_UI32 append_put(const FORCED_VALUE *forced, RTS_UI32 sorted)
+{
+    PUT *put = &force.puts[sorted];
+
+    put->at = AppGetAreaAddress(forced->place.area, forced->place.offset[0], forced->place.size);
+    put->low = (RTS_UI32)forced->value;
+    put->high = (RTS_UI32)(forced->value >> 32);
+    return sorted + 1;
+}
+
+/* Sorts what is not searched by its size. */
+static void sort_puts(void)
+{
+    static const RTS_UI8 sizes[SIZES] = {4, 8, 2, 1};
+    RTS_UI32 sorted = 0;
+    RTS_UI32 row, before, i;
+
+    for (row = 0; row < SIZES; row++) {
+        before = sorted;
+        for (i = 0; i < force.count; i++) {
+            if (!force.list[i].is_searched && force.list[i].place.size == sizes[row])
+                sorted = append_put(&force.list[i], sorted);
+        }
+        if (row == OF_4) {
+            force.has_others = sorted != force.count;
+            if ((sorted & 1) != 0) {
+                force.puts[sorted] = force.puts[sorted - 1];
+                sorted++;
+            }
+        }
+        force.puts_of[row] = sorted - before;
+    }
+}
+
+/* With the lock, which it gives back. Registers the phases when there are values, and only then. */
+static void end_change(RTS_UI32 lock)
 {
     bool has_some = force.count > 0;
 
+    sort_puts();
+    SysLockLeave(lock);
     force.serial++;
-    if (has_some == had_some)
+    if (has_some == force.has_phases)
         return;
+    force.has_phases = has_some;
     if (has_some) {
         CyclePhaseAdd(CYCLE_BEFORE_CODE, &before_code);
         CyclePhaseAdd(CYCLE_AFTER_CODE, &after_code);
@@ -232,62 +282,44 @@ static void note_change(bool had_some)
     IecCycleFindPhases();
 }
 
-static void append(const APP_PLACE *place, RTS_UI64 value)
-{
-    ENTRY *entry = &force.list[force.count];
-
-    entry->forced.place = *place;
-    entry->forced.value = value;
-    entry->at = NULL;
-    entry->store = STORE_SEARCHED;
-    if (!needs_search(place)) {
-        entry->at = AppGetAreaAddress(place->area, place->offset[0], place->size);
-        entry->store = store_of(place, entry->at);
-    }
-    force.list[++force.count].store = STORE_END;
-}
-
 MON_RESULT ForceSet(const APP_PLACE *place, RTS_UI64 value)
 {
-    bool had_some = force.count > 0;
-    bool has_room;
     RTS_UI32 lock = SysLockEnter();
+    bool has_room;
 
     remove_place(place);
     has_room = force.count < FORCE_MAX;
     if (has_room) {
-        append(place, value);
-        search_and_put(NO_TASK, &force.list[force.count - 1].forced);
+        FORCED_VALUE *forced = &force.list[force.count];
+        forced->place = *place;
+        forced->value = value;
+        forced->is_searched = needs_search(place);
+        force.count++;
+        search_and_put(NO_TASK, forced);
     }
-    SysLockLeave(lock);
-    note_change(had_some);
+    end_change(lock);
     return has_room ? MONITORING_ERR_OK : MONITORING_ERR_FORCE_FAILED;
 }
 
 void ForceEnd(const APP_PLACE *place)
 {
-    bool had_some = force.count > 0;
     RTS_UI32 lock = SysLockEnter();
 
     remove_place(place);
-    SysLockLeave(lock);
-    note_change(had_some);
+    end_change(lock);
 }
 
 void ForceEndAll(void)
 {
-    bool had_some = force.count > 0;
     RTS_UI32 lock = SysLockEnter();
 
     force.count = 0;
-    force.list[0].store = STORE_END;
-    SysLockLeave(lock);
-    note_change(had_some);
+    end_change(lock);
 }
 
 const FORCED_VALUE *ForceGet(RTS_UI32 index)
 {
-    return index < force.count ? &force.list[index].forced : NULL;
+    return index < force.count ? &force.list[index] : NULL;
 }
 
 RTS_UI32 ForceGetCount(void)

@@ -17,18 +17,10 @@ enum { PLACES = CYCLE_MAX_PHASES > 0 ? CYCLE_MAX_PHASES : 1 };
 CYCLE_ENTRY *cycle_phases[CYCLE_SAFE_STATE + 1];
 
 static struct {
-    RTS_UI32 count; /* of those in the rows of phases */
+    RTS_UI8 used;  /* see CyclePhasesGet */
+    RTS_UI8 taken; /* of `row` */
     CYCLE_ENTRY row[PLACES];
-#if CYCLE_PHASES_CHANGE
-    RTS_UI32 taken; /* of `row` */
-#endif
 } phases;
-
-#if CYCLE_PHASES_CHANGE
-#define TAKEN phases.taken
-#else
-#define TAKEN phases.count
-#endif
 
 static void append(CYCLE_PHASE when, CYCLE_ENTRY *entry)
 {
@@ -37,21 +29,18 @@ static void append(CYCLE_PHASE when, CYCLE_ENTRY *entry)
     while (*end != NULL)
         end = &(*end)->next;
     *end = entry;
-    phases.count++;
+    phases.used |= (RTS_UI8)(1u << when);
 }
 
 RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run)
 {
     CYCLE_ENTRY *entry;
 
-    if (CYCLE_MAX_PHASES == 0 || TAKEN == PLACES)
+    if (CYCLE_MAX_PHASES == 0 || phases.taken == PLACES)
         return CMNoRoom(CYCLE_OWN_PHASES);
-    entry = &phases.row[TAKEN];
+    entry = &phases.row[phases.taken++];
     entry->run = run;
     append(when, entry);
-#if CYCLE_PHASES_CHANGE
-    phases.taken++;
-#endif
     return ERR_OK;
 }
 
@@ -71,13 +60,14 @@ void CyclePhaseRemove(CYCLE_PHASE when, const CYCLE_ENTRY *entry)
     while (*at != entry)
         at = &(*at)->next;
     *at = entry->next;
-    phases.count--;
+    if (cycle_phases[when] == NULL)
+        phases.used &= (RTS_UI8) ~(1u << when);
 }
 #endif
 
-bool CyclePhasesExist(void)
+RTS_UI32 CyclePhasesGet(void)
 {
-    return CYCLE_MAX_PHASES > 0 && phases.count > 0;
+    return CYCLE_MAX_PHASES > 0 ? phases.used : 0;
 }
 
 void CyclePhasesForget(void)
@@ -91,6 +81,6 @@ void CyclePhasesForget(void)
 void AppEnterSafeState(void)
 {
     AppAreasClearOutputs();
-    if (CyclePhasesExist())
+    if (CyclePhasesGet() != 0)
         CyclePhasesRun(CYCLE_SAFE_STATE, 0, NULL);
 }

@@ -41,8 +41,7 @@ typedef struct {
     GUARD guard;
     RTS_I64 watchdog_ns; /* 0: none */
     RTS_UI16 sensitivity;
-    bool has_phases; /* anything before or after its code */
-    bool has_copies; /* of inputs and outputs */
+    RTS_UI8 beside; /* its code: what there is to do */
 #if IEC_TASK_CALLS
     RTS_UI16 exceeded; /* cycles in a row longer than watchdog_ns */
     bool ends_series;  /* this cycle, of long ones, if it is long as well */
@@ -214,7 +213,11 @@ static void set_time(TASK *task, RTS_I64 time_ns)
 
 static RTS_UI32 index_of(const TASK *task)
 {
+#if IEC_TASK_CALLS
+    return task->context.task - 1; /* one instruction instead of a multiplication */
+#else
     return (RTS_UI32)(task - tasks.list);
+#endif
 }
 
 static void run_entry(void *arg)
@@ -370,43 +373,57 @@ static bool end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
     return false;
 }
 
-/* Without phases a task is here because of its copies. */
-static void run_phases_before(TASK *task)
-{
-    bool has_phases = CyclePhasesExist();
+/* TASK.beside: a bit for the copies of inputs and outputs, and those of CyclePhasesGet. */
+enum { HAS_COPIES = 1, PHASES_SHIFT = 1 };
 
-    if (has_phases)
-        CyclePhasesRun(CYCLE_INPUTS, index_of(task), &task->context);
-    if (!has_phases || task->has_copies)
-        AppImageCopyIn(index_of(task));
-    if (has_phases)
-        CyclePhasesRun(CYCLE_BEFORE_CODE, index_of(task), &task->context);
+/* Where phases do not change, the linker knows which ones are always empty, and their row is all that is looked at. */
+static RTS_INLINE bool has_phase(RTS_UI32 beside, CYCLE_PHASE when)
+{
+    return CYCLE_PHASES_CHANGE ? (beside >> PHASES_SHIFT >> when & 1) != 0 : cycle_phases[when] != NULL;
 }
 
-static RTS_INLINE void record(TASK *task, RTS_I64 due_ns)
+/* Without phases a task is here because of its copies. */
+static RTS_INLINE bool has_copies(RTS_UI32 beside)
 {
-    if (cycle_phases[CYCLE_RECORD] == NULL)
-        return;
+    return (!CYCLE_PHASES_CHANGE && CyclePhasesGet() == 0) || (beside & HAS_COPIES) != 0;
+}
+
+static void run_phases_before(TASK *task)
+{
+    RTS_UI32 beside = task->beside;
+    RTS_UI32 index = index_of(task);
+
+    if (has_phase(beside, CYCLE_INPUTS))
+        CyclePhasesRun(CYCLE_INPUTS, index, &task->context);
+    if (has_copies(beside))
+        AppImageCopyIn(index);
+    if (has_phase(beside, CYCLE_BEFORE_CODE))
+        CyclePhasesRun(CYCLE_BEFORE_CODE, index, &task->context);
+}
+
+static RTS_INLINE void record(TASK *task, RTS_UI32 index, RTS_I64 due_ns)
+{
 #if TRACE_BUFFER > 0
     task->due_ns = due_ns;
 #else
     RTS_UNUSED(due_ns);
 #endif
-    CyclePhasesRun(CYCLE_RECORD, index_of(task), &task->context);
+    CyclePhasesRun(CYCLE_RECORD, index, &task->context);
 }
 
 static RTS_INLINE void run_phases_after(TASK *task, RTS_I64 due_ns)
 {
-    bool has_phases = CyclePhasesExist();
+    RTS_UI32 beside = task->beside;
+    RTS_UI32 index = index_of(task);
 
-    if (has_phases)
-        CyclePhasesRun(CYCLE_AFTER_CODE, index_of(task), &task->context);
-    if (!has_phases || task->has_copies)
-        AppImageCopyOut(index_of(task), &tasks.running);
-    if (has_phases && SysAtomicLoad(&tasks.running)) {
-        CyclePhasesRun(CYCLE_OUTPUTS, index_of(task), &task->context);
-        record(task, due_ns);
-    }
+    if (has_phase(beside, CYCLE_AFTER_CODE))
+        CyclePhasesRun(CYCLE_AFTER_CODE, index, &task->context);
+    if (has_copies(beside))
+        AppImageCopyOut(index, &tasks.running);
+    if ((!has_phase(beside, CYCLE_OUTPUTS) && !has_phase(beside, CYCLE_RECORD)) || !SysAtomicLoad(&tasks.running))
+        return;
+    CyclePhasesRun(CYCLE_OUTPUTS, index, &task->context);
+    record(task, index, due_ns);
 }
 
 /* After its code. */
@@ -414,7 +431,7 @@ static RTS_INLINE bool finish_cycle(TASK *task, RTS_I64 start_ns, RTS_I64 due_ns
 {
     RTS_I64 elapsed_ns;
 
-    if (task->has_phases)
+    if (task->beside != 0)
         run_phases_after(task, due_ns);
     elapsed_ns = SysTimeGetNs() - (BP_MAX > 0 && SYS_DEBUG_WAITS ? task->guard.start_ns : start_ns);
     account(task, start_ns - due_ns, elapsed_ns);
@@ -470,7 +487,7 @@ static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
         return wait_for_turn(task, due_ns);
     }
 #endif
-    if (task->has_phases)
+    if (task->beside != 0)
         run_phases_before(task);
     if (!SysExceptTry(run_entry, task, &exception))
         return end_code(task, &exception);
@@ -764,6 +781,11 @@ static RTS_I64 limit_of(const TASK *task)
     return most_ns != 0 && limit_ns > most_ns ? most_ns : limit_ns;
 }
 
+static void find_what_is_beside(TASK *task)
+{
+    task->beside = (RTS_UI8)(AppImageSetContext(index_of(task), &task->context) | CyclePhasesGet() << PHASES_SHIFT);
+}
+
 static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *prototype)
 {
     RTS_UI32 phase = task->guard.phase;
@@ -773,10 +795,9 @@ static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *protot
     task->guard.phase = phase; /* goes on, so that a supervisor never takes a new cycle for an old one */
     task->context = *prototype;
 #if IEC_TASK_CALLS
-    task->context.task = index_of(task) + 1;
+    task->context.task = (RTS_UI32)(task - tasks.list) + 1;
 #endif
-    task->has_copies = AppImageSetContext(index_of(task), &task->context);
-    task->has_phases = task->has_copies || CyclePhasesExist();
+    find_what_is_beside(task);
     task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
     task->record = record;
     task->min_ns = 0xFFFFFFFFu;
@@ -800,7 +821,7 @@ void IecCycleFindPhases(void)
     RTS_UI32 i;
 
     for (i = 0; i < tasks.count; i++)
-        tasks.list[i].has_phases = tasks.list[i].has_copies || CyclePhasesExist();
+        tasks.list[i].beside = (RTS_UI8)((tasks.list[i].beside & HAS_COPIES) | CyclePhasesGet() << PHASES_SHIFT);
 }
 
 #if ONLINE_CHANGE
@@ -812,7 +833,7 @@ static void set_code(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *prot
     for (area = 0; area < APP_AREA_COUNT; area++)
         task->context.area[area] = prototype->area[area];
     task->context.imports = prototype->imports;
-    task->has_copies = AppImageSetContext(index_of(task), &task->context);
+    find_what_is_beside(task);
     task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
     task->record = record;
 }
