@@ -157,3 +157,70 @@ class EndlessFunctions(EventFunctions):
         plc.write({"hang": True})
         plc.stop()
         self.check_exception(plc, "WATCHDOG", "HASENDED")
+
+
+REGISTERED = """
+VAR_GLOBAL
+    heard : ARRAY[0..5] OF DWORD;
+    door_open : BOOL;
+END_VAR
+FUNCTION OnEvent : DWORD
+VAR_INPUT
+    dwEvent, dwFilter, dwOwner : DWORD;
+END_VAR
+heard[0] := heard[0] + 1;
+heard[1] := dwEvent;
+heard[2] := dwFilter + dwOwner;
+OnEvent := 1;
+END_FUNCTION
+FUNCTION MayStop : BOOL
+heard[3] := heard[3] + 1;
+MayStop := door_open;
+IF door_open THEN
+    EventSetReason('the door is open');
+END_IF
+END_FUNCTION
+PROGRAM Main
+VAR
+    n : INT; ok : ARRAY[0..5] OF BOOL; take, back : BOOL;
+END_VAR
+n := n + 1;
+IF take THEN
+    ok[0] := SysCallbackRegister(INDEXOF(OnEvent), EVENT_STOP)
+        AND SysCallbackRegister(INDEXOF(OnEvent), RTS_EVENT.EVT_StartDone);
+    ok[1] := SysCallbackRegister(INDEXOF(MayStop), RTS_EVENT.EVT_DenyStop)
+        AND SysCallbackRegister(INDEXOF(MayStop), RTS_EVENT.EVT_DenyStop);
+    ok[2] := NOT SysCallbackUnregister(INDEXOF(MayStop), EVENT_START);
+    take := FALSE;
+END_IF
+IF back THEN
+    ok[3] := SysCallbackUnregister(INDEXOF(MayStop), RTS_EVENT.EVT_DenyStop);
+    back := FALSE;
+END_IF
+END_PROGRAM
+"""
+"""Functions that the program registers."""
+
+
+def check_registered(plc: Controller, run: Callable[[], None]) -> None:
+    """Lets events call the functions of REGISTERED. `run`: lets the program run for a cycle at least."""
+    stop_done, start_done = 0x10004, 0x10002
+    plc.write({"Main.take": True})
+    run()
+    assert plc.read("Main.ok")[:3] == [True] * 3
+    plc.write({"door_open": True})
+    with pytest.raises(DeviceError, match="the door is open"):
+        plc.stop()
+    plc.write({"door_open": False})
+    plc.stop()
+    assert plc.read("heard") == [1, stop_done, 0, 2, 0, 0]
+    plc.start()
+    assert plc.read("heard") == [2, start_done, 0, 2, 0, 0]
+    plc.write({"door_open": True, "Main.back": True})
+    run()
+    plc.stop()
+    assert plc.read("heard") == [3, stop_done, 0, 2, 0, 0] and plc.read("Main.ok")[3]
+    plc.reset("warm")  # ends all of it
+    plc.start()
+    plc.stop()
+    assert plc.read("heard")[0] == 0

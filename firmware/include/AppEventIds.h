@@ -41,6 +41,10 @@ enum {
     EVT_TaskException = 0x800C8, /* of a task that failed; only functions of the program are called, in the task */
 };
 
+/* In the function table of an image: identifier of a function that the program registers for events, without its number,
+ * which is 1 to 0x7FFF. */
+enum { IEC_CALLBACK = 0x07D00000 };
+
 enum { EVTPARAMID_CmpApp = 1 };
 
 /* The application that an event is about. */

@@ -9,6 +9,11 @@
  *
  *   event_answer(BOOL):BOOL     TRUE denies
  *   event_reason(LWORD, ...)    words for the denial, IEC_REASON_WORDS * 8 characters at most
+ *
+ * Functions in the table under IEC_CALLBACK and a number are called on the events that the program registers them for:
+ *
+ *   event_register(UDINT event, UDINT function, BOOL on):BOOL    until the variables of the program end
+ *   event_current():UDINT                                        the event that calls
  */
 #ifndef IECEVENTS_H
 #define IECEVENTS_H

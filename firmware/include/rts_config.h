@@ -354,6 +354,10 @@
 #ifndef IEC_EVENTS
 #define IEC_EVENTS 0
 #endif
+/* Functions that a program may register for events (SysCallbackRegister) at a time: 4 bytes of RAM each. */
+#ifndef IEC_CALLBACKS
+#define IEC_CALLBACKS 4
+#endif
 /* Calls of a program that main carries out (CmpAppCalls.h) at a time, and bytes of data that each has room for, a multiple
  * of 32: the more, the fewer calls a long file takes. 48 bytes of RAM and the data for each. It needs HAS_CmpAppCalls in
  * cmp_list.c and one of EVENT_MAX_CALLBACKS. 0: no flash for it, and a program that needs one is refused. */

@@ -10,7 +10,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from event_functions import PROGRAM, EndlessFunctions
+from event_functions import PROGRAM, REGISTERED, EndlessFunctions, check_registered
 
 from plctool import connect
 from plctool.device import Plc
@@ -43,3 +43,12 @@ def test_power_off_and_on_calls_functions_of_start_and_stop(plc: Plc, plcrt: Plc
     with connect(f"tcp:{plcrt.tcp}") as again:
         eventually(lambda: again.read("Main.n") > 0)
         assert again.read("heard[1]", "heard[2]", "heard[3]") == {"heard[1]": 1, "heard[2]": 1, "heard[3]": 0}
+
+
+def test_functions_that_the_program_registers_are_called(plc: Plc, tool) -> None:
+    plc.flash(Path(tool.build("registered", REGISTERED)))
+
+    def run() -> None:
+        eventually(lambda: not plc.read("Main.take") and not plc.read("Main.back"))
+
+    check_registered(plc, run)

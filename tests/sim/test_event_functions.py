@@ -11,7 +11,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from event_functions import PROGRAM, EndlessFunctions
+from event_functions import PROGRAM, REGISTERED, EndlessFunctions, check_registered
 
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -41,3 +41,10 @@ class TestSimulator(EndlessFunctions):
         assert isinstance(plc, Simulator)
         while not condition():
             plc.run_cycles(1)
+
+
+def test_functions_that_the_program_registers_are_called(tmp_path: Path) -> None:
+    source = tmp_path / "registered.st"
+    source.write_text(REGISTERED)
+    with Simulator.from_sources(source) as plc:
+        check_registered(plc, lambda: plc.run_cycles(1))

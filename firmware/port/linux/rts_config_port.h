@@ -37,6 +37,7 @@
 #define ONLINE_CHANGE 1
 #define IEC_LOG_BURST 32
 #define IEC_EVENTS 1
+#define IEC_CALLBACKS 16
 #define SETTINGS 1
 #define APP_CALLS 32
 #define APP_CALL_DATA 4096

@@ -36,6 +36,7 @@
 #endif
 #define IEC_LOG_BURST 16
 #define IEC_EVENTS 1
+#define IEC_CALLBACKS 16
 #define SETTINGS 1
 #define APP_CALLS 32
 #define APP_CALL_DATA 2048

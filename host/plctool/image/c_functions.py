@@ -23,6 +23,8 @@ _FUNCTIONS = {
         log_add(UDINT,UDINT,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD):BOOL  352  480""",
     "IecEvents": """
         event_answer(BOOL):BOOL                             32    48
+        event_current():UDINT                               16    16
+        event_register(UDINT,UDINT,BOOL):BOOL               64    80
         event_reason(LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD,LWORD):BOOL  160  192""",
     "CmpAppCalls": """
         call_put(DINT,UDINT,LWORD,LWORD,LWORD,LWORD):BOOL  112   160

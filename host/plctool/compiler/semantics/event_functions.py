@@ -5,14 +5,27 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
+import zlib
 from collections.abc import Iterator
 
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, FunctionInfo, PouSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax.diagnostics import did_you_mean
-from plctool.compiler.typed.nodes import Call, CallStatement, Const, EventFunction, Pos, Pou, PouKind
+from plctool.compiler.typed.nodes import (
+    Call,
+    CallStatement,
+    Const,
+    Direction,
+    EventFunction,
+    Expr,
+    Place,
+    Pos,
+    Pou,
+    PouKind,
+)  # fmt: skip
 from plctool.core import lib
-from plctool.iec.types import BOOL
+from plctool.iec.types import BOOL, DWORD
 
 EVENTS = (
     "EVT_PrepareStart", "EVT_StartDone", "EVT_PrepareStop", "EVT_StopDone", "EVT_PrepareReset", "EVT_ResetDone",
@@ -69,8 +82,41 @@ def declare_event_functions(world: World) -> list[EventFunction]:
             else:
                 place = f"{other.pou.pos.file}, line {other.pou.pos.line}"
                 _error(world, symbol, f"{event} calls {other.name} already ({place}); let that call {symbol.decl.name}")
-    world.pous += [function.pou for function in found.values()]
-    return list(found.values())
+    functions = [*found.values(), *_registered(world)]
+    world.pous += [function.pou for function in functions]
+    return functions
+
+
+def number_of(name: str) -> int:
+    """The number that INDEXOF gives for a function: an INT, the same after each change of the program."""
+    return zlib.crc32(name.casefold().encode()) % 0x7FFF + 1
+
+
+def may_be_registered(info: FunctionInfo) -> bool:
+    """True if events can call the function: without parameters, or as CoDeSys 2.3 has them."""
+    inputs = [v.type for v, direction in info.parameters if direction is Direction.INPUT]
+    return len(inputs) == len(info.parameters) and inputs in ([], [DWORD] * 3) and info.result in _RESULTS[len(inputs)]
+
+
+_RESULTS = {0: (None, BOOL, ERROR), 3: (None, DWORD, ERROR)}
+_INDEXOF = re.compile(r"\bINDEXOF\s*\(\s*(\w+)\s*\)", re.IGNORECASE)
+
+
+def _registered(world: World) -> Iterator[EventFunction]:
+    """The functions that INDEXOF names, so that the program can register them."""
+    sources = {s.path: s for s in (world.scope_of(symbol).source for symbol in world.names.pou_symbols())}
+    wanted = {name.casefold() for source in sources.values() for name in _INDEXOF.findall(source.text)}
+    numbers = dict[int, str]()
+    for symbol in world.names.functions() if wanted else ():
+        name = symbol.decl.name
+        info = world.declared.function(symbol, {}) if name.casefold() in wanted else None
+        if info is None or not may_be_registered(info):
+            continue  # INDEXOF says what is wrong
+        number = number_of(name)
+        if number in numbers:
+            _error(world, symbol, f"{name} and {numbers[number]} have the same number; rename one of them")
+        numbers[number] = name
+        yield EventFunction(int(lib.IEC_CALLBACK) + number, name, _caller(world, f"INDEXOF_{name}", info))
 
 
 def _error(world: World, symbol: PouSymbol, message: str) -> None:
@@ -118,12 +164,23 @@ def _caller(world: World, event: str, info: FunctionInfo) -> Pou:
     answers = world.declared.function(answer, {})
     assert answers is not None
     pou = Pou(event, PouKind.FUNCTION, pos)
-    called = Call(info.pou, [], info.result or NOTHING, pos)
-    if info.result is None:
+    called = Call(info.pou, _arguments(world, info, pos), info.result or NOTHING, pos)
+    if info.result != BOOL:
         pou.body = [CallStatement(called, pos), _call(answers, Const(0, BOOL, pos), pos)]
     else:
         pou.body = [_call(answers, called, pos)]
     return pou
+
+
+def _arguments(world: World, info: FunctionInfo, pos: Pos) -> list[Expr | Place | None]:
+    """The event, a filter and an owner, for a function as in CoDeSys 2.3."""
+    if not info.parameters:
+        return []
+    current = world.names.unit("event_current__", library=True)
+    assert isinstance(current, PouSymbol)
+    function = world.declared.function(current, {})
+    assert function is not None
+    return [Call(function.pou, [], DWORD, pos), Const(0, DWORD, pos), Const(0, DWORD, pos)]
 
 
 def _call(answers: FunctionInfo, answer: Call | Const, pos: Pos) -> CallStatement:

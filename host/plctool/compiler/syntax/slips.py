@@ -152,7 +152,6 @@ REFUSED = {
 
 REFUSED_CALLS = {
     "BITADR": "a bit has no address of its own here; use the variable itself, or ADR and a bit number",
-    "INDEXOF": "a POU has no number here; call it by its name",
     **dict.fromkeys(
         ("__XADD", "__COMPARE_AND_SWAP", "TEST_AND_SET", "TESTANDSET", "SYSCPUTESTANDSET"),
         "there is no reading and writing in one step that other tasks cannot interrupt; let one task alone write it",

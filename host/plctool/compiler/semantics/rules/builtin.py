@@ -10,6 +10,7 @@ from collections.abc import Callable
 from plctool.compiler.base.missing_names import known_name_like
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import convert, elementary, error_value, place_of, settle
+from plctool.compiler.semantics.event_functions import may_be_registered, number_of
 from plctool.compiler.semantics.generics import bounds_of
 from plctool.compiler.semantics.rules import intrinsics
 from plctool.compiler.semantics.rules.arguments import packed, packed_and_pointed_to, size_of
@@ -48,6 +49,7 @@ from plctool.iec.types import (
     BYTE,
     DINT,
     ELEMENTARY,
+    INT,
     LINT,
     UDINT,
     ULINT,
@@ -284,6 +286,7 @@ def _ask(c: Checker, name: str, node: ast.Expr, target: Place | None, pos: Pos) 
 # ---- calls by name ----
 
 _PLACES = ("__POUNAME", "__POSITION")
+_INDEX = "INDEXOF"
 _FUNCTIONS = intrinsics.FUNCTIONS | _ON_VARIABLES
 
 
@@ -293,6 +296,8 @@ def find_built_in(c: Checker, name: str) -> Callable[[ast.Call, Type | None], Ex
         return lambda node, expected: of_variable(c, name, node, expected)
     if name in _PLACES:
         return lambda node, expected: _place(c, name, node)
+    if name == _INDEX:
+        return lambda node, _: _function_number(c, node)
     if name in INFORMATION_FUNCTIONS:
         return lambda node, _: information(c, name, node)
     function = _FUNCTIONS.get(name)
@@ -312,12 +317,13 @@ def _applied(c: Checker, name: str, function: BuiltIn, node: ast.Call, expected:
 
 def is_built_in(name: str) -> bool:
     """True for a function that the compiler knows itself; conversions are not among them."""
-    return any(name.upper() in known for known in (_FUNCTIONS, _OF_VARIABLES, _PLACES, QUERIES, INFORMATION_FUNCTIONS))
+    known_here = (_FUNCTIONS, _OF_VARIABLES, _PLACES, (_INDEX,), QUERIES, INFORMATION_FUNCTIONS)
+    return any(name.upper() in known for known in known_here)
 
 
 def built_in_names() -> list[str]:
     """Returns the functions that the compiler knows itself, but for conversions and what begins with _."""
-    known_here = (_FUNCTIONS, _OF_VARIABLES, INFORMATION_FUNCTIONS)
+    known_here = (_FUNCTIONS, _OF_VARIABLES, (_INDEX,), INFORMATION_FUNCTIONS)
     return sorted(name for known in known_here for name in known if not name.startswith("_"))
 
 
@@ -329,6 +335,24 @@ def _place(c: Checker, name: str, node: ast.Call) -> Expr:
     pou = c.scope.source.stem if c.scope.pou is None else c.scope.pou.name
     text = pou if name == "__POUNAME" else f"Line {pos.line}, Column {pos.column}"
     return Const(text, StringType(max(len(text), 1)), pos)
+
+
+def _function_number(c: Checker, node: ast.Call) -> Expr:
+    """`INDEXOF(Name)`: the number of a function that events may call (event_functions.py)."""
+    given = node.args[0].value if len(node.args) == 1 else None
+    symbol = c.world.names.own_unit(given.name.casefold()) if isinstance(given, ast.Name) else None
+    if not isinstance(symbol, PouSymbol) or symbol.keyword is not ast.Unit.FUNCTION:
+        return c.error(
+            node.pos, "arguments", "INDEXOF takes the name of a FUNCTION of the program that events may call"
+        )
+    info = c.world.declared.function(symbol, {})
+    if info is not None and not may_be_registered(info):
+        message = (
+            f"no event can call {symbol.decl.name}: it takes no inputs and has the result BOOL or none, or it takes"
+            " 3 inputs of type DWORD and has the result DWORD or none"
+        )
+        return c.error(node.pos, "arguments", message)
+    return Const(number_of(symbol.decl.name), INT, c.pos(node.pos))
 
 
 def function_hint(c: Checker, name: str) -> str:
