@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "AppState.h"
+#include "CanopenDeviceDriver.h"
 #include "CmpIoMgrEmbedded.h"
 #include "CmpLog.h"
 #include "SysAtomic.h"
@@ -249,17 +250,25 @@ static RTS_UI8 canopen_free(RTS_I32 number)
 
 /* ---- states: what the library calls, from tasks ---- */
 
-static RTS_UI8 state_of(const CANOPEN_LINE *line, RTS_UI8 node)
+/* The number of this controller on a network as a device, 0: it is none. */
+static RTS_UI8 get_device_node(RTS_UI32 network)
 {
-    const CANOPEN_DEVICE *device = node <= CANOPEN_MAX_NODE ? CanopenFindNode(line, node) : NULL;
+#if CANOPEN_DEVICE_DATA > 0
+    return IoDrvCanopenDeviceGetNode(network);
+#else
+    RTS_UNUSED(network);
+    return 0;
+#endif
+}
 
-    if (node == 0 || node == line->own_node)
-        return line->was_off ? STATE_NOT_AVAILABLE : STATE_OPERATIONAL;
-    if (device == NULL || !CanopenNodeIsWatched(&device->node))
-        return STATE_UNKNOWN;
-    if (!CanopenNodeIsHeard(&device->node, SysTimeGetMs()))
-        return STATE_NOT_AVAILABLE;
-    switch (device->node.nmt_state) {
+static bool is_own_node(RTS_UI32 network, RTS_UI8 node)
+{
+    return node == 0 || node == all.setup->lines[network].own_node || node == get_device_node(network);
+}
+
+static RTS_UI8 state_of_heartbeat(RTS_UI8 state)
+{
+    switch (state) {
     case NODE_BOOTS:
         return STATE_INIT;
     case NODE_STOPPED:
@@ -271,6 +280,32 @@ static RTS_UI8 state_of(const CANOPEN_LINE *line, RTS_UI8 node)
     default:
         return STATE_UNKNOWN;
     }
+}
+
+static RTS_UI8 own_state(const CANOPEN_LINE *line, RTS_UI32 network)
+{
+    if (line->was_off)
+        return STATE_NOT_AVAILABLE;
+#if CANOPEN_DEVICE_DATA > 0
+    if (get_device_node(network) != 0)
+        return state_of_heartbeat(IoDrvCanopenDeviceGetState());
+#else
+    RTS_UNUSED(network);
+#endif
+    return STATE_OPERATIONAL;
+}
+
+static RTS_UI8 state_of(const CANOPEN_LINE *line, RTS_UI32 network, RTS_UI8 node)
+{
+    const CANOPEN_DEVICE *device = node <= CANOPEN_MAX_NODE ? CanopenFindNode(line, node) : NULL;
+
+    if (is_own_node(network, node))
+        return own_state(line, network);
+    if (device == NULL || !CanopenNodeIsWatched(&device->node))
+        return STATE_UNKNOWN;
+    if (!CanopenNodeIsHeard(&device->node, SysTimeGetMs()))
+        return STATE_NOT_AVAILABLE;
+    return state_of_heartbeat(device->node.nmt_state);
 }
 
 static RTS_UI32 kernel_of(const CANOPEN_LINE *line)
@@ -287,7 +322,8 @@ static RTS_UI32 canopen_status(RTS_UI8 network, RTS_UI8 node)
 
     if (line == NULL)
         return STATE_UNKNOWN | (RTS_UI32)KERNEL_NO_NETWORK << 16;
-    return state_of(line, node) | (RTS_UI32)line->own_node << 8 | kernel_of(line) << 16;
+    RTS_UI8 own = line->own_node != 0 ? line->own_node : get_device_node(network);
+    return state_of(line, network, node) | (RTS_UI32)own << 8 | kernel_of(line) << 16;
 }
 
 /* ---- emergencies ---- */
@@ -468,10 +504,23 @@ static void end(CALL *call, RTS_I32 result)
         SysAtomicStore(&call->state, SLOT_FREE); /* cancelled meanwhile */
 }
 
-/* This controller itself: it has no object dictionary. */
-static bool is_own(const CALL *call)
+/* This controller itself, which has an object dictionary if it is a device: no frame is sent. */
+static RTS_I32 serve(CALL *call)
 {
-    return call->node == 0 || call->node == all.setup->lines[call->network].own_node;
+#if CANOPEN_DEVICE_DATA > 0
+    const CANOPEN_OBJECT what = {.index = call->index, .sub = call->sub};
+    bool is_write = call->kind == KIND_WRITE;
+    RTS_UI32 size = is_write ? call->size : (RTS_UI32)sizeof(call->data);
+
+    call->sdo.abort = IoDrvCanopenDeviceAccess(call->network, &what, is_write, call->data, &size);
+    call->sdo.done = size;
+    if (call->sdo.abort == 0)
+        return 1;
+    return !is_write && call->sdo.abort == SDO_ABORT_MEMORY ? -KERNEL_OVERFLOW : -KERNEL_OTHER;
+#else
+    call->sdo.abort = SDO_ABORT_NO_DICTIONARY;
+    return -KERNEL_OTHER;
+#endif
 }
 
 static void begin(CALL *call, RTS_UI32 now_ms)
@@ -543,9 +592,8 @@ static void run(CALL *call, RTS_UI32 now_ms)
             end(call, -KERNEL_BUS_OFF);
         } else if (call->kind == KIND_NMT) {
             command(call, now_ms);
-        } else if (is_own(call)) {
-            call->sdo.abort = SDO_ABORT_NO_DICTIONARY;
-            end(call, -KERNEL_OTHER);
+        } else if (is_own_node(call->network, call->node)) {
+            end(call, serve(call));
         } else {
             begin(call, now_ms);
         }

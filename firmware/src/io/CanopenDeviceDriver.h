@@ -6,6 +6,7 @@
 #ifndef CANOPENDEVICEDRIVER_H
 #define CANOPENDEVICEDRIVER_H
 
+#include "CanopenObject.h"
 #include "IoConfig.h"
 
 /* When main has something to do without a frame [ns], INT64_MAX: never. */
@@ -17,5 +18,14 @@ RTS_RESULT IoDrvCanopenDeviceSet(const IoConfigConnector *connector, RTS_UI32 pa
                                  const RTS_UI8 *data);
 RTS_RESULT IoDrvCanopenDeviceGet(const IoConfigConnector *connector, RTS_UI32 parameter, RTS_UI32 bit, RTS_UI32 bits,
                                  RTS_UI8 *data);
+
+/* The number of the device on a network, 0: there is none; its state as a heartbeat has it. From any context. */
+RTS_UI8 IoDrvCanopenDeviceGetNode(RTS_UI32 network);
+RTS_UI8 IoDrvCanopenDeviceGetState(void);
+
+/* From main: reads or writes an object as a manager does. An abort code, 0: done; SDO_ABORT_NO_DICTIONARY: this controller
+ * is no device on the network. `*size`: bytes to be written, or the room for what is read, and then the bytes of it. */
+RTS_UI32 IoDrvCanopenDeviceAccess(RTS_UI32 network, const CANOPEN_OBJECT *what, bool is_write, RTS_UI8 *data,
+                                  RTS_UI32 *size);
 
 #endif

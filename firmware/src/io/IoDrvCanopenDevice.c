@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "CMUtils.h"
+#include "CanopenAccess.h"
 #include "CanopenDevice.h"
 #include "CanopenDeviceDriver.h"
 #include "CanopenDevicePdo.h"
@@ -439,6 +440,42 @@ RTS_RESULT IoDrvCanopenDeviceGet(const IoConfigConnector *connector, RTS_UI32 pa
     memset(data, 0, (bits + 7) / 8);
     copy_bits(data, 0, memory, bit, bits);
     return ERR_OK;
+}
+
+/* ---- the program of this controller ---- */
+
+RTS_UI8 IoDrvCanopenDeviceGetNode(RTS_UI32 network)
+{
+    return device.is_running && network == device.network ? device.slave.node : 0;
+}
+
+RTS_UI8 IoDrvCanopenDeviceGetState(void)
+{
+    return device.slave.state;
+}
+
+static RTS_UI32 access_object(const CANOPEN_OBJECT *object, bool is_write, RTS_UI8 *data, RTS_UI32 *size)
+{
+    if (is_write && object->where == CANOPEN_PROGRAM_OBJECT)
+        return SDO_ABORT_STATE; /* no program replaces itself */
+    if (is_write)
+        return CanopenAccessWrite(&device.slave, object, data, *size, SysTimeGetMs());
+    return object->size <= *size ? CanopenAccessRead(&device.slave, object, data, size) : SDO_ABORT_MEMORY;
+}
+
+RTS_UI32 IoDrvCanopenDeviceAccess(RTS_UI32 network, const CANOPEN_OBJECT *what, bool is_write, RTS_UI8 *data,
+                                  RTS_UI32 *size)
+{
+    CANOPEN_OBJECT object;
+    RTS_UI32 abort = SDO_ABORT_NO_DICTIONARY;
+
+    if (device.is_running && network == device.network)
+        abort = CanopenDictFind(&device.slave, what->index, what->sub, &object);
+    if (abort == 0)
+        abort = access_object(&object, is_write, data, size);
+    if (abort != 0)
+        *size = 0;
+    return abort;
 }
 
 /* ---- requests from the PC ---- */
