@@ -57,11 +57,11 @@ X(IoDrvModbus)
 #if HAS_IecCan
 X(IecCan)
 #endif
-#if HAS_IoDrvCanopen
-X(IoDrvCanopen)
-#endif
 #if HAS_IoDrvCanopenDevice
 X(IoDrvCanopenDevice)
+#endif
+#if HAS_IoDrvCanopen
+X(IoDrvCanopen)
 #endif
 #if HAS_CmpForce
 X(CmpForce)
