@@ -31,7 +31,7 @@ EVENTS = (
     "EVT_PrepareStart", "EVT_StartDone", "EVT_PrepareStop", "EVT_StopDone", "EVT_PrepareReset", "EVT_ResetDone",
     "EVT_PrepareDownload", "EVT_DownloadDone", "EVT_CreateBootprojectDone", "EVT_DenyStartBootproject",
     "EVT_PrepareStartBootproject", "EVT_StartBootprojectDone", "EVT_DenyStart", "EVT_DenyStop",
-    "EVT_TaskException",
+    "EVT_PrepareOnlineChange", "EVT_OnlineChangeDone", "EVT_TaskException",
 )  # fmt: skip
 """Those of AppEventIds.h that happen while the program has its values."""
 
@@ -46,15 +46,12 @@ ALIASES = {
 """Names in older systems."""
 
 _EARLY = "it happens before the program has its initial values; write EVT_PrepareStartBootproject"
-_NO_ONLINE_CHANGE = "there is no online change; write EVT_PrepareDownload"
 _NO_LOGIN = "no event says that a tool logs in or out"
 NOT_CALLED = {
     "EVT_LoadBootprojectDone": _EARLY,
     "EVT_DenyLoadBootproject": _EARLY,
     "EVT_PrepareLoadBootproject": _EARLY,
     "EVT_AllBootprojectsLoaded": _EARLY,
-    "EVT_PrepareOnlineChange": _NO_ONLINE_CHANGE,
-    "EVT_OnlineChangeDone": _NO_ONLINE_CHANGE,
     "EVT_PrepareExit": "write FB_Exit",
     "EVT_CmpApp_Exception": "a program that has failed is not called; write EVT_TaskException",
     "OnInit": "write FB_Init, or EVT_PrepareStart",
