@@ -130,9 +130,9 @@ def watch(
     is said, and the program goes on."""
     if project_of(args) is None:
         raise UsageError("--watch is for a project; name its folder.", "usage")
-    from plctool.compiler.front import Trees
+    from plctool.compiler.tree_cache import trees_of_user
 
-    seen, trees = None, Trees()
+    seen, trees = None, trees_of_user()
     while True:
         now = _state_of(args)
         if now != seen:

@@ -21,6 +21,7 @@ from plctool.compiler.semantics.assertions import FAILED, LIVE, NUMBER, Assertio
 from plctool.compiler.semantics.statement_marks import StatementMarks
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.syntax.warnings import ALL_WARNINGS, WarningOptions
+from plctool.compiler.tree_cache import trees_of_user
 from plctool.controller import ExceptionInfo
 from plctool.core import lib
 from plctool.debug.symbols import SourceLine
@@ -117,6 +118,7 @@ class TestProgram:
                 io=description,
                 libraries=imported,
                 dialect=system,
+                trees=trees_of_user(),
                 information=files.information,
             )
         self.sources += [*io_sources(description), *library_sources(imported)]
