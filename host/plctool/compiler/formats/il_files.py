@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from plctool.compiler.base.source import Source
-from plctool.compiler.formats.instruction_list import translate
-from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError
 from plctool.compiler.formats.text import Chunk, Findings, Part, Place, Text
 from plctool.compiler.syntax.plain_text import plain_text
 
@@ -48,6 +46,9 @@ def has_lists(text: str) -> bool:
 
 def statements(text: str, plain: str, span: tuple[int, int], at: Place, findings: Findings) -> list[Part]:
     """What stands in place of a list of instructions that begins at a place; only a line end after an error."""
+    from plctool.compiler.formats.instruction_list import translate  # late: few texts have lists
+    from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError
+
     start, end = span
     body = Body()
     try:

@@ -15,12 +15,9 @@ from plctool.compiler.base.source import Finding, Piece, Source
 from plctool.compiler.formats import (
     automation_studio,
     beremiz,
-    codesys2,
     global_lists,
     il_files,
     object_text,
-    plcopen,
-    twincat,
     twincat_projects,
     unreadable,
 )
@@ -46,14 +43,20 @@ def _structured_text(path: str, text: str) -> list[Source]:
 
 
 def _export(path: str, text: str) -> list[Source]:
+    from plctool.compiler.formats import codesys2  # late, as are the other readers that few programs need
+
     return [codesys2.read_export(path, text)]
 
 
 def _twincat(path: str, text: str) -> list[Source]:
+    from plctool.compiler.formats import twincat
+
     return [twincat.read_object(path, text)]
 
 
 def _xml(path: str, text: str) -> list[Source]:
+    from plctool.compiler.formats import plcopen
+
     return plcopen.read_project(path, text)
 
 
@@ -241,6 +244,8 @@ def _is_source(path: Path, root: Path) -> bool:
     check_inside(path, root)
     if suffix != ".xml":
         return True
+    from plctool.compiler.formats import plcopen
+
     with path.open("rb") as file:
         return _has_sources(path, file.read(plcopen.HEAD))
 
@@ -248,7 +253,11 @@ def _is_source(path: Path, root: Path) -> bool:
 def _has_sources(path: Path, data: bytes) -> bool:
     """Whether a file, of which this is at least the beginning, is one."""
     suffix = path.suffix.lower()
-    return suffix in SUFFIXES or (suffix == ".xml" and plcopen.is_project(decode(data[: plcopen.HEAD])))
+    if suffix != ".xml":
+        return suffix in SUFFIXES
+    from plctool.compiler.formats import plcopen
+
+    return plcopen.is_project(decode(data[: plcopen.HEAD]))
 
 
 def _is_text(path: Path, root: Path) -> bool:
