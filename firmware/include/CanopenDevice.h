@@ -17,6 +17,7 @@ typedef enum {
     CANOPEN_ERROR_LATE = 4,      /* an RPDO */
     CANOPEN_ERROR_SHORT = 8,     /* an RPDO */
     CANOPEN_ERROR_BUS = 16,
+    CANOPEN_ERROR_COLLISION = 32, /* another device has our number; until a reset */
 } CANOPEN_ERROR;
 
 /* A device whose first fields are set boots. False: its table cannot be used. */

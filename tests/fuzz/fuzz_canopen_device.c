@@ -30,6 +30,9 @@ static const CANOPEN_OBJECT objects[] = {
     {0x1000, 0, CANOPEN_UNSIGNED32, CANOPEN_ACCESS_READ, CANOPEN_CONSTANT, 4, 0x195},
     {0x1018, 0, CANOPEN_UNSIGNED8, CANOPEN_ACCESS_READ, CANOPEN_CONSTANT, 1, 4},
     {0x1018, 1, CANOPEN_UNSIGNED32, CANOPEN_ACCESS_READ, CANOPEN_CONSTANT, 4, 7},
+    {0x1F50, 1, CANOPEN_DOMAIN, CANOPEN_ACCESS_WRITE, CANOPEN_PROGRAM_OBJECT, 1, PROGRAM_DATA},
+    {0x1F51, 1, CANOPEN_UNSIGNED8, CANOPEN_ACCESS_READ | CANOPEN_ACCESS_WRITE, CANOPEN_PROGRAM_OBJECT, 1,
+     PROGRAM_CONTROL},
     {0x2000, 0, CANOPEN_UNSIGNED16, CANOPEN_ACCESS_READ | CANOPEN_ACCESS_TPDO, CANOPEN_IN_VALUES, 2, 0},
     {0x2001, 0, CANOPEN_BOOLEAN, CANOPEN_ACCESS_READ | CANOPEN_ACCESS_WRITE | CANOPEN_ACCESS_RPDO, CANOPEN_IN_VALUES, 1,
      2},
@@ -38,6 +41,48 @@ static const CANOPEN_OBJECT objects[] = {
     {0x2003, 0, CANOPEN_VISIBLE_STRING, CANOPEN_ACCESS_READ | CANOPEN_ACCESS_WRITE, CANOPEN_IN_VALUES, TEXT_SIZE,
      VALUES - TEXT_SIZE - 1},
 };
+/* ---- a program: its bytes come in order and fit ---- */
+
+static RTS_UI32 program_size;
+static bool is_downloading;
+
+static RTS_UI32 begin_program(bool has_size, RTS_UI32 size)
+{
+    program_size = 0;
+    is_downloading = !has_size || size < 1000;
+    return is_downloading ? 0 : SDO_ABORT_MEMORY;
+}
+
+static RTS_UI32 write_program(const RTS_UI8 *data, RTS_UI32 size)
+{
+    volatile RTS_UI8 last = size > 0 ? data[size - 1] : 0; /* all of it can be read */
+
+    FUZZ_CHECK(is_downloading && size <= CANOPEN_DEVICE_SDO);
+    (void)last;
+    program_size += size;
+    return program_size > 500 ? SDO_ABORT_HARDWARE : 0;
+}
+
+static RTS_UI32 end_program(void)
+{
+    FUZZ_CHECK(is_downloading);
+    is_downloading = false;
+    return program_size < 20 ? SDO_ABORT_LENGTH : 0;
+}
+
+static RTS_UI32 command_program(RTS_UI8 command)
+{
+    return command > PROGRAM_CLEAR ? SDO_ABORT_VALUE : (RTS_UI32)CANOPEN_REPLIES_LATER;
+}
+
+static void read_program(RTS_UI32 place, RTS_UI8 *data, RTS_UI32 *size)
+{
+    FUZZ_CHECK(place != PROGRAM_DATA && *size <= CANOPEN_DEVICE_SDO);
+    memset(data, (int)place, *size);
+}
+
+static const CANOPEN_PROGRAM program = {begin_program, write_program, end_program, command_program, read_program};
+
 static const CANOPEN_PDO_SETTING rpdos[] = {
     {.cob = 0x200, .of_node = 1, .type = 255, .count = 2, .map = {0x20010001, 0x20020020}},
     {.cob = 0x300, .of_node = 1, .type = 1, .count = 1, .map = {0x20020020}},
@@ -136,6 +181,10 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
          SDO(0x1B, 'h', 'i', 0, 0, 0, 0, 0)},
         {SDO(0xC6, 0x03, 0x20, 0, 8, 0, 0, 0), SDO(0x01, 1, 2, 3, 4, 5, 6, 7), SDO(0x82, 8, 0, 0, 0, 0, 0, 0),
          SDO(0xD9, 0, 0, 0, 0, 0, 0, 0)},
+        {SDO(0xC6, 0x50, 0x1F, 1, 21, 0, 0, 0), SDO(0x01, 1, 2, 3, 4, 5, 6, 7), SDO(0x02, 8, 9, 1, 2, 3, 4, 5),
+         SDO(0x83, 1, 2, 3, 4, 5, 6, 7), SDO(0xC1, 0, 0, 0, 0, 0, 0, 0), SDO(0x2F, 0x51, 0x1F, 1, 1, 0, 0, 0)},
+        {SDO(0x21, 0x50, 0x1F, 1, 21, 0, 0, 0), SDO(0x00, 1, 2, 3, 4, 5, 6, 7), SDO(0x10, 8, 9, 1, 2, 3, 4, 5),
+         SDO(0x01, 1, 2, 3, 4, 5, 6, 7)},
         {SDO(0xA4, 0x03, 0x20, 0, 5, 0, 0, 0), SDO(0xA3, 0, 0, 0, 0, 0, 0, 0), SDO(0xA2, 1, 5, 0, 0, 0, 0, 0),
          SDO(0xA1, 0, 0, 0, 0, 0, 0, 0)},
         {SDO(0x23, 0x00, 0x18, 1, 0x85, 1, 0, 0xC0), SDO(0x2F, 0x00, 0x1A, 0, 0, 0, 0, 0),
@@ -187,6 +236,7 @@ static void begin(void)
     now_ms = 0xFFFFF000; /* it wraps */
     is_full = false;
     slave.send = take_frame;
+    slave.program = &program;
     slave.objects = objects;
     slave.object_count = RTS_COUNT(objects);
     slave.values = values;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +23,13 @@ from plctool.sim import Simulator
 
 TPDO, SDO, SDO_REQUEST, HEARTBEAT, EMCY = 0x180 + NODE, 0x580 + NODE, 0x600 + NODE, 0x700 + NODE, 0x80 + NODE
 OWN_NODE = 0x8001
+FRAME_NS = 300_000  # the longest frame at 500 kbit/s, with its pause
 START, STOP, PREOPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x82
 
 
 class SimNetwork:
     """What masters of python canopen use of a network: each frame is on the simulated bus before they look for a reply.
-    `lose`: numbers of frames, sent or received, that get lost; `double`: that come twice."""
+    `lose`: numbers of frames, sent or received, that get lost; `double`: that come twice; `late`: 2 s later."""
 
     def __init__(self, plc: Simulator) -> None:
         self.plc = plc
@@ -35,9 +37,12 @@ class SimNetwork:
         self.count = 0
         self.lose: set[int] = set()
         self.double: set[int] = set()
+        self.late: set[int] = set()
 
     def _times(self) -> int:
         self.count += 1
+        if self.count in self.late:
+            self.plc.run_for(2000)
         return 0 if self.count in self.lose else 2 if self.count in self.double else 1
 
     def send_message(self, can_id: int, data: Any, remote: bool = False) -> None:
@@ -153,6 +158,37 @@ def test_short_rpdo_is_not_used_and_reported_once(plc: Simulator) -> None:
     assert frames(plc, EMCY) == [bytes(8)]
 
 
+def test_device_with_our_number_is_reported_once(plc: Simulator) -> None:
+    for data in (b"\0", b"\5", b"\5"):
+        plc.can_send(HEARTBEAT, data)
+        plc.run_for(20)
+    assert frames(plc, EMCY) == [b"\x50\x81\x11\0\0\0\0\0"]
+    assert [e.text for e in plc.log()].count(f"Another CANopen device has number {NODE}") == 1
+    nmt(plc, RESET_COMMUNICATION)
+    plc.can_receive()
+    plc.can_send(HEARTBEAT + 1, b"\5")
+    plc.run_for(20)
+    assert frames(plc, EMCY) == [], "another number"
+
+
+def test_synchronous_values_keep_their_sync_during_a_block_transfer(plc: Simulator) -> None:
+    """A master writes one block transfer after the other without a pause, and sends SYNC each 10 ms."""
+    nmt(plc, START)
+    segments = [bytes([number | (0x80 if number == 15 else 0), *b"a recipe"[:7]]) for number in range(1, 16)]
+    begin = bytes([0xC2, 0x02, 0x22, 0, 100, 0, 0, 0])
+    sent: list[int] = []
+    for _ in range(50):
+        plc.can_send(0x80)
+        for data in (begin, *segments, bytes([0xC1 | 5 << 2, 0, 0, 0, 0, 0, 0, 0])):
+            plc.can_send(SDO_REQUEST, data)
+        plc.run_for(10)
+        got = plc.can_receive()
+        sent += [f.time_ns for f in got if f.id == 0x280 + NODE]
+        assert [f.data[0] for f in got if f.id == SDO] == [0xA4, 0xA2, 0xA1]
+    assert len(sent) == 25, "after each second SYNC"
+    assert all(abs(b - a - 20_000_000) <= FRAME_NS for a, b in pairwise(sent))
+
+
 def test_late_rpdo_is_reported(plc: Simulator) -> None:
     client_of(SimNetwork(plc)).download(0x1400, 5, (50).to_bytes(2, "little"))
     nmt(plc, START)
@@ -165,9 +201,9 @@ def test_late_rpdo_is_reported(plc: Simulator) -> None:
     assert frames(plc, EMCY) == [bytes(8)]
 
 
-@pytest.mark.parametrize("wrong", ["lose", "double"])
+@pytest.mark.parametrize("wrong", ["lose", "double", "late"])
 @pytest.mark.parametrize("block", [False, True])
-def test_one_frame_lost_or_doubled_never_makes_wrong_data(plc: Simulator, wrong: str, block: bool) -> None:
+def test_one_frame_lost_doubled_or_late_never_makes_wrong_data(plc: Simulator, wrong: str, block: bool) -> None:
     """Each frame of a transfer in turn: it ends well, or the value is the previous one."""
     before, text = b"as it was", b"a recipe of several segments, up to a hundred bytes of it, and yet more of them"
 

@@ -59,6 +59,20 @@ def test_timer_sends_sync_in_its_period_whatever_the_tasks_do(tmp_path: Path) ->
         assert all(abs(b - a - 5_000_000) <= FRAME_NS for a, b in pairwise(times))
 
 
+def test_sync_is_in_time_beside_a_bus_full_of_a_download(tmp_path: Path) -> None:
+    """Frames of 29 bits, as a download has them, take nine tenths of the bus."""
+    with of(tmp_path, CYCLIC + BY_SYNC) as plc:
+        plc.run_for(500)
+        plc.can_receive()
+        for _ in range(200):
+            for number in range(16):  # 4.3 ms
+                plc.can_send(0x1F400000 + number, bytes(8), extended=True)
+            plc.run_for(5)
+        times = [f.time_ns for f in plc.can_receive() if f.id == SYNC]
+        assert len(times) == 200
+        assert all(abs(b - a - 5_000_000) <= FRAME_NS for a, b in pairwise(times))
+
+
 def test_tasks_run_at_each_sync_and_at_the_end_of_each_window(tmp_path: Path) -> None:
     with of(tmp_path, CYCLIC + BY_SYNC + BY_WINDOW) as plc:
         plc.run_for(500)

@@ -212,6 +212,16 @@ def test_nodes_are_regained_after_bus_off(plc: Simulator) -> None:
     assert outputs(plc, "kernel", "CONFIRM", "STATE") == (True, 0)
 
 
+def test_bus_may_go_off_again_and_again(plc: Simulator) -> None:
+    for number in range(50):
+        plc.fault("Bus", "cut", 40)
+        plc.run_for(120 + number * 7)
+        assert not plc.read("Valves.ok"), number
+        plc.fault("Bus", "cut", 0)
+        plc.run_for(5000)
+        assert plc.read("Valves.ok"), number
+
+
 def test_kernel_state_is_that_of_the_network(plc: Simulator) -> None:  # C405-25
     give(plc, "kernel", ENABLE=True)
     assert outputs(plc, "kernel", "CONFIRM", "STATE") == (True, 0)

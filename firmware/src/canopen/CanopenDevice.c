@@ -23,6 +23,7 @@ enum {
     EMCY_LATE = 0x8250,
     EMCY_HEARTBEAT = 0x8130,
     EMCY_BUS = 0x8140,
+    EMCY_COLLISION = 0x8150,
     IS_STOPPING = 2, /* of 1029h */
     IS_NOTHING = 1,
     NODE_SHIFT = 16,
@@ -230,6 +231,8 @@ static RTS_UI32 get_watched_ms(const CANOPEN_SLAVE *slave)
 
 static void take_heartbeat(CANOPEN_SLAVE *slave, RTS_UI32 node, RTS_UI32 now_ms)
 {
+    if (node != 0 && node == slave->node)
+        set_error(slave, CANOPEN_ERROR_COLLISION, true, EMCY_COLLISION);
     if (node == 0 || node != slave->settings.consumer >> NODE_SHIFT || get_watched_ms(slave) == 0)
         return;
     slave->is_watching = true;

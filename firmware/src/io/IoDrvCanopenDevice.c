@@ -20,6 +20,7 @@
 #include "CmpCan.h"
 #include "CmpChecksum.h"
 #include "CmpIoMgrEmbedded.h"
+#include "CmpLog.h"
 #include "SysLock.h"
 #include "SysTarget.h"
 #include "SysTime.h"
@@ -33,6 +34,7 @@ static struct {
     RTS_UI32 network;
     bool is_running;
     bool was_operational;
+    bool has_collision;                /* it was reported */
     RTS_UI8 emergency[EMERGENCY_SIZE]; /* the code of the program */
     RTS_UI16 reported;
     CAN_USER user;
@@ -357,6 +359,16 @@ static void report_emergency(void)
     CanopenDeviceReport(&device.slave, CANOPEN_ERROR_PROGRAM, code);
 }
 
+static void report_collision(void)
+{
+    bool is_there = (device.slave.errors & CANOPEN_ERROR_COLLISION) != 0;
+
+    if (is_there && !device.has_collision)
+        LogAdd(CMPID_IoDrvCanopenDevice, LOG_WARNING, ERR_DUPLICATE, "Another CANopen device has number %u",
+               (unsigned)device.slave.node);
+    device.has_collision = is_there;
+}
+
 /* Inputs count while the network keeps the device in operation. */
 static void note_state(void)
 {
@@ -376,6 +388,7 @@ static void cycle(void)
     if (device.slave.written == 0)
         follow_inputs();
     report_emergency();
+    report_collision();
     CanopenDevicePoll(&device.slave, now_ms);
     note_state();
     SysTimeWantPass(CanopenDeviceGetWaitMs(&device.slave, now_ms));
