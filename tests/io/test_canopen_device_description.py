@@ -87,6 +87,14 @@ def test_text_is_no_network_variable(tmp_path: Path) -> None:
         compiled(tmp_path, 'read."2101" = "Main.batch"\n', "", write=WRITE.replace('["Main.night"]', '["Main.batch"]'))
 
 
+@pytest.mark.parametrize("name", ["TIME", "DATE", "TOD", "DT", "WSTRING(20)"])
+def test_types_without_an_object_are_refused(tmp_path: Path, name: str) -> None:  # C405-07
+    path = write_device(tmp_path)
+    path.write_text(path.read_text().replace("batch : STRING(20) := 'none'", f"batch : {name}"))
+    with pytest.raises(CompileError, match="no object of CANopen can be"):
+        compile_sources([path])
+
+
 def test_eds_is_the_same_for_the_same_image_and_has_no_doubts(tmp_path: Path) -> None:
     image = parse_image(compiled(tmp_path))
     text = eds_of_image(image, [], "app.eds")
