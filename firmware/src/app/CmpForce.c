@@ -20,20 +20,20 @@
 #include "SysAtomic.h"
 #include "SysLock.h"
 
-/* A value that is where it always is. */
+/* A value of 1, 2 or 4 bytes that is where it always is. */
 typedef struct {
     RTS_UI8 *at;
-    RTS_UI32 low, high;
+    RTS_UI32 value;
 } PUT;
 
 #define NO_TASK 0xFFFFFFFFu
 
-/* The puts are in the order of their sizes, those of 4 bytes first; if they are odd, the last one is there twice. */
-enum { OF_4, OF_8, OF_2, OF_1, SIZES };
+enum { LARGEST_PUT = 4 };
 
+/* The puts are in the order of their sizes, the largest first. If those are odd, the last one of them is there twice. */
 static struct {
-    RTS_UI32 puts_of[SIZES];
-    bool has_others; /* than those of 4 bytes */
+    RTS_UI32 puts_of[LARGEST_PUT + 1]; /* by size */
+    bool has_others;                   /* than the largest ones */
     PUT puts[FORCE_MAX + 1];
     RTS_UI32 count;
     RTS_UI32 serial;
@@ -113,36 +113,33 @@ static RTS_NOINLINE void search_and_put(RTS_UI32 task, const FORCED_VALUE *force
 
 /* ---- the cycle ---- */
 
-#define PUT_ALL_OF(row, type, value)                         \
-    for (left = force.puts_of[row]; left != 0; left--, to++) \
-    *(volatile type *)(void *)to->at = (type)(value)
-
 static RTS_NOINLINE void put_others(RTS_UI32 task)
 {
-    const PUT *to = &force.puts[force.puts_of[OF_4]];
-    RTS_UI32 left, i;
+    const PUT *to = &force.puts[force.puts_of[LARGEST_PUT]];
+    RTS_UI32 i;
 
-    PUT_ALL_OF(OF_8, RTS_UI64, (RTS_UI64)to->high << 32 | to->low);
-    PUT_ALL_OF(OF_2, RTS_UI16, to->low);
-    PUT_ALL_OF(OF_1, RTS_UI8, to->low);
+    for (i = force.puts_of[2]; i != 0; i--, to++)
+        *(volatile RTS_UI16 *)(void *)to->at = (RTS_UI16)to->value;
+    for (i = force.puts_of[1]; i != 0; i--, to++)
+        *(volatile RTS_UI8 *)to->at = (RTS_UI8)to->value;
     for (i = 0; i < force.count; i++) {
         if (force.list[i].is_searched)
             search_and_put(task, &force.list[i]);
     }
 }
 
-/* Before and after the code of each task. At most some us for 16 values, unless pointers lead to them. */
+/* Before and after the code of each task. At most some us for 16 values, unless they are searched. */
 static void put_all(RTS_UI32 task, const IEC_CONTEXT *context)
 {
     RTS_UI32 lock = RTS_ONE_CORE ? 0 : SysLockEnter();
-    RTS_UI32 left = force.puts_of[OF_4];
+    RTS_UI32 left = force.puts_of[LARGEST_PUT];
     const PUT *to = force.puts;
 
     RTS_UNUSED(context);
     if (left != 0) {
         do { /* in pairs and counted down: less than four instructions each on a Cortex-M3 */
-            *(volatile RTS_UI32 *)(void *)to[0].at = to[0].low;
-            *(volatile RTS_UI32 *)(void *)to[1].at = to[1].low;
+            *(volatile RTS_UI32 *)(void *)to[0].at = to[0].value;
+            *(volatile RTS_UI32 *)(void *)to[1].at = to[1].value;
             to += 2;
         } while ((left -= 2) != 0);
     }
@@ -180,7 +177,7 @@ static bool needs_search(const APP_PLACE *place)
 {
     RTS_UI32 i;
 
-    if (place->pointers > 0 || place->mask != PLACE_ALL_BITS || is_copied(place))
+    if (place->pointers > 0 || place->mask != PLACE_ALL_BITS || place->size > LARGEST_PUT || is_copied(place))
         return true;
     for (i = 0; i < force.count; i++) {
         if (may_overlap(&force.list[i].place, place))
@@ -227,37 +224,29 @@ static void remove_place(const APP_PLACE *place)
     force.count--;
 }
 
-static RTS_UI32 append_put(const FORCED_VALUE *forced, RTS_UI32 sorted)
-{
-    PUT *put = &force.puts[sorted];
-
-    put->at = AppGetAreaAddress(forced->place.area, forced->place.offset[0], forced->place.size);
-    put->low = (RTS_UI32)forced->value;
-    put->high = (RTS_UI32)(forced->value >> 32);
-    return sorted + 1;
-}
-
-/* Sorts what is not searched by its size. */
 static void sort_puts(void)
 {
-    static const RTS_UI8 sizes[SIZES] = {4, 8, 2, 1};
-    RTS_UI32 sorted = 0;
-    RTS_UI32 row, before, i;
+    PUT *to = force.puts;
+    RTS_UI32 size, i;
 
-    for (row = 0; row < SIZES; row++) {
-        before = sorted;
+    for (size = LARGEST_PUT; size != 0; size /= 2) {
+        const PUT *first = to;
         for (i = 0; i < force.count; i++) {
-            if (!force.list[i].is_searched && force.list[i].place.size == sizes[row])
-                sorted = append_put(&force.list[i], sorted);
+            const FORCED_VALUE *forced = &force.list[i];
+            if (forced->is_searched || forced->place.size != size)
+                continue;
+            to->at = AppGetAreaAddress(forced->place.area, forced->place.offset[0], size);
+            to->value = (RTS_UI32)forced->value;
+            to++;
         }
-        if (row == OF_4) {
-            force.has_others = sorted != force.count;
-            if ((sorted & 1) != 0) {
-                force.puts[sorted] = force.puts[sorted - 1];
-                sorted++;
+        if (size == LARGEST_PUT) {
+            force.has_others = to != first + force.count;
+            if ((to - first) % 2 != 0) {
+                *to = to[-1];
+                to++;
             }
         }
-        force.puts_of[row] = sorted - before;
+        force.puts_of[size] = (RTS_UI32)(to - first);
     }
 }
 
