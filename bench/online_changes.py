@@ -109,7 +109,5 @@ def main() -> None:
     print(f"\nonline change on plcrt, a task of 1 ms, {INSTANCES} instances grow and move, and as many pointers")
     print(f"  pause for moving 1 000 instances: {pause} us; in all {seconds:.2f} s")
     lines, edits, pauses = measure_edits()
-    print(
-        f"  {lines} lines in a file for each block, one edited: runs after {min(edits):.2f} s at best, {max(edits):.2f} s at most"
-    )
+    print(f"  {lines} lines in {BLOCKS + 1} files, one edited: runs after {min(edits):.2f} to {max(edits):.2f} s")
     print(f"  pause when nothing moves: {min(pauses)} to {max(pauses)} us; one of less than 1 ms loses no cycle")
