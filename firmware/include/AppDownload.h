@@ -36,4 +36,16 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal);
 RTS_RESULT AppDownloadChange(APP_REFUSAL *refusal);
 void AppDownloadAbort(void);
 
+/* With BOOT_ON_DEMAND: AppDownloadEnd, but the application is not what boots, and nothing about it is in a record: after the
+ * power was off the previous one runs, with its own retain variables. So it does when the next download begins, which
+ * needs the room of this one. Without a previous one nothing boots. */
+RTS_RESULT AppDownloadTry(APP_REFUSAL *refusal);
+
+bool AppDownloadTriesAll(void); /* a setting wants it of each download that says nothing of it */
+bool AppDownloadIsTried(void);  /* the application is one of AppDownloadTry */
+
+/* Makes the application what boots; ERR_OK if it is already. ERR_APP_NOT_LOADED; ERR_CALL_AGAIN within an event;
+ * ERR_APP_CREATE_BOOTPROJECT_FAILED: the flash cannot be written, and the previous one still boots. */
+RTS_RESULT AppCreateBootProject(void);
+
 #endif

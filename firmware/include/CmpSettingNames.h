@@ -13,6 +13,8 @@
 /* clang-format off */
 SETTING_CHOICE(BootStart, "CmpApp", "Bootproject.Start", "always|never|clean",
                "whether the program starts at power-up; clean: not after an exception or crash, until a user starts it")
+SETTING_CHOICE(BootOnDownload, "CmpApp", "CreateBootprojectOnDownload", "yes|no",
+               "whether a download is the boot project at once; no: when 'plctool boot' makes it one")
 SETTING_NUMBER(Watchdog, "CmpIecTask", "Watchdog", 0, 0, 5000,
                "longest cycle of a task that has no watchdog [ms]; 0: as built, 5000 on plcrt and 2000 on boards")
 SETTING_NUMBER(MaxLoad, "CmpSchedule", "MaxProcessorLoad", 0, 0, 6400,

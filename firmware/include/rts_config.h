@@ -326,6 +326,12 @@
 #define ONLINE_CHANGE 0
 #endif
 
+/* 1: a downloaded program may run without being the boot project, until a tool makes it one (AppDownloadTry); 32 bytes of RAM.
+ * 0: no flash for it, and each download is the boot project. */
+#ifndef BOOT_ON_DEMAND
+#define BOOT_ON_DEMAND 0
+#endif
+
 /* How long an online change waits for a cycle to end, in which no other one begins [ms]. */
 #ifndef ONLINE_CHANGE_WAIT_MS
 #define ONLINE_CHANGE_WAIT_MS 200

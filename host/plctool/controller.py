@@ -142,7 +142,8 @@ class ProgramStopped(DeviceError):
 @dataclass(frozen=True)
 class PlcStatus:
     """`state` is "run", "halted", "stop", "exception" or "none"; `image_crc` is 0 without application. `forced`: the
-    names of the variables that are forced. `forbidden`: the operations that the program forbids now, of OPERATIONS."""
+    names of the variables that are forced. `forbidden`: the operations that the program forbids now, of OPERATIONS.
+    `boots`: it is what starts at power-up."""
 
     state: AppState
     image_crc: int
@@ -150,18 +151,21 @@ class PlcStatus:
     exception: ExceptionInfo | None
     forced: list[str] = field(default_factory=list)
     forbidden: list[str] = field(default_factory=list)
+    boots: bool = True
 
 
 @dataclass(frozen=True)
 class FlashResult:
     """`skipped`: the controller had this very image already. `seconds` is the time the transfer took. `persistent`:
-    what became of PERSISTENT values, None if the symbols of one of the programs are missing."""
+    what became of PERSISTENT values, None if the symbols of one of the programs are missing. `boots`: it is what starts
+    at power-up."""
 
     bytes: int
     seconds: float
     skipped: bool
     state: AppState
     persistent: KeptChanges | None = None
+    boots: bool = True
 
 
 @dataclass(frozen=True)
@@ -270,7 +274,8 @@ class Controller(ABC):
             now = self._started(now)
         if now.image_crc != crc:
             raise went_down()
-        return FlashResult(len(data), seconds, skipped, now.state, persistent)
+        boots = bool(now.operating_state & lib.OS_BOOTPROJECT_VALID)
+        return FlashResult(len(data), seconds, skipped, now.state, persistent, boots)
 
     def change(
         self,
@@ -437,7 +442,8 @@ class Controller(ABC):
         exception = self._explain(status.image_crc, status.exception) if status.exception else None
         forced = list(self._named_forces(status.image_crc)) if status.operating_state & lib.OS_FORCE_ACTIVE else []
         forbidden = [name for bit, name in enumerate(OPERATIONS) if status.forbidden >> bit & 1]
-        return PlcStatus(status.state, status.image_crc, status.image_size, exception, forced, forbidden)
+        boots = bool(status.operating_state & lib.OS_BOOTPROJECT_VALID)
+        return PlcStatus(status.state, status.image_crc, status.image_size, exception, forced, forbidden, boots)
 
     def check_running(self) -> None:
         """Raises ProgramStopped when the application stopped with an exception."""

@@ -644,6 +644,32 @@ RTS_RESULT AppDownloadChange(APP_REFUSAL *refusal)
 }
 #endif
 
+#if BOOT_ON_DEMAND
+RTS_RESULT AppDownloadTry(APP_REFUSAL *refusal)
+{
+    RTS_RESULT result = AppDownloadEnd(refusal);
+
+    fakes.tried = result == ERR_OK;
+    return result;
+}
+
+bool AppDownloadTriesAll(void)
+{
+    return false;
+}
+
+bool AppDownloadIsTried(void)
+{
+    return fakes.tried;
+}
+
+RTS_RESULT AppCreateBootProject(void)
+{
+    fakes.tried = false;
+    return ERR_OK;
+}
+#endif
+
 /* ---- password ---- */
 
 #if COMM_PASSWORD

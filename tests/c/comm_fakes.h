@@ -56,6 +56,7 @@ typedef struct {
 
     RTS_UI8 image[FAKE_IMAGE_SIZE];
     bool download_open;
+    bool tried;
     RTS_UI32 download_total;
     RTS_UI32 download_crc;
     RTS_UI32 download_offset;

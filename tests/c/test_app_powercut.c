@@ -38,11 +38,35 @@ static void prepare(const GEOMETRY *g)
 }
 
 static RTS_RESULT story_result;
-static bool packed; /* application 2 comes packed */
+static bool packed;                           /* application 2 comes packed */
+static enum { BOOTS, TRIED, MADE_BOOT } kind; /* how application 2 comes */
+
+static RTS_RESULT download_to_try(const APP_BYTES *image)
+{
+    APP_REFUSAL refusal;
+    RTS_RESULT result = send_part(image, image->size);
+
+    return result == ERR_OK ? AppDownloadTry(&refusal) : result;
+}
+
+static RTS_RESULT try_program(void)
+{
+    RTS_RESULT result = download_to_try(&images[2]);
+
+    if (result == ERR_OK)
+        result = AppStartApplication();
+    if (result == ERR_OK)
+        result = SimAdvance(ms(5000));
+    if (result == ERR_OK)
+        result = AppStopApplication();
+    return result == ERR_OK && kind == MADE_BOOT ? AppCreateBootProject() : result;
+}
 
 static RTS_RESULT try_story(void)
 {
-    RTS_RESULT result = packed ? download_packed(&images[2]) : download_by_canopen(&images[2]);
+    RTS_RESULT result = kind != BOOTS ? try_program()
+                        : packed      ? download_packed(&images[2])
+                                      : download_by_canopen(&images[2]);
 
     if (result == ERR_OK)
         result = AppStartApplication();
@@ -146,6 +170,36 @@ static void sweep(const GEOMETRY *g)
     }
     printf("     program size %2u, erased 0x%02X, sector %4u: %u operations\n", (unsigned)g->program_size, g->erased,
            (unsigned)g->sector_size, (unsigned)operations);
+}
+
+/* Application 1 also has its own retain variables after it. */
+static void a_program_that_is_tried_is_gone_after_any_cut(void)
+{
+    static const GEOMETRY g = {8, 0xFF, 512};
+    RTS_UI32 operations;
+    RTS_UI32 mode;
+    RTS_UI32 k;
+
+    prepare(&g);
+    kind = TRIED;
+    operations = count_operations();
+    for (mode = SIM_CUT_BEFORE; mode <= SIM_CUT_TORN; mode++) {
+        for (k = 1; k <= operations + 1; k++) { /* the last one comes after all of them */
+            CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            SimFlashCut(k, mode);
+            CHECK_EQUAL(SimCall(story, NULL), k <= operations ? SIM_POWER_CUT : ERR_OK);
+            SimFlashPowerOff();
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) >= 100 + 600);
+            CHECK_EQUAL(check_whole(), 1);
+            check_can_be_flashed_again();
+        }
+    }
+    printf("     tried: %u operations\n", (unsigned)operations);
+    kind = MADE_BOOT;
+    sweep(&g);
+    kind = BOOTS;
 }
 
 static void every_cut_leaves_the_old_or_the_new_application(void)
@@ -379,6 +433,7 @@ int main(void)
     RUN(the_same_holds_for_packed_downloads);
     RUN(the_first_download_can_be_cut_anywhere);
     RUN(an_origin_reset_can_be_cut_anywhere);
+    RUN(a_program_that_is_tried_is_gone_after_any_cut);
     RUN(cuts_go_on_for_ever);
     return test_result();
 }

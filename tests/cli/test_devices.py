@@ -110,6 +110,7 @@ def test_what_is_no_image_exits_2(tool: Any, plc: FakePlc, scratch: Path) -> Non
 def test_status_without_application(tool: Any, plc: FakePlc) -> None:
     assert tool("status", *PORT, "--json").json == {
         "state": "none", "image_crc": None, "exception": None, "program": None, "forced": [], "forbidden": [],
+        "boot_project": None,
     }  # fmt: skip
     assert tool("status", *PORT).out == "state: none\n"
 

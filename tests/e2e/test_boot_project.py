@@ -73,3 +73,40 @@ def test_a_flash_that_another_firmware_laid_out_is_said_on_stderr(tool, plcrt, c
     process = plcrt.process
     process.send_signal(signal.SIGTERM)
     assert "plcrt: Flash laid out by another firmware" in process.stderr.read()
+
+
+def test_a_program_that_is_tried_is_gone_after_a_power_cut_unless_it_is_made_the_boot_project(tool, plcrt, counter):
+    other = tool.build("other", "PROGRAM Main VAR n : DINT; END_VAR n := n + 2; END_PROGRAM")
+    third = tool.build("third", "PROGRAM Main VAR n : DINT; END_VAR n := n + 3; END_PROGRAM")
+    port = ("--port", plcrt.port)
+    tool.ok("flash", *port, str(counter))
+    for image in (other, third):  # the second one takes the room of the first
+        assert tool.ok("flash", *port, "--no-boot", str(image))["boot_project"] is False
+        assert state(tool, plcrt) == ("run", crc_of(tool, image))
+        assert tool.ok("status", *port)["boot_project"] is False
+    assert "boot" in tool("status", *port).out
+    plcrt.stop(signal.SIGKILL)
+    plcrt.start()
+    assert state(tool, plcrt) == ("run", crc_of(tool, counter))
+    tool.ok("flash", *port, "--no-boot", str(other))
+    assert tool.ok("boot", *port)["boot_project"] is True
+    plcrt.stop(signal.SIGKILL)
+    plcrt.start()
+    assert state(tool, plcrt) == ("run", crc_of(tool, other))
+
+
+def test_a_setting_says_whether_a_download_is_the_boot_project(tool, plcrt, counter, tmp_path):
+    settings = tmp_path / "plc.cfg"
+    settings.write_text("[CmpApp]\nCreateBootprojectOnDownload=no\n")
+    tool.ok("settings", "put", "--port", plcrt.port, str(settings))
+    plcrt.stop()
+    plcrt.start()
+    port = ("--port", plcrt.port)
+    assert tool.ok("flash", *port, str(counter))["boot_project"] is False
+    plcrt.stop(signal.SIGKILL)
+    plcrt.start()
+    assert state(tool, plcrt)[0] == "none"
+    assert tool.ok("flash", *port, "--boot", str(counter))["boot_project"] is True
+    plcrt.stop(signal.SIGKILL)
+    plcrt.start()
+    assert state(tool, plcrt)[0] == "run"

@@ -451,7 +451,8 @@ class FakePlc:
         return [bintag.container(lib.TAG_APP_DESCRIPTOR, bintag.Tag(lib.TAG_APP_OPTION, content, shift=2))]
 
     def _status(self, tags: bintag.Tags) -> list[bintag.Tag]:
-        state = struct.pack("<HII", 0, self.state, self.operating)
+        boots = lib.OS_BOOTPROJECT_VALID if self.image else 0
+        state = struct.pack("<HII", 0, self.state, self.operating | boots)
         return [
             bintag.container(
                 lib.TAG_APP_STATUS,

@@ -37,6 +37,7 @@
 #define IEC_LOG_BURST 16
 #define IEC_EVENTS 1
 #define IEC_CALLBACKS 16
+#define BOOT_ON_DEMAND 1
 #define SETTINGS 1
 #define APP_CALLS 32
 #define APP_CALL_DATA 2048

@@ -205,6 +205,9 @@ RTS_RESULT AppBootAgain(void)
     RTS_RESULT result;
 
     AppUnload();
+    AppCommitEndTry(); /* it is not the boot project */
+    if (BOOT_ON_DEMAND && AppCommitGet()->active == SLOT_NONE)
+        return ERR_APP_NOT_LOADED;
     result = load_boot_project(true);
     return result == ERR_OK ? AppStartIfAllowed() : result;
 }

@@ -24,9 +24,15 @@ enum { BEGUN_MAX = 0xFE };
 
 RTS_STATIC_ASSERT(sizeof(APP_SEAL) == FILE_ALIGN, a_seal_is_programmed_at_once);
 
+static RTS_RESULT write_record(const char *text);
+
 static struct {
     FLASH_LOG log; /* its `opened` says whether anything is known */
     COMMIT commit; /* what is in flash, or should be and could not be written */
+#if BOOT_ON_DEMAND
+    bool tried;    /* the active slot has no seal */
+    COMMIT booted; /* what is in flash then */
+#endif
 #if COMM_PASSWORD
     USER_VERIFIER password; /* also when the commit of its record does not count */
 #endif
@@ -126,6 +132,47 @@ RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after)
     return ERR_DEVICE;
 }
 
+/* ---- an image that is tried ---- */
+
+#if BOOT_ON_DEMAND
+void AppCommitTry(RTS_UI32 slot, RTS_UI32 size, RTS_UI32 crc, RTS_UI32 retain_after)
+{
+    state.booted = state.commit;
+    state.tried = true;
+    state.commit.slot[slot] = (COMMIT_SLOT){size, crc, retain_after};
+    state.commit.state[slot] = SLOT_TRIAL;
+    state.commit.active = (RTS_UI8)slot;
+    state.commit.begun = 0;
+}
+
+bool AppCommitIsTried(void)
+{
+    return state.tried;
+}
+
+RTS_RESULT AppCommitSeal(void)
+{
+    RTS_UI32 slot = state.commit.active;
+    const COMMIT_SLOT *image = &state.commit.slot[slot];
+    APP_SEAL seal = {state.commit.number + 1, image->crc, image->retain_after, 0};
+
+    seal.check = AppSealCheck(&seal);
+    if (SysFileWrite(slot, &seal, sizeof seal) != ERR_OK || SysFileClose(slot) != ERR_OK)
+        return ERR_DEVICE;
+    state.commit.number = seal.number;
+    state.tried = false;
+    (void)write_record(""); /* what is known of it; without this record it is a trial, as after a download */
+    return ERR_OK;
+}
+
+void AppCommitEndTry(void)
+{
+    if (state.tried)
+        state.commit = state.booted;
+    state.tried = false;
+}
+#endif
+
 /* ---- records ---- */
 
 static RTS_UI32 record_tag(void)
@@ -220,6 +267,9 @@ void AppCommitOpen(void)
     bool known;
 
     (void)FlashLogOpen(&state.log, FILE_COMMIT);
+#if BOOT_ON_DEMAND
+    state.tried = false;
+#endif
     forget_record();
     forget_password();
     result = read_record();
@@ -245,6 +295,16 @@ void AppCommitTakeBack(RTS_UI32 slot)
     AppCommitOpen();
 }
 
+/* What a record may know. */
+static const COMMIT *in_flash(void)
+{
+#if BOOT_ON_DEMAND
+    if (state.tried)
+        return &state.booted;
+#endif
+    return &state.commit;
+}
+
 /* Writes what has been changed. */
 static RTS_RESULT write_record(const char *text)
 {
@@ -254,8 +314,9 @@ static RTS_RESULT write_record(const char *text)
 
     if (COMMIT_HAS_CAUSE) {
         memset(&record, 0, sizeof record);
-        record.commit = state.commit;
-        record.exception = *AppExceptionGet();
+        record.commit = *in_flash();
+        if (!AppCommitIsTried())
+            record.exception = *AppExceptionGet();
         put_password(&record);
         if (APP_CRASH_TEXT_SIZE > 1)
             memcpy(record.text, text, CMUtlStrNLen(text, sizeof record.text - 1));
@@ -271,6 +332,7 @@ RTS_RESULT AppCommitErase(void)
     const COMMIT before = state.commit;
     RTS_RESULT result;
 
+    AppCommitEndTry();
     forget_record();
     state.commit.number = before.number;
     result = write_record("");
@@ -286,6 +348,7 @@ RTS_RESULT AppCommitRollBack(RTS_UI32 failed, RTS_UI32 retain_after)
     RTS_UI32 other = AppCommitOtherSlot(failed);
     RTS_RESULT result;
 
+    AppCommitEndTry();
     state.commit.active = (RTS_UI8)other;
     state.commit.begun = 0;
     state.commit.state[failed] = SLOT_FAILED;
@@ -303,6 +366,12 @@ RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 changed)
 
     if (before == SLOT_PROVEN || before == changed)
         return ERR_OK;
+    if (AppCommitIsTried()) {
+        if (changed == SLOT_PROVEN) /* what the previous one needs is kept */
+            return ERR_PENDING;
+        state.commit.state[slot] = changed;
+        return ERR_OK;
+    }
     state.commit.state[slot] = changed;
     result = write_record("");
     if (result != ERR_OK && changed != SLOT_FAILED)
@@ -316,14 +385,15 @@ void AppCommitSetDead(const char *text)
 
     *dead = *dead == SLOT_PROVEN ? SLOT_HALTED : SLOT_FAILED;
     state.commit.begun = 0;
-    (void)write_record(text);
+    if (!AppCommitIsTried())
+        (void)write_record(text);
 }
 
 void AppCommitBegin(RTS_UI32 slot)
 {
     RTS_UI8 *begun = &state.commit.state[state.commit.active];
 
-    if (FLASH_READS_FAIL && slot != state.commit.active)
+    if ((FLASH_READS_FAIL && slot != state.commit.active) || AppCommitIsTried())
         return;
     if (*begun == SLOT_HALTED)
         *begun = SLOT_PROVEN;
@@ -334,7 +404,7 @@ void AppCommitBegin(RTS_UI32 slot)
 
 void AppCommitDone(RTS_UI32 slot)
 {
-    if (FLASH_READS_FAIL && slot != state.commit.active)
+    if ((FLASH_READS_FAIL && slot != state.commit.active) || AppCommitIsTried())
         return;
     state.commit.begun = 0;
     if (FlashLogMark(&state.log) != ERR_OK)

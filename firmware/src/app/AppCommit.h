@@ -14,6 +14,7 @@
 #include "AppRecord.h"
 #include "CmpErrors.h"
 #include "CmpStd.h"
+#include "rts_config.h"
 
 /* Finds out what is in flash. If the application failed, it is in that exception again. */
 void AppCommitOpen(void);
@@ -37,6 +38,22 @@ RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot);
 /* Seals the image in `slot`, whose file ends with it: from now on it is what boots, a trial. On ERR_DEVICE what was
  * before still is, and the image is deleted. */
 RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after);
+
+#if BOOT_ON_DEMAND
+/* The image in `slot` counts as AppCommitInstall makes it count, but not in flash: no record is written that knows of it,
+ * and it has not proven itself. It ends with AppCommitSeal, AppCommitEndTry, a rollback, or AppCommitErase. */
+void AppCommitTry(RTS_UI32 slot, RTS_UI32 size, RTS_UI32 crc, RTS_UI32 retain_after);
+bool AppCommitIsTried(void);
+
+/* Seals the image that is tried. On ERR_DEVICE it goes on as it was. */
+RTS_RESULT AppCommitSeal(void);
+
+/* What boots is what counts again. */
+void AppCommitEndTry(void);
+#else
+#define AppCommitIsTried() false
+#define AppCommitEndTry() ((void)0)
+#endif
 
 /* Takes AppCommitInstall back before a record knows of it: the image in `slot` is deleted, and what was before is again. */
 void AppCommitTakeBack(RTS_UI32 slot);

@@ -18,6 +18,7 @@
 #include "AppState.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
+#include "SettingValues.h"
 #include "SysFileFlash.h"
 #include "SysFlash.h"
 #include "Unpack.h"
@@ -27,16 +28,25 @@ static struct {
     RTS_UI32 slot;
     RTS_UI32 size;
     RTS_UI32 crc;
+#if BOOT_ON_DEMAND
+    bool tries; /* the image that is complete is not to boot */
+#endif
 } download;
 
+#if BOOT_ON_DEMAND
+#define IS_TRY download.tries
+#else
+#define IS_TRY false
+#endif
+
 /* Which slot is kept. An application that failed gives way to the previous one now, or that one would be overwritten
- * though it is the newest that runs; it is kept also when it cannot be read now. */
+ * though it is the newest that runs; it is kept also when it cannot be read now. So does one that is only tried. */
 static RTS_UI32 slot_to_keep(void)
 {
     const COMMIT *commit = AppCommitGet();
     RTS_UI32 active = commit->active;
 
-    if (active != SLOT_NONE && commit->state[active] == SLOT_FAILED && AppCanRollBack(active)) {
+    if (active != SLOT_NONE && (commit->state[active] == SLOT_FAILED || AppCommitIsTried()) && AppCanRollBack(active)) {
         AppUnload();
         (void)AppRollBack(active);
         return AppCommitOtherSlot(active);
@@ -53,6 +63,8 @@ RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
     AppDownloadAbort();
     if (CMHasLeftOut())
         return ERR_NOTINITIALIZED;
+    if (AppCommitIsTried() && AppAskStop() != ERR_OK)
+        return ERR_OPERATION_DENIED;
     if (AppCommitResult() != ERR_OK && AppGetSlot() == SLOT_NONE)
         return ERR_DEVICE; /* what is worth keeping is not known */
     slot = AppCommitOtherSlot(slot_to_keep());
@@ -138,6 +150,23 @@ static void put_back(RTS_UI32 failed_slot, bool ran)
         AppCommitTakeBack(failed_slot);
 }
 
+/* Ends the old application; one that is not to boot counts from here on. The old one has not failed then, whatever happens. */
+static void begin_try(const APP_IMAGE *image, bool ran, RTS_UI32 retain_after)
+{
+#if BOOT_ON_DEMAND
+    if (IS_TRY && ran && !AppHasException())
+        (void)AppCommitSetState(AppGetSlot(), SLOT_TRIAL);
+#endif
+    AppUnload();
+#if BOOT_ON_DEMAND
+    if (IS_TRY)
+        AppCommitTry(image->file, image->size, image->crc, retain_after);
+#endif
+    RTS_UNUSED(image);
+    RTS_UNUSED(ran);
+    RTS_UNUSED(retain_after);
+}
+
 /* The checked image takes the place of the old application. */
 static RTS_RESULT replace(const APP_IMAGE *image, APP_REFUSAL *refusal)
 {
@@ -149,13 +178,13 @@ static RTS_RESULT replace(const APP_IMAGE *image, APP_REFUSAL *refusal)
     if (code == NULL)
         return APP_REFUSE(refusal, ERR_NOMEMORY, "There is no executable memory for the code.");
     RetainKeepNone(); /* of the application that was in this slot */
-    result = AppCommitInstall(image->file, image->crc, retain_after);
+    result = IS_TRY ? (RTS_RESULT)ERR_OK : AppCommitInstall(image->file, image->crc, retain_after);
     if (result != ERR_OK) {
         SysFlashReleaseCode(image->file);
         return APP_REFUSE(refusal, result, "The flash cannot be written.");
     }
     ran = AppStopTasks();
-    AppUnload();
+    begin_try(image, ran, retain_after);
     result = AppLoad(image, code, retain_after, refusal);
     if (result == ERR_OK) {
         result = AppInitialise();
@@ -164,7 +193,7 @@ static RTS_RESULT replace(const APP_IMAGE *image, APP_REFUSAL *refusal)
     }
     if (result != ERR_OK)
         put_back(image->file, ran);
-    else
+    else if (!IS_TRY)
         AppPostEvent(EVT_CreateBootprojectDone);
     return result;
 }
@@ -202,7 +231,7 @@ static RTS_RESULT finish_download(TAKE_OVER take, APP_REFUSAL *refusal)
     return result == ERR_OK ? take(&image, refusal) : result;
 }
 
-RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
+static RTS_RESULT end_download(APP_REFUSAL *refusal)
 {
     RTS_RESULT result;
 
@@ -215,6 +244,52 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Download refused: %s", refusal->text);
     return result;
 }
+
+RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
+{
+#if BOOT_ON_DEMAND
+    download.tries = false;
+#endif
+    return end_download(refusal);
+}
+
+#if BOOT_ON_DEMAND
+RTS_RESULT AppDownloadTry(APP_REFUSAL *refusal)
+{
+    download.tries = true;
+    return end_download(refusal);
+}
+
+bool AppDownloadTriesAll(void)
+{
+    return SETTING(BootOnDownload) != 0;
+}
+
+bool AppDownloadIsTried(void)
+{
+    return AppCommitIsTried();
+}
+
+RTS_RESULT AppCreateBootProject(void)
+{
+    RTS_RESULT result;
+
+    AppHandlePendingException();
+    if (AppEventIsPosting())
+        return ERR_CALL_AGAIN;
+    if (AppGetState() == AS_NONE)
+        return ERR_APP_NOT_LOADED;
+    if (!AppCommitIsTried())
+        return ERR_OK;
+    result = AppCommitSeal();
+    LogAdd(CMPID_CmpAppEmbedded, (result == ERR_OK ? LOG_INFO : LOG_ERROR) | LOG_KEPT, result,
+           "Boot project %s, CRC %X", result == ERR_OK ? "created" : "not created", (unsigned)AppGetImage()->crc);
+    if (result != ERR_OK)
+        return ERR_APP_CREATE_BOOTPROJECT_FAILED;
+    AppPostEvent(EVT_CreateBootprojectDone);
+    return ERR_OK;
+}
+#endif
 
 #if ONLINE_CHANGE
 RTS_RESULT AppDownloadChange(APP_REFUSAL *refusal)

@@ -156,7 +156,7 @@ void AppGetStatus(APP_STATUS *status)
         status->op_state |= OS_DOWNLOAD;
     if (AppHasException())
         status->op_state |= OS_EXCEPTION;
-    if (AppCommitGet()->active != SLOT_NONE)
+    if (AppCommitGet()->active != SLOT_NONE && !AppCommitIsTried())
         status->op_state |= OS_BOOTPROJECT_VALID;
 #if BP_MAX > 0
     if (AppBpIsHalted())

@@ -169,6 +169,20 @@ static RTS_RESULT release_force_list(SRV_REQUEST *request, BTAG_WRITER *reply)
 }
 #endif
 
+#if BOOT_ON_DEMAND
+static RTS_RESULT create_boot_project(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UI32 session = 0;
+    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_APP_SESSION, &session);
+
+    if (result == ERR_OK)
+        result = check_app_session(request->client, session);
+    if (result == ERR_OK)
+        write_verdict(reply, AppCreateBootProject());
+    return result;
+}
+#endif
+
 #if SRV_OTHER_CLIENTS || EXCEPT_REGISTERS > 0
 static void append_word(BTAG_WRITER *reply, uintptr_t word)
 {
@@ -556,6 +570,19 @@ static bool is_change(const DOWNLOAD_BLOCK *block)
 #define is_change(block) false
 #endif
 
+#if BOOT_ON_DEMAND
+/* Whether an image is not to boot: a client says so, or else a setting. */
+static bool is_try(const DOWNLOAD_BLOCK *block)
+{
+    if ((block->flags & (DLF_TRY | DLF_WRITEBOOTAPPLICATION)) == 0)
+        return AppDownloadTriesAll();
+    return (block->flags & DLF_TRY) != 0;
+}
+#else
+#define is_try(block) false
+#define AppDownloadTry(refusal) AppDownloadEnd(refusal)
+#endif
+
 static RTS_RESULT take_block(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *block, APP_REFUSAL *refusal)
 {
     RTS_RESULT result = ERR_OK;
@@ -563,6 +590,11 @@ static RTS_RESULT take_block(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *bl
     if (OperationMay(is_change(block) ? OPERATION_ONLINE_CHANGE : OPERATION_DOWNLOAD) != ERR_OK)
         return APP_REFUSE(refusal, ERR_OPERATION_DENIED,
                           "The running program forbids it (PlcOperationControlInstance).");
+#if BOOT_ON_DEMAND && ONLINE_CHANGE
+    if (is_change(block) && AppDownloadIsTried())
+        return APP_REFUSE(refusal, ERR_INVALID_STATE,
+                          "The program is not the boot project; make it one first (plctool boot).");
+#endif
     if (is_anothers(client))
         return APP_REFUSE(refusal, ERR_INVALID_STATE, "Another tool is downloading; try again when it is done.");
     if (block->offset > block->total || block->size > block->total - block->offset)
@@ -586,7 +618,7 @@ static RTS_RESULT install(const DOWNLOAD_BLOCK *block, APP_REFUSAL *refusal)
     if (is_change(block))
         return AppDownloadChange(refusal);
 #endif
-    result = AppDownloadEnd(refusal);
+    result = is_try(block) ? AppDownloadTry(refusal) : AppDownloadEnd(refusal);
     if (result == ERR_OK && (block->flags & DLF_START) != 0)
         (void)AppStartApplication();
     return result;
@@ -630,6 +662,10 @@ static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
     if (block.size == 0)
         BTagWrite32(reply, TAG_CDL_CHANGES, 1);
 #endif
+#if BOOT_ON_DEMAND
+    if (block.size == 0)
+        BTagWrite32(reply, TAG_CDL_TRIES, 1);
+#endif
     if (APP_REFUSAL_TEXT_SIZE > 1 && result != ERR_OK && refusal.text[0] != '\0')
         BTagWriteText(reply, TAG_CDL_REASON, refusal.text, BTagGetRoom(reply) - REASON_OVERHEAD);
     return ERR_OK;
@@ -657,6 +693,9 @@ static const SRV_SERVICE services[] = {
 #endif
 #if EXCEPT_REGISTERS > 0
     {SRV_APP_READ_REGISTERS, RIGHT_VIEW, read_registers},
+#endif
+#if BOOT_ON_DEMAND
+    {SRV_APP_CREATE_BOOTPROJECT, RIGHT_DOWNLOAD, create_boot_project},
 #endif
 #if SRV_OTHER_CLIENTS
     {SRV_APP_DELETE, RIGHT_DOWNLOAD, delete_app},

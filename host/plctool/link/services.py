@@ -279,6 +279,23 @@ def look(session: Session) -> None:
     read_status(session)
 
 
+def create_boot_project(session: Session) -> None:
+    """Makes the application what starts at power-up."""
+    look(session)
+
+    def request() -> bintag.Tags:
+        number = bintag.u32(lib.TAG_APP_SESSION, session.application().session)
+        return session.call(lib.SG_APPLICATION, lib.SRV_APP_CREATE_BOOTPROJECT, [number], SLOW_PATIENCE)
+
+    try:
+        reply = session.recover(request)
+    except DeviceError as error:
+        if error.result != lib.ERR_L7_UNKNOWNCMD:
+            raise
+        return  # each download is the boot project
+    _check_control(reply, "boot project")
+
+
 def stop(session: Session) -> None:
     look(session)
     _check_control(session.recover(partial(_control, session, lib.SRV_APP_STOP)), "stop")
@@ -431,6 +448,7 @@ class Prepared:
     arrived: int
     unpacks: int
     changes: bool = False
+    tries: bool = False
 
 
 def prepare_download(session: Session, image: bytes) -> tuple[Status, Prepared]:
@@ -448,7 +466,8 @@ def _question(image: bytes) -> Request:
 
 def _prepared(answer: bintag.Tags) -> Prepared:
     unpacks = 0 if answer.find(lib.TAG_CDL_UNPACKS) is None else answer.u32(lib.TAG_CDL_UNPACKS)
-    return Prepared(_arrived(answer), unpacks, answer.find(lib.TAG_CDL_CHANGES) is not None)
+    changes, tries = (answer.find(tag) is not None for tag in (lib.TAG_CDL_CHANGES, lib.TAG_CDL_TRIES))
+    return Prepared(_arrived(answer), unpacks, changes, tries)
 
 
 def _position(image: bytes, flags: int, offset: int) -> bintag.Tag:
@@ -470,17 +489,18 @@ def download(
     *,
     start: bool = False,
     change: bool = False,
+    boot: bool | None = None,
 ) -> None:
     """Sends an image; the device checks it and makes it its application, stopped. With `start` the device also starts
     it, unless its firmware is older than `DLF_START`: the status shows that. `change`: it takes the place of the one
-    that runs, between two cycles.
+    that runs, between two cycles. `boot`: whether it is the boot project; None: as a setting of the device says.
 
     Continues an aborted transfer of the same image, also automatically after the channel was lost; `restart`
     begins at the first byte in any case. `progress` is called with the bytes that have arrived. Raises DeviceError with
     the device's reason when it refuses the image; its old application is untouched then. `prepared`: what
     `prepare_download` has just found.
     """
-    transfer = _Transfer(session, image, start, change, progress)
+    transfer = _Transfer(session, image, start, change, boot, progress)
     tries = 0
     while True:
         arrived = transfer.arrived
@@ -513,11 +533,19 @@ class _Transfer:
     was opened, all blocks have been sent."""
 
     def __init__(
-        self, session: Session, image: bytes, start: bool, change: bool, progress: Callable[[int], None]
+        self,
+        session: Session,
+        image: bytes,
+        start: bool,
+        change: bool,
+        boot: bool | None,
+        progress: Callable[[int], None],
     ) -> None:
         self.arrived = 0
         self.sent_all = False
         self._flags = lib.DLF_CHANGE if change else lib.DLF_START if start else 0
+        if boot is not None:
+            self._flags |= lib.DLF_WRITEBOOTAPPLICATION if boot else lib.DLF_TRY
         self._session = session
         self._image = image
         self._progress = progress
@@ -530,6 +558,9 @@ class _Transfer:
             prepared = _prepared(self._session.call(question.group, question.service, question.tags))
         if self._flags & lib.DLF_CHANGE and not prepared.changes:
             raise DeviceError("The firmware of this device knows no online change; download the program.", "no-change")
+        if self._flags & lib.DLF_TRY and not prepared.tries:
+            message = "The firmware of this device makes each download the boot project; flash without --no-boot."
+            raise DeviceError(message, "no-boot")
         self._unpacks = prepared.unpacks
         self._take(prepared.arrived)
         return self.arrived

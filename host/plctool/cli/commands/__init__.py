@@ -54,6 +54,7 @@ GROUPS: dict[str, tuple[Row, ...]] = {
     ),
     "devices": (
         Row("reset", "device", "reset the program; it is stopped afterwards"),
+        Row("boot", "device", "make the program what starts at power-up, after 'flash --no-boot'"),
         Row("cycle", "device", "run one cycle of each task of a stopped program"),
         Row("tasks", "device", "show the times of the tasks"),
         Row("latency", "latency", "show how late the cycles of each task began"),

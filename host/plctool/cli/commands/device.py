@@ -48,6 +48,11 @@ def stop_arguments(command: Parser) -> None:
     command.set_defaults(action=_stop)
 
 
+def boot_arguments(command: Parser) -> None:
+    add_link(command)
+    command.set_defaults(action=_boot)
+
+
 def cycle_arguments(command: Parser) -> None:
     add_link(command)
     command.set_defaults(action=_cycle)
@@ -108,7 +113,10 @@ def _status(args: argparse.Namespace) -> int:
 def status(plc: Plc) -> Document:
     """Returns the state of the program, with the name and version that plc.toml gave it."""
     status = plc.status()
-    return status_document(status) | {"program": program_document(plc) if status.image_crc else None}
+    return status_document(status) | {
+        "program": program_document(plc) if status.image_crc else None,
+        "boot_project": status.boots if status.image_crc else None,
+    }
 
 
 def status_text(document: dict[str, Any]) -> str:
@@ -121,6 +129,8 @@ def status_text(document: dict[str, Any]) -> str:
         task = f" in task {exception['task']}" if exception["task"] else ""
         where = f"{place_text(exception)}{detail_text(exception)}{calls_text(exception)}"
         lines.append(f"exception: {exception['name']}{task}{where}")
+    if document.get("boot_project") is False:
+        lines.append("boot project: another one, or none; 'plctool boot' makes it this program")
     if document["forced"]:
         lines.append(f"forced: {', '.join(document['forced'])}")
     if document["forbidden"]:
@@ -135,6 +145,16 @@ def _start(args: argparse.Namespace) -> int:
 def start(plc: Plc) -> Document:
     """Starts the program; the state that it leads to."""
     plc.start()
+    return status(plc)
+
+
+def _boot(args: argparse.Namespace) -> int:
+    return on_device(args, boot, status_text)
+
+
+def boot(plc: Plc) -> Document:
+    """Makes the program what starts at power-up; the state."""
+    plc.create_boot_project()
     return status(plc)
 
 

@@ -32,6 +32,10 @@ if TYPE_CHECKING:
 def flash_arguments(command: Parser) -> None:
     add_image(command)
     command.add_argument("--no-start", action="store_true", help="do not start it; it starts at the next power-up")
+    command.add_argument(
+        "--boot", action=argparse.BooleanOptionalAction,
+        help="whether it is what starts at power-up; --no-boot: when 'plctool boot' makes it so (default: a setting)",
+    )  # fmt: skip
     command.add_argument("--force", action="store_true", help="send it even if the device has it already")
     command.add_argument(
         "--with-source", nargs="*", type=usable_path, metavar="FILE.st|DIR",
@@ -78,8 +82,9 @@ def _flash(args: argparse.Namespace) -> int:
     def operation(plc: Plc) -> Document:
         with Progress(not args.json) as progress:
             document = flash(
-                plc, args.image, start=not args.no_start, force=args.force, progress=progress.show, announce=announce
-            )
+                plc, args.image, start=not args.no_start, force=args.force, boot=args.boot, progress=progress.show,
+                announce=announce,
+            )  # fmt: skip
         if prepared is not None:
             from plctool.cli.commands.source import store_source
 
@@ -97,8 +102,8 @@ def _change(args: argparse.Namespace, link: Link) -> int:
 
     if len(link.nodes or ()) > 1:
         raise UsageError("--online-change is for one device; name one with --node.", "usage")
-    if args.no_start or args.force or args.with_source is not None:
-        raise UsageError("--online-change goes without --no-start, --force and --with-source.", "usage")
+    if args.no_start or args.force or args.with_source is not None or args.boot is not None:
+        raise UsageError("--online-change goes without --no-start, --force, --no-boot and --with-source.", "usage")
     if args.back and args.watch:
         raise UsageError("--back goes without --watch.", "usage")
     with connect(args) as plc:
@@ -121,6 +126,7 @@ def _flash_several(args: argparse.Namespace, link: Link) -> int:
                 args.image,
                 start=not args.no_start,
                 force=args.force,
+                boot=args.boot,
                 progress=lambda node, done, total: progress.show(done, total, node),
             )
     except KeyboardInterrupt:
@@ -149,23 +155,25 @@ class Interrupted(PlcError):
 
 
 def flash(
-    plc: Controller,
+    plc: Plc,
     image: Path,
     *,
     start: bool = True,
     force: bool = False,
+    boot: bool | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
     announce: Callable[[Sequence[OtherTool]], None] = lambda others: None,
 ) -> Document:
     """Brings an image onto a controller; see `Controller.flash`. `announce` gets the other tools on the line first."""
     others = plc.others()
     announce(others)
-    result = plc.flash(image, start=start, force=force, progress=progress)
+    result = plc.flash(image, start=start, force=force, boot=boot, progress=progress)
     return {
         "bytes": result.bytes,
         "seconds": round(result.seconds, 3),
         "skipped": result.skipped,
         "state": str(result.state),
+        "boot_project": result.boots,
         "others": [vars(other) for other in others],
         "persistent": None if result.persistent is None else vars(result.persistent),
     }
@@ -177,6 +185,7 @@ def flash_several(
     *,
     start: bool = True,
     force: bool = False,
+    boot: bool | None = None,
     progress: Callable[[str, int, int], None] = lambda node, done, total: None,
 ) -> tuple[Document, list[PlcError]]:
     """Brings an image onto several controllers at once. Returns also what went wrong; the document has it by node."""
@@ -190,7 +199,7 @@ def flash_several(
                 raise Interrupted("Interrupted.", "interrupted")
             progress(node, done, total)
 
-        return {"node": node, **flash(plc, image, start=start, force=force, progress=show)}
+        return {"node": node, **flash(plc, image, start=start, force=force, boot=boot, progress=show)}
 
     devices: list[Document] = []
     errors: list[PlcError] = []
@@ -236,6 +245,8 @@ def flash_text(document: dict[str, Any]) -> str:
     size, seconds = document["bytes"], document["seconds"]
     done = "already on the device" if document["skipped"] else f"{size} bytes in {seconds:.2f} s"
     lines = [f"{done}; state: {document['state']}"]
+    if not document["boot_project"]:
+        lines.append("It does not start at power-up; 'plctool boot' makes it the boot project.")
     if document["persistent"]:
         lines += [f"PERSISTENT value lost: {name} {why}" for name, why in document["persistent"]["lost"].items()]
         lines += [f"PERSISTENT value new: {name}" for name in document["persistent"]["new"]]

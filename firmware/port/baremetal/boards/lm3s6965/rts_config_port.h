@@ -8,6 +8,7 @@
 
 #define ONLINE_CHANGE 0
 #define TRACE_BUFFER 0 /* the full configuration has no room for traces in 64 KiB of RAM */
+#define BOOT_ON_DEMAND 0
 #define IEC_EVENTS 0   /* nor for functions of events */
 #define SETTINGS 0     /* nor for settings */
 #define APP_CALLS 0    /* nor for calls of programs, such as files */

@@ -43,6 +43,9 @@
 #ifndef IEC_TASK_HANDLER
 #define IEC_TASK_HANDLER 1
 #endif
+#ifndef BOOT_ON_DEMAND
+#define BOOT_ON_DEMAND 1
+#endif
 #ifndef IEC_EVENTS
 #define IEC_EVENTS 1
 #endif
