@@ -60,10 +60,11 @@ class Platform:
         return [*ZIG, name, *(["-target", self.target] if name == "cc" else [])]
 
 
-# GNU's C library is that of Debian 11 and Ubuntu 20.04; plcrt needs gettid, which came with 2.30.
+# GNU's C library: plcrt needs gettid, which came with 2.30, and with 32 bits functions of 64-bit time, which came with
+# 2.34. Debian 11 and Ubuntu 20.04 have 2.31.
 PLATFORMS = {
     "aarch64-linux": Platform("manylinux_2_31_aarch64", "linux", "aarch64", "aarch64-linux-gnu.2.31", "EM_AARCH64"),
-    "armv7-linux": Platform("manylinux_2_31_armv7l", "linux", "arm", "arm-linux-gnueabihf.2.31", "EM_ARM"),
+    "armv7-linux": Platform("manylinux_2_34_armv7l", "linux", "arm", "arm-linux-gnueabihf.2.34", "EM_ARM"),
     "x86_64-musl": Platform("musllinux_1_2_x86_64", "linux", "x86_64", "x86_64-linux-musl", "EM_X86_64"),
     "aarch64-musl": Platform("musllinux_1_2_aarch64", "linux", "aarch64", "aarch64-linux-musl", "EM_AARCH64"),
     "x86_64-windows": Platform("win_amd64", "windows", "x86_64", "", "pei-x86-64", "_plccore.pyd"),
@@ -82,14 +83,14 @@ def run(*command: str | Path) -> str:
 
 
 def cross_file(platform: Platform) -> str:
-    """A file for meson; nothing of the build is run."""
+    """A file for meson; nothing of the build is run. C libraries have macros that our warnings are not for."""
     return f"""\
 [binaries]
 c = {platform.tool("cc")}
 ar = {platform.tool("ar")}
 exe_wrapper = ['false']
 [built-in options]
-c_args = ['-Wno-c11-extensions']
+c_args = ['-Wno-c11-extensions', '-Wno-sign-compare']
 [properties]
 skip_sanity_check = true
 [host_machine]

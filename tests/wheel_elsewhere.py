@@ -8,6 +8,7 @@ tested, as tests/wheel.py does; for 32-bit Arm, for which PyPI has no llvmlite, 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -113,7 +114,8 @@ class Trial:
 
 def install(wheel: Path, machine: str, site: Path, folder: Path) -> None:
     """With what it needs from PyPI, as pip on that machine would."""
-    platforms = [f"--platform={tag}_{machine}" for tag in ("manylinux_2_31", "manylinux_2_28", "manylinux2014")]
+    tags = ("manylinux_2_34", "manylinux_2_31", "manylinux_2_28", "manylinux2014")
+    platforms = [f"--platform={tag}_{machine}" for tag in tags]
     run([sys.executable, "-m", "pip", "install", "--quiet", "--only-binary=:all:", "--python-version=3.11",
          "--implementation=cp", *platforms, f"--target={site}", str(wheel), "pytest"], folder)  # fmt: skip
 
@@ -144,7 +146,7 @@ def check_module(trial: Trial) -> None:
 
 
 def try_wheel(wheel: Path) -> None:
-    name = wheel.stem.rsplit("manylinux_2_31_", 1)[-1]
+    name = re.sub(r".*linux_\d+_\d+_", "", wheel.stem)
     machine = MACHINES.get(name)
     if machine is None:
         skip(f"{wheel.name} is for a system that QEMU's user mode is not.")

@@ -15,6 +15,8 @@
 #include "port.h"
 #include "rts_config.h"
 
+#include <time.h> /* before linux/errqueue.h, which needs its timespec */
+
 #include <arpa/inet.h>
 #include <errno.h>
 #include <ifaddrs.h>
