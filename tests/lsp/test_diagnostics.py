@@ -184,3 +184,38 @@ def statements(folder: Path, path: str, edits: int, seed: int) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_a_check_of_bodies_alone_finds_what_a_whole_check_finds(folder: Path, seed: int) -> None:
     statements(folder, "src/pump.st", 40, seed)
+
+
+def test_a_program_that_no_task_runs_is_still_named_after_an_edit_of_statements(tmp_path: Path) -> None:
+    file = tmp_path / "main.st"
+    file.write_text(
+        "PROGRAM Main\nVAR n : INT; spare : INT; END_VAR\nn := 1;\nEND_PROGRAM\n"
+        "PROGRAM Other\nVAR n : INT; END_VAR\nn := 1;\nEND_PROGRAM\n"
+        "CONFIGURATION C\nRESOURCE R ON PLC\nTASK Fast(INTERVAL := T#10ms, PRIORITY := 1);\n"
+        "PROGRAM P WITH Fast : Main;\nEND_RESOURCE\nEND_CONFIGURATION\n"
+    )
+    project, observer = Project([file], texts := {}), Observer(lambda: None)
+    snapshot = project.snapshot()
+    kept = Kept(observer, snapshot.sources, checked(snapshot, None, observer))
+    texts[str(file)] = file.read_text().replace("n := 1;", "n := 2;\nn := 3;", 1)
+    project.change(str(file))
+    (source,) = project.sources
+    found = kept.check(source)
+    assert found == checked(project.snapshot())
+    assert [d.code for d in found or ()] == ["unused", "unused"]
+
+
+def test_a_body_that_an_abstract_method_gets_is_left_to_the_check_of_all(tmp_path: Path) -> None:
+    file = tmp_path / "main.st"
+    file.write_text(
+        "FUNCTION_BLOCK ABSTRACT A\nMETHOD ABSTRACT M : INT\nEND_METHOD\nEND_FUNCTION_BLOCK\n"
+        "FUNCTION_BLOCK B EXTENDS A\nMETHOD M : INT\nM := 1;\nEND_METHOD\nEND_FUNCTION_BLOCK\n"
+        "PROGRAM Main\nVAR b : B; n : INT; END_VAR\nn := b.M();\nEND_PROGRAM\n"
+    )
+    project, observer = Project([file], texts := {}), Observer(lambda: None)
+    snapshot = project.snapshot()
+    kept = Kept(observer, snapshot.sources, checked(snapshot, None, observer))
+    texts[str(file)] = file.read_text().replace("M : INT\nEND_METHOD", "M : INT\nRETURN;\nEND_METHOD", 1)
+    project.change(str(file))
+    (source,) = project.sources
+    assert kept.check(source) is None

@@ -7,7 +7,7 @@ whole check hold for a new text. The result is shown at once; a whole check late
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from plctool.compiler.base.garbage import no_collection
@@ -90,6 +90,10 @@ def _keyed(declarations: Iterable[ast.Declaration]) -> dict[_Key, ast.PouDecl]:
     return found
 
 
+def _with_bodies(declarations: Mapping[_Key, ast.PouDecl]) -> set[_Key]:
+    return {key for key, decl in declarations.items() if decl.body}
+
+
 class Kept:
     """A program as the last whole check without syntax errors has left it, and what that has found."""
 
@@ -133,11 +137,13 @@ class Kept:
             again = self._checked(old, before, _Moved(before.source, before.source))
             self._of_bodies[source.path] = frozenset(again)
         decls = _keyed(after.declarations)
+        if _with_bodies(_keyed(before.declarations)) != _with_bodies(decls):
+            return None  # whether a method has a body belongs to its declaration
         bodies = [(scope, decls.get(self._keys.get(id(decl), ("", "")))) for scope, decl in old]
         if any(
             new is None or bool(new.body) != bool(decl.body) for (_, decl), (_, new) in zip(old, bodies, strict=True)
         ):
-            return None  # whether a method has a body belongs to its declaration
+            return None
         moved = _Moved(before.source, source)
         found = moved.all(d for d in self._found.get(source.path, ()) if not self._is_of_body(d, before))
         found += self._checked([(scope, decl) for scope, decl in bodies if decl is not None], after, moved)
@@ -156,7 +162,7 @@ class Kept:
     def _is_of_body(self, diagnostic: Diagnostic, tree: Tree) -> bool:
         """True for what the check of the bodies of a file reports again."""
         if diagnostic.code == _UNUSED:
-            return _unit_at(tree, diagnostic) is not None
+            return _unit_at(tree, diagnostic) is not None  # else it is about a program that no task runs
         return diagnostic in self._of_bodies[tree.source.path]
 
     def _checked(self, bodies: Sequence[tuple[Scope, ast.PouDecl]], tree: Tree, moved: _Moved) -> list[Diagnostic]:
@@ -221,9 +227,9 @@ def _offset(tree: Tree, diagnostic: Diagnostic) -> int:
 
 
 def _unit_at(tree: Tree, diagnostic: Diagnostic) -> object:
-    """The unit that a diagnostic is in."""
+    """The unit that a diagnostic is in, after its name."""
     token = bisect_right(tree.starts, _offset(tree, diagnostic)) - 1
-    return next((b for b in tree.blocks if b.kind in UNITS and b.first < token <= b.last), None)
+    return next((b for b in tree.blocks if b.kind in UNITS and b.first + 1 < token <= b.last), None)
 
 
 def _broken_lines(tree: Tree) -> list[tuple[int, int]]:
