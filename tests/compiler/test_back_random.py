@@ -6,6 +6,7 @@ import random
 
 import pytest
 from back_support import POS, ProgramBuilder, Running, binary, build, const, load, place, pos
+from shares import share
 
 from plctool.compiler.typed.nodes import (
     AddressOf,
@@ -286,7 +287,7 @@ def outcome(program: TypedProgram, level: int) -> list[tuple[int, object, bytes]
     return found
 
 
-@pytest.mark.parametrize("seed", range(36))
+@pytest.mark.parametrize("seed", share(range(36), 3))
 def test_optimised_programs_do_the_same(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = outcome(Generator(seed).program(), 0)
     assert outcome(Generator(seed).program(), 2) == expected

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from shares import share
 
 from plctool.compiler import compile_sources
 from plctool.core import lib
@@ -275,7 +276,7 @@ def block(number: int, bodies: list[list[Node]]) -> str:
     return f"FUNCTION_BLOCK Block{number}\nVAR\n{VARIABLES}END_VAR\n{counters}{methods}{first}\nEND_FUNCTION_BLOCK\n"
 
 
-@pytest.mark.parametrize(("seed", "level"), [(0, 0), (1, 2), (2, 0), (3, 2)])
+@pytest.mark.parametrize(("seed", "level"), share([(0, 0), (1, 2), (2, 2), (3, 0)], 2))
 def test_the_compiled_body_takes_the_same_way(seed: int, level: int, tmp_path: Path) -> None:
     r = random.Random(seed)
     blocks = [[Writer(r, method).body(3) for method in range(METHODS + 1)] for _ in range(UNITS)]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from checked_program import CheckedProgram, checked
+from shares import share
 
 from plctool.compiler import compile_sources
 from plctool.compiler.base.level import Level
@@ -64,8 +65,10 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> CheckedProgram:
     return checked([folder])
 
 
-@pytest.mark.parametrize("level", [0, 1, 2, 3, "s"])
-@pytest.mark.parametrize("target", WITH_STUBS, ids=lambda target: target.name)
+CASES = [(target, level) for target in WITH_STUBS for level in (0, 2, "s", 1, 3)]
+
+
+@pytest.mark.parametrize(("target", "level"), share(CASES, 2), ids=lambda x: getattr(x, "name", str(x)))
 def test_imports_are_those_of_the_processor(program: CheckedProgram, target: Target, level: Level) -> None:
     image = parse_image(program.built(level, target.name).image)
     found = {external.name: find_c_function(external.name, external.signature) for external in image.externals}

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from shares import share
 
 from plctool.compiler import compile_sources
 from plctool.sim import Simulator
@@ -176,7 +177,7 @@ def outcome(nodes: list[Node]) -> tuple[int, int]:
     return machine.h, machine.fuel
 
 
-@pytest.mark.parametrize(("seed", "level"), [(0, 0), (1, 2), (2, 0), (3, 2), (4, 2)])
+@pytest.mark.parametrize(("seed", "level"), share([(0, 0), (1, 2), (2, 2), (3, 0), (4, 2)], 2))
 def test_the_compiled_body_takes_the_same_way(seed: int, level: int, tmp_path: Path) -> None:
     bodies = [Writer(seed * UNITS + k).body(3) for k in range(UNITS)]
     counters = ", ".join(f"i{depth}" for depth in range(5))

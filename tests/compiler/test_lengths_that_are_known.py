@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from shares import share
 
 from plctool import Simulator
 from plctool.compiler.base.source import Source
@@ -183,7 +184,7 @@ def program(model: Model, kind: str) -> str:
     return f"{UNITS}PROGRAM Main VAR {DECLARATIONS} {rest}\n{model.body}\nEND_PROGRAM"
 
 
-@pytest.mark.parametrize("seed", range(9))
+@pytest.mark.parametrize("seed", share(range(9), 3))
 def test_strings_and_lengths_are_those_of_the_model(seed: int, tmp_path: Path) -> None:
     """The lowering knows the lengths; the optimiser, which takes most of the time, works on some of the programs."""
     model, kind = Model(seed), KINDS[seed % len(KINDS)]

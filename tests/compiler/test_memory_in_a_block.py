@@ -10,6 +10,7 @@ import pytest
 from front_support import main, program
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shares import share
 
 from plctool import Simulator
 from plctool.compiler import compile_sources
@@ -118,7 +119,7 @@ p := ADR(a); q := ADR(list[2]); r REF= b; i := 2;
 """
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", share(range(12), 3))
 def test_a_program_does_the_same_as_without_optimisation(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
 
