@@ -15,5 +15,5 @@ settings.register_profile(
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture],
 )
-settings.register_profile("same", settings.get_profile("new"), derandomize=True, max_examples=100 if WHOLE else 40)
+settings.register_profile("same", settings.get_profile("new"), derandomize=True, max_examples=100 if WHOLE else 20)
 settings.load_profile("same")

@@ -23,7 +23,7 @@ ENOUGH = 20  # cycles of a program that goes on whatever it did
 class BadPrograms(Campaign):
     name = "program"
     promise = "a bad program is stopped with the cause in the log, and the previous one runs at the next start"
-    short = 14
+    short = 10
 
     def cases(self) -> list[Case]:
         cases = []

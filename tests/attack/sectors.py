@@ -19,7 +19,7 @@ PATTERNS = ("FF", "00", "random")
 class Sectors(Campaign):
     name = "sector"
     promise = "a lost sector costs the program that is in it, and nothing else"
-    short = 60
+    short = 30
 
     def cases(self) -> list[Case]:
         return [
