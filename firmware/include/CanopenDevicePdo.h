@@ -33,8 +33,8 @@ void CanopenPdoUnpack(CANOPEN_SLAVE *slave);
 /* From the bus cycle task: sends what has changed or is due. */
 void CanopenPdoSendChanged(CANOPEN_SLAVE *slave, RTS_UI32 now_ms);
 
-/* From main: SYNC has come. */
-void CanopenPdoSync(CANOPEN_SLAVE *slave, RTS_UI32 now_ms);
+/* From main: SYNC has come, with this counter; 0: without one. */
+void CanopenPdoSync(CANOPEN_SLAVE *slave, RTS_UI32 counter, RTS_UI32 now_ms);
 
 /* From main: true if an RPDO with an event timer is late. `wait_ms`: until the next one is, UINT32_MAX: never. */
 bool CanopenPdoIsLate(const CANOPEN_SLAVE *slave, RTS_UI32 now_ms, RTS_UI32 *wait_ms);

@@ -44,8 +44,9 @@ typedef struct {
     RTS_UI32 time;
     RTS_UI16 emcy_inhibit; /* x 100 us */
     RTS_UI16 heartbeat_ms;
-    RTS_UI8 on_error; /* 1029h:1 */
-    RTS_UI8 reserved[3];
+    RTS_UI8 on_error;     /* 1029h:1 */
+    RTS_UI8 sync_counter; /* 1019h: SYNC has a counter up to this one, 0: none */
+    RTS_UI8 reserved[2];
     CANOPEN_PDO_SETTING pdos[CANOPEN_DIRECTIONS][CANOPEN_DEVICE_ROOM(CANOPEN_DEVICE_PDOS)];
 } CANOPEN_SETTINGS;
 
@@ -56,6 +57,7 @@ typedef struct {
     RTS_UI8 size;                     /* bytes of its mapping */
     RTS_UI8 syncs;                    /* since it was sent */
     bool is_sent;                     /* since it is active */
+    bool has_started;                 /* the SYNC with its start value has come */
     bool has_staged;
     RTS_UI32 number;                   /* of receptions */
     RTS_UI32 used;                     /* the reception whose data are in the values */

@@ -56,8 +56,8 @@ typedef struct {
     RTS_UI32 cob; /* bit 31: not used */
     RTS_UI8 type;
     RTS_UI8 count;
-    RTS_UI8 of_node; /* of a default: 1: the node number is added to `cob` */
-    RTS_UI8 reserved;
+    RTS_UI8 of_node;   /* of a default: 1: the node number is added to `cob` */
+    RTS_UI8 start;     /* TPDO: the counter of the SYNC after which it is sent first, 0: of any */
     RTS_UI16 inhibit;  /* x 100 us */
     RTS_UI16 event_ms; /* TPDO: sent at least so often; RPDO: late after so long */
     RTS_UI32 map[CANOPEN_MAPPINGS];

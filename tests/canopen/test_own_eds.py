@@ -20,7 +20,7 @@ def test_eds_of_a_program_passes_the_check(tmp_path: Path, capsys: pytest.Captur
     assert (made.status, made.out) == (0, "mixer.eds written\n")
     checked = run_here(capsys, "canopen", "check", "mixer.eds")
     assert (checked.status, checked.out) == (
-        0, "mixer.eds: Mixer, 51 objects, 4 RPDOs, 4 TPDOs; 0 errors, 0 warnings\n"
+        0, "mixer.eds: Mixer, 52 objects, 4 RPDOs, 4 TPDOs; 0 errors, 0 warnings\n"
     )  # fmt: skip
     assert "ParameterName=Main.temps, element 3" in Path("mixer.eds").read_text()
 

@@ -111,7 +111,7 @@ def test_what_is_not_in_the_eds_does_not_exist(manager: Manager, eds: Eds) -> No
     for index in (0x1002, 0x1404, 0x1804, 0x1A04, 0x2100, 0x2206, 0xFFFF):
         assert index not in eds.objects
         assert manager.abort_of(index, 0) == 0x06020000
-    for index, sub in ((0x1018, 5), (0x1800, 4), (0x1A00, 9), (0x2102, 4), (0x2200, 1)):
+    for index, sub in ((0x1018, 5), (0x1800, 4), (0x1400, 6), (0x1800, 7), (0x1A00, 9), (0x2102, 4), (0x2200, 1)):
         assert eds.entry(index, sub) is None
         assert manager.abort_of(index, sub) == 0x06090011
 

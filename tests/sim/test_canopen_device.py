@@ -145,6 +145,35 @@ def test_synchronous_values_are_of_one_sync(plc: Simulator) -> None:
     assert len(frames(plc, 0x280 + NODE)) == 4, "after each second SYNC"
 
 
+def test_tpdo_waits_for_the_sync_with_its_start_value(plc: Simulator) -> None:
+    sdo = client_of(SimNetwork(plc))
+    for refused in (1, 241, 255):
+        with pytest.raises(SdoAbortedError, match="0x06090030"):
+            sdo.download(0x1019, 0, bytes([refused]))
+    sdo.download(0x1019, 0, b"\x0a")
+    with pytest.raises(SdoAbortedError, match="0x06090030"):
+        sdo.download(0x1801, 6, b"\3")  # it is valid
+    sdo.download(0x1801, 1, (0xC000_0000 | 0x280 + NODE).to_bytes(4, "little"))
+    sdo.download(0x1801, 6, b"\3")
+    sdo.download(0x1801, 1, (0x4000_0000 | 0x280 + NODE).to_bytes(4, "little"))
+    nmt(plc, START)
+    plc.can_receive()
+    after: list[int] = []
+    for counter in (9, 10, 1, 2, 3, 4, 5, 6, 7):
+        plc.can_send(0x80, bytes([counter]))
+        plc.run_for(10)
+        after += [counter] * len(frames(plc, 0x280 + NODE))
+    assert after == [3, 5, 7], "then after each second one"
+    sdo.download(0x1019, 0, b"\0")
+    nmt(plc, PREOPERATIONAL)
+    nmt(plc, START)
+    plc.can_receive()
+    for _ in range(2):
+        plc.can_send(0x80)
+        plc.run_for(10)
+    assert len(frames(plc, 0x280 + NODE)) == 1, "without counters it is not waited for"
+
+
 def test_short_rpdo_is_not_used_and_reported_once(plc: Simulator) -> None:
     nmt(plc, START)
     for _ in range(3):

@@ -159,6 +159,8 @@ static RTS_UI32 check_setting(const CANOPEN_SLAVE *slave, RTS_UI16 index, RTS_UI
         return check_emcy(slave, value);
     case OBJECT_CONSUMER:
         return value >> NODE_SHIFT > CANOPEN_MAX_NODE ? SDO_ABORT_VALUE : 0;
+    case OBJECT_SYNC_COUNTER:
+        return value == 1 || value > CANOPEN_LAST_SYNC_TYPE ? SDO_ABORT_VALUE : 0;
     case OBJECT_ON_ERROR:
         return value > MOST_ON_ERROR ? SDO_ABORT_TOO_HIGH : 0;
     default:

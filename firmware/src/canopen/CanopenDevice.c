@@ -280,7 +280,7 @@ static void take_other(CANOPEN_SLAVE *slave, const CAN_FRAME *frame, RTS_UI32 no
     RTS_UI32 function = frame->id & CANOPEN_FUNCTION_MASK;
 
     if (frame->id == slave->sync_id && frame->id != 0)
-        CanopenPdoSync(slave, now_ms);
+        CanopenPdoSync(slave, slave->settings.sync_counter != 0 && frame->size == 1 ? frame->data[0] : 0, now_ms);
     else if (CanopenPdoIsMine(slave, frame->id))
         note_short(slave);
     else if (frame->id == CANOPEN_SDO_REQUEST + (RTS_UI32)slave->node && serves(slave))

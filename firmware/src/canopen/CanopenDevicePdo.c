@@ -17,6 +17,7 @@ enum {
     KIND = 2,
     INHIBIT = 3,
     EVENT = 5,
+    START = 6,
     INHIBIT_PER_MS = 10,
     DUMMIES = 8, /* data types that fill RPDOs are 1 to 7 */
 };
@@ -137,6 +138,8 @@ RTS_UI32 CanopenPdoGet(const CANOPEN_SLAVE *slave, const CANOPEN_OBJECT *object)
         return pdo->type;
     case INHIBIT:
         return pdo->inhibit;
+    case START:
+        return pdo->start;
     default:
         return pdo->event_ms;
     }
@@ -159,6 +162,11 @@ static RTS_UI32 set_communication(CANOPEN_PDO_SETTING *pdo, RTS_UI32 sub, RTS_UI
             return SDO_ABORT_VALUE;
         pdo->inhibit = (RTS_UI16)value;
         return 0;
+    case START:
+        if (value > CANOPEN_LAST_SYNC_TYPE || (is_valid && value != pdo->start))
+            return SDO_ABORT_VALUE;
+        pdo->start = (RTS_UI8)value;
+        return 0;
     default:
         pdo->event_ms = (RTS_UI16)value;
         return 0;
@@ -173,7 +181,7 @@ static void update(const CANOPEN_SLAVE *slave, const CANOPEN_PDO_SETTING *pdo, C
 
     if (active == run->active)
         return;
-    run->is_sent = run->has_staged = false;
+    run->is_sent = run->has_staged = run->has_started = false;
     run->syncs = 0;
     run->used = SysAtomicLoad(&run->number);
     SysAtomicStore(&run->time_ms, now_ms);
@@ -420,16 +428,26 @@ void CanopenPdoSendChanged(CANOPEN_SLAVE *slave, RTS_UI32 now_ms)
     }
 }
 
-void CanopenPdoSync(CANOPEN_SLAVE *slave, RTS_UI32 now_ms)
+/* True after each `type`-th SYNC, the first of which is the one with the start value. */
+static bool is_turn(const CANOPEN_PDO_SETTING *pdo, CANOPEN_PDO_RUN *run, RTS_UI32 counter)
+{
+    if (pdo->start != 0 && counter != 0 && !run->has_started) {
+        run->has_started = counter == pdo->start;
+        return run->has_started;
+    }
+    return ++run->syncs >= pdo->type;
+}
+
+void CanopenPdoSync(CANOPEN_SLAVE *slave, RTS_UI32 counter, RTS_UI32 now_ms)
 {
     CAN_FRAME frame;
 
     for (RTS_UI32 i = 0; i < slave->pdo_count[CANOPEN_TPDOS]; i++) {
-        RTS_UI32 type = slave->settings.pdos[CANOPEN_TPDOS][i].type;
+        const CANOPEN_PDO_SETTING *pdo = &slave->settings.pdos[CANOPEN_TPDOS][i];
         CANOPEN_PDO_RUN *run = &slave->runs[CANOPEN_TPDOS][i];
-        if (type > CANOPEN_LAST_SYNC_TYPE || !pack(slave, i, &frame))
+        if (pdo->type > CANOPEN_LAST_SYNC_TYPE || !pack(slave, i, &frame))
             continue;
-        if (type == 0 ? has_changed(run, &frame) : ++run->syncs >= type)
+        if (pdo->type == 0 ? has_changed(run, &frame) : is_turn(pdo, run, counter))
             send(slave, run, &frame, now_ms);
     }
 }

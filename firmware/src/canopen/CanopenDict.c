@@ -12,6 +12,7 @@ enum {
     RO = CANOPEN_ACCESS_READ,
     RW = CANOPEN_ACCESS_READ | CANOPEN_ACCESS_WRITE,
     PDO_SUBS = 5,
+    START = 6, /* of a TPDO */
     COB = 1,
     KIND = 2,
     INHIBIT = 3,
@@ -56,6 +57,7 @@ static const CANOPEN_OBJECT fixed[] = {
     SETTING_U32(OBJECT_CONSUMER, 1, consumer),
     SETTING_U16(OBJECT_HEARTBEAT, 0, heartbeat_ms),
     LIVE(OBJECT_IDENTITY, 4, CANOPEN_UNSIGNED32, RO, 4, LIVE_SERIAL),
+    {OBJECT_SYNC_COUNTER, 0, CANOPEN_UNSIGNED8, RW, CANOPEN_SETTING, 1, offsetof(CANOPEN_SETTINGS, sync_counter)},
     U8_CONSTANT(OBJECT_VERIFY, 0, 2),
     SETTING_U32(OBJECT_VERIFY, 1, date),
     SETTING_U32(OBJECT_VERIFY, 2, time),
@@ -168,6 +170,7 @@ bool CanopenDictIsGood(const CANOPEN_SLAVE *slave)
 
 static RTS_UI32 find_pdo(RTS_UI16 index, RTS_UI8 sub, CANOPEN_OBJECT *found)
 {
+    bool is_tpdo = index >= OBJECT_TPDO;
     bool is_mapping = ((index - OBJECT_RPDO) / PDO_SPACE & 1) != 0;
 
     *found = (CANOPEN_OBJECT){index, sub, CANOPEN_UNSIGNED8, RW, CANOPEN_LIVE, 1, is_mapping ? LIVE_MAPPING : LIVE_PDO};
@@ -181,14 +184,14 @@ static RTS_UI32 find_pdo(RTS_UI16 index, RTS_UI8 sub, CANOPEN_OBJECT *found)
     } else if (sub == 0) {
         found->access = RO;
         found->where = CANOPEN_CONSTANT;
-        found->place = PDO_SUBS;
+        found->place = is_tpdo ? START : PDO_SUBS;
     } else if (sub == COB) {
         found->type = CANOPEN_UNSIGNED32;
         found->size = 4;
     } else if (sub == PDO_SUBS || sub == INHIBIT) {
         found->type = CANOPEN_UNSIGNED16;
         found->size = 2;
-    } else if (sub != KIND) {
+    } else if (sub != KIND && (sub != START || !is_tpdo)) {
         return SDO_ABORT_NO_SUB;
     }
     return 0;

@@ -28,6 +28,7 @@ _NAMES = {
     0x100A: "Manufacturer software version", 0x1010: "Store parameters", 0x1011: "Restore default parameters",
     0x1014: "COB-ID EMCY", 0x1015: "Inhibit time EMCY", 0x1016: "Consumer heartbeat time",
     0x1017: "Producer heartbeat time", 0x1018: "Identity object", 0x1020: "Verify configuration",
+    0x1019: "Synchronous counter overflow value",
     0x1029: "Error behaviour", 0x1200: "SDO server parameter",
     0x1F50: "Program data", 0x1F51: "Program control", 0x1F56: "Program software identification",
     0x1F57: "Flash status identification", REASON: "Why the program was refused",
@@ -43,6 +44,7 @@ _SUB_NAMES = {
 _PDO_SUBS = {
     1: ("COB-ID", 7), 2: ("Transmission type", 5), 3: ("Inhibit time", 6), 5: ("Event timer", 6)
 }  # fmt: skip
+_TPDO_SUBS = {**_PDO_SUBS, 6: ("SYNC start value", 5)}
 _RPDO, _TPDO, _MAPPING = 0x1400, 0x1800, 0x200
 
 
@@ -215,9 +217,10 @@ class _Writer:
         settings = self._table("CANOPEN_PDO_SETTING", parameter)
         for number, pdo in enumerate(settings):
             cob = f"$NODEID+0x{pdo.cob:X}" if pdo.of_node else f"0x{pdo.cob:X}"
-            values = {1: cob, 2: str(pdo.type), 3: str(pdo.inhibit), 5: str(pdo.event_ms)}
-            rows = [Row(0, "Highest sub-index", 5, "const", "5")]
-            rows += [Row(sub, name, kind, "rw", values[sub]) for sub, (name, kind) in _PDO_SUBS.items()]
+            values = {1: cob, 2: str(pdo.type), 3: str(pdo.inhibit), 5: str(pdo.event_ms), 6: str(pdo.start)}
+            subs = _TPDO_SUBS if first == _TPDO else _PDO_SUBS
+            rows = [Row(0, "Highest sub-index", 5, "const", str(max(subs)))]
+            rows += [Row(sub, name, kind, "rw", values[sub]) for sub, (name, kind) in subs.items()]
             self._objects[first + number] = Object(first + number, f"{word} {number + 1} communication", rows)
             maps = [Row(0, "Number of mapped objects", 5, "rw", str(pdo.count))]
             maps += [
