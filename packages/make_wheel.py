@@ -83,14 +83,14 @@ def run(*command: str | Path) -> str:
 
 
 def cross_file(platform: Platform) -> str:
-    """A file for meson; nothing of the build is run. C libraries have macros that our warnings are not for."""
+    """A file for meson; nothing of the build is run."""
     return f"""\
 [binaries]
 c = {platform.tool("cc")}
 ar = {platform.tool("ar")}
 exe_wrapper = ['false']
 [built-in options]
-c_args = ['-Wno-c11-extensions', '-Wno-sign-compare']
+c_args = ['-Wno-c11-extensions', '-Wno-sign-compare'] # of macros of the C library
 [properties]
 skip_sanity_check = true
 [host_machine]
@@ -105,13 +105,12 @@ host = false
 
 def build_firmware(platform: Platform, folder: Path) -> None:
     """The simulator's libraries, and plcrt where it runs."""
-    cross = ROOT / "cross/x86_64-windows.ini"
-    if platform.target:
-        cross = folder / "cross.ini"
-        cross.write_text(cross_file(platform))
-    build = folder / "build"
-    if not (build / "build.ninja").exists():
-        run(MESON, "setup", "--buildtype=release", build, ROOT, "--cross-file", cross)
+    cross, build = folder / "cross.ini", folder / "build"
+    text = cross_file(platform) if platform.target else (ROOT / "cross/x86_64-windows.ini").read_text()
+    if not build.exists() or not cross.exists() or cross.read_text() != text:
+        cross.write_text(text)
+        wipe = ["--wipe"] if build.exists() else []
+        run(MESON, "setup", *wipe, "--buildtype=release", build, ROOT, "--cross-file", cross)
     targets = run(NINJA, "-C", build, "-t", "targets", "all")
     facts = {str(SIM / path) for path in re.findall(r"libboard_facts_\w+\.a", targets)}
     wanted = [*sorted(facts), str(SIM / "librts_sim_bus.a"), str(SIM / "librts_sim.a")]
