@@ -1,10 +1,16 @@
-"""A CAN bus made of pseudo terminals: each is an SLCAN adapter. Frames go from an open one to all others that are."""
+"""A CAN bus made of pseudo terminals: each is an SLCAN adapter. Frames go from an open one to all others that are.
+
+`python -m plctool.testing.can_hub COUNT` prints their paths, one a line, and carries frames until Ctrl-C. Programs of
+others are put on it by SLCAN (docs/canopen.md).
+"""
 
 from __future__ import annotations
 
 import os
 import random
 import selectors
+import signal
+import sys
 import threading
 import tty
 from contextlib import suppress
@@ -12,6 +18,7 @@ from dataclasses import dataclass, field
 
 _LARGEST_BACKLOG = 1 << 20  # bytes for an adapter that no tool reads, before frames to it are dropped
 _READ = 4096
+_MOST_ADAPTERS = 128
 _FRAMES = b"tTrRdDbB"  # first letters of lines that are frames; all others are commands to the adapter
 _OPENS, _CLOSES = b"OL", b"C"  # the same of the commands after which an adapter hears the bus, and does not
 
@@ -103,3 +110,19 @@ def _open() -> _Adapter:
     tty.setraw(slave)
     os.set_blocking(master, False)
     return _Adapter(master, slave, os.ttyname(slave))
+
+
+def main() -> None:
+    """A bus for other processes, until Ctrl-C or SIGTERM."""
+    words = sys.argv[1:]
+    if len(words) != 1 or not words[0].isdecimal() or not 2 <= int(words[0]) <= _MOST_ADAPTERS:
+        sys.exit(f"usage: python -m plctool.testing.can_hub COUNT, from 2 to {_MOST_ADAPTERS} adapters")
+    signals = {signal.SIGINT, signal.SIGTERM}
+    signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    with CanHub(int(words[0])) as hub:
+        print("\n".join(hub.paths), flush=True)
+        signal.sigwait(signals)
+
+
+if __name__ == "__main__":
+    main()
