@@ -73,7 +73,7 @@
 #error "HAS_IoDrvCanopenDevice: set CANOPEN_DEVICE_DATA in rts_config_port.h, and HAS_CmpCan in cmp_list.c."
 #endif
 #if HAS_CmpCanopenProgram && (!CANOPEN_PROGRAM_DOWNLOAD || !HAS_IoDrvCanopenDevice)
-#error "HAS_CmpCanopenProgram: set CANOPEN_PROGRAM_DOWNLOAD in rts_config_port.h, and HAS_IoDrvCanopenDevice in cmp_list.c."
+#error "HAS_CmpCanopenProgram: set CANOPEN_PROGRAM_DOWNLOAD, and HAS_IoDrvCanopenDevice in cmp_list.c."
 #endif
 #if HAS_CmpLogKeep && (LOG_KEEP == 0 || !HAS_CmpLog)
 #error \

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no
 PROGRAMS = sorted((Path(__file__).parents[1] / "st").rglob("*.st"))
 EDITED = 40  # programs, others for each seed
 WORDS = ("END_IF", "VAR", ":=", ";", "x", "(", "(*", "'", "{IF", "NOT", "ARRAY", "0")
-COMMENT = "(* " + "long " * 300 + "*)\n"  # short texts are not kept
+COMMENT = "(* " + "long " * 300 + "*)\n"  # short sources are not kept
 NAMES = frozenset[str]()
 
 
@@ -37,7 +37,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ObjectCache:
 
 @pytest.fixture
 def not_parsed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Takes the paths of the texts that are parsed."""
+    """Takes the paths of the sources that are parsed."""
     paths: list[str] = []
 
     def noting(source: Source, *args: object, **options: object) -> object:

@@ -46,7 +46,7 @@ def has_lists(text: str) -> bool:
 
 def statements(text: str, plain: str, span: tuple[int, int], at: Place, findings: Findings) -> list[Part]:
     """What stands in place of a list of instructions that begins at a place; only a line end after an error."""
-    from plctool.compiler.formats.instruction_list import translate  # late: few texts have lists
+    from plctool.compiler.formats.instruction_list import translate  # late: few files have lists
     from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError
 
     start, end = span

@@ -6,16 +6,15 @@
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H
 
+/* The full configuration has no room for these in 64 KiB of RAM. */
 #define ONLINE_CHANGE 0
-#define TRACE_BUFFER 0 /* the full configuration has no room for traces in 64 KiB of RAM */
-#define BOOT_ON_DEMAND 0
-#define IEC_EVENTS 0   /* nor for functions of events */
-#define SETTINGS 0     /* nor for settings */
-#define APP_CALLS 0    /* nor for calls of programs, such as files */
-#define IEC_FILES 0
-/* The full configuration has no room for traces and breakpoints in 64 KiB of RAM. */
 #define TRACE_BUFFER 0
 #define BP_MAX 0
+#define BOOT_ON_DEMAND 0
+#define IEC_EVENTS 0
+#define SETTINGS 0
+#define APP_CALLS 0
+#define IEC_FILES 0
 #define IEC_TASK_CALLS 0
 #define TASK_LOAD 0
 #define SCHED_LEVEL_EVENTS 0
