@@ -1,7 +1,7 @@
 """Makes the wheel for another system from that for this one: `make_wheel.py PLATFORM WHEEL OUTPUT`.
 
 WHEEL: for this Linux. What is compiled stays in the folder build-wheel-PLATFORM. Zig's compiler (PyPI: ziglang) has the
-C libraries of other Linux systems; for Windows there is Debian's compiler. Python's own library is not needed: modules
+C libraries of most systems; for the others there are Debian's compilers. Python's own library is not needed: modules
 of the limited interface run with every Python from 3.11 on, which has their names.
 
 Checks what can be checked elsewhere: what the module imports and exports, and for which processor it is.
@@ -45,30 +45,37 @@ class Platform:
     tag: str
     system: str  # as meson names it
     processor: str  # as meson names its family
-    target: str  # as Zig names it; "": not by Zig
     machine: str  # as its files name the processor
+    target: str = ""  # as Zig names it
+    gcc: str = ""  # Debian's compiler, where it is not Zig's
+    cross: str = ""  # with it, the file for meson
     module: str = "_plccore.abi3.so"
 
     @property
     def has_plcrt(self) -> bool:
         return self.system == "linux"
 
-    def tool(self, name: str) -> list[str]:
-        """The command of a tool, of `cc` and `ar`."""
-        if not self.target:
-            return [MINGW + {"cc": "gcc-posix"}.get(name, name)]
-        return [*ZIG, name, *(["-target", self.target] if name == "cc" else [])]
+    @property
+    def compiler(self) -> list[str]:
+        return [self.gcc] if self.gcc else [*ZIG, "cc", "-target", self.target]
 
 
-# GNU's C library: plcrt needs gettid, which came with 2.30, and with 32 bits functions of 64-bit time, which came with
-# 2.34. Debian 11 and Ubuntu 20.04 have 2.31.
+# GNU's C library is that of Debian 11 and Ubuntu 20.04 (plcrt needs gettid, which came with 2.30), for 32-bit Arm that
+# of Debian 12: Zig lacks functions of libgcc that programs use there.
 PLATFORMS = {
-    "aarch64-linux": Platform("manylinux_2_31_aarch64", "linux", "aarch64", "aarch64-linux-gnu.2.31", "EM_AARCH64"),
-    "armv7-linux": Platform("manylinux_2_34_armv7l", "linux", "arm", "arm-linux-gnueabihf.2.34", "EM_ARM"),
-    "x86_64-musl": Platform("musllinux_1_2_x86_64", "linux", "x86_64", "x86_64-linux-musl", "EM_X86_64"),
-    "aarch64-musl": Platform("musllinux_1_2_aarch64", "linux", "aarch64", "aarch64-linux-musl", "EM_AARCH64"),
-    "x86_64-windows": Platform("win_amd64", "windows", "x86_64", "", "pei-x86-64", "_plccore.pyd"),
-}
+    "aarch64-linux": Platform(
+        "manylinux_2_31_aarch64", "linux", "aarch64", "EM_AARCH64", target="aarch64-linux-gnu.2.31"
+    ),
+    "armv7-linux": Platform(
+        "manylinux_2_36_armv7l", "linux", "arm", "EM_ARM", gcc="arm-linux-gnueabihf-gcc", cross="armv7-linux.ini"
+    ),
+    "x86_64-musl": Platform("musllinux_1_2_x86_64", "linux", "x86_64", "EM_X86_64", target="x86_64-linux-musl"),
+    "aarch64-musl": Platform("musllinux_1_2_aarch64", "linux", "aarch64", "EM_AARCH64", target="aarch64-linux-musl"),
+    "x86_64-windows": Platform(
+        "win_amd64", "windows", "x86_64", "pei-x86-64",
+        gcc=f"{MINGW}gcc-posix", cross="x86_64-windows.ini", module="_plccore.pyd",
+    ),
+}  # fmt: skip
 
 
 def run(*command: str | Path) -> str:
@@ -86,8 +93,8 @@ def cross_file(platform: Platform) -> str:
     """A file for meson; nothing of the build is run."""
     return f"""\
 [binaries]
-c = {platform.tool("cc")}
-ar = {platform.tool("ar")}
+c = {platform.compiler}
+ar = {[*ZIG, "ar"]}
 exe_wrapper = ['false']
 [built-in options]
 c_args = ['-Wno-c11-extensions', '-Wno-sign-compare'] # of macros of the C library
@@ -106,7 +113,7 @@ host = false
 def build_firmware(platform: Platform, folder: Path) -> None:
     """The simulator's libraries, and plcrt where it runs."""
     cross, build = folder / "cross.ini", folder / "build"
-    text = cross_file(platform) if platform.target else (ROOT / "cross/x86_64-windows.ini").read_text()
+    text = (ROOT / "cross" / platform.cross).read_text() if platform.cross else cross_file(platform)
     if not build.exists() or not cross.exists() or cross.read_text() != text:
         cross.write_text(text)
         wipe = ["--wipe"] if build.exists() else []
@@ -128,7 +135,7 @@ def include_folders(platform: Platform) -> list[Path]:
 def write_module(platform: Platform, folder: Path) -> Path:
     """Its source, which the compiler's idea of sizes is part of."""
     source = folder / "_plccore.c"
-    run(sys.executable, ROOT / "host/make_plccore.py", "--cc", shlex.join(platform.tool("cc")), "--include",
+    run(sys.executable, ROOT / "host/make_plccore.py", "--cc", shlex.join(platform.compiler), "--include",
         *include_folders(platform), "--output", source, "--depfile", folder / "_plccore.c.d")  # fmt: skip
     return source
 
@@ -136,7 +143,7 @@ def write_module(platform: Platform, folder: Path) -> Path:
 def compile_c(platform: Platform, source: Path, result: Path) -> Path:
     flags = ["-O2", "-std=gnu99", "-fPIC", "-DPy_LIMITED_API=0x030B0000", "-include", ROOT / "packages/pyconfig.h"]
     include = [*include_folders(platform), Path(sysconfig.get_paths()["include"])]
-    run(*platform.tool("cc"), *flags, *(f"-I{path}" for path in include), "-c", source, "-o", result)
+    run(*platform.compiler, *flags, *(f"-I{path}" for path in include), "-c", source, "-o", result)
     return result
 
 
@@ -165,7 +172,7 @@ def link_module(platform: Platform, folder: Path) -> Path:
     whole = [port / "librts_sim_bus.a", *sorted(port.glob("libboard_facts_*.a"))]
     archives = ["-Wl,--whole-archive", *whole, "-Wl,--no-whole-archive", port / "librts_sim.a"]
     result = folder / platform.module
-    run(*platform.tool("cc"), "-shared", "-s", "-o", result, module, boards, *archives,
+    run(*platform.compiler, "-shared", "-s", "-o", result, module, boards, *archives,
         *system_flags(platform, module, folder), "-pthread", "-lm")  # fmt: skip
     return result
 

@@ -1,8 +1,8 @@
 """Tries wheels in a Python of Debian for another processor, by QEMU's user mode: `tests/wheel_elsewhere.py WHEEL...`.
 
 Debian's Python is fetched and unpacked in build-wheel-trial, not installed. For 64-bit Arm a program is built, run and
-tested, as tests/wheel.py does; for 32-bit Arm, for which PyPI has no llvmlite, the simulator's module runs. Exit status
-77: it cannot be done here, for the reason that is printed.
+tested, as tests/wheel.py does; for 32-bit Arm, for which PyPI has no llvmlite, the simulator's module runs. Of a wheel
+for musl only plcrt runs. Exit status 77: it cannot be done here, for the reason that is printed.
 """
 
 from __future__ import annotations
@@ -35,13 +35,14 @@ class Machine:
 
     debian: str
     emulator: str
-    has_llvmlite: bool
-    packages: tuple[str, ...]
+    has_llvmlite: bool = False
+    packages: tuple[str, ...] = ()
 
 
 MACHINES = {
     "aarch64": Machine("arm64", "qemu-aarch64", True, ("python3", "libstdc++6", "zlib1g")),
     "armv7l": Machine("armhf", "qemu-arm", False, ("python3", "python3-cffi-backend", "zlib1g")),
+    "x86_64": Machine("amd64", "qemu-x86_64"),
 }
 
 
@@ -114,7 +115,7 @@ class Trial:
 
 def install(wheel: Path, machine: str, site: Path, folder: Path) -> None:
     """With what it needs from PyPI, as pip on that machine would."""
-    tags = ("manylinux_2_34", "manylinux_2_31", "manylinux_2_28", "manylinux2014")
+    tags = ("manylinux_2_31", "manylinux_2_28", "manylinux2014")
     platforms = [f"--platform={tag}_{machine}" for tag in tags]
     run([sys.executable, "-m", "pip", "install", "--quiet", "--only-binary=:all:", "--python-version=3.11",
          "--implementation=cp", *platforms, f"--target={site}", str(wheel), "pytest"], folder)  # fmt: skip
@@ -145,15 +146,23 @@ def check_module(trial: Trial) -> None:
     assert trial.python("-c", MODULE_WORKS).startswith("module ")
 
 
-def try_wheel(wheel: Path) -> None:
-    name = re.sub(r".*linux_\d+_\d+_", "", wheel.stem)
-    machine = MACHINES.get(name)
-    if machine is None:
-        skip(f"{wheel.name} is for a system that QEMU's user mode is not.")
-        return
-    for needed in (machine.emulator, "apt-get", "dpkg-deb"):
-        if shutil.which(needed) is None:
-            skip(f"needs {needed}: ./bootstrap.sh --tests")
+def check_tools(*names: str) -> None:
+    for name in names:
+        if shutil.which(name) is None:
+            skip(f"needs {name}: ./bootstrap.sh --tests")
+
+
+def try_plcrt(wheel: Path, machine: Machine) -> None:
+    """Of a wheel for musl, which is in the program."""
+    check_tools(machine.emulator)
+    with tempfile.TemporaryDirectory() as folder:
+        unpack(wheel, Path(folder) / "site")
+        assert run([machine.emulator, "site/bin/plcrt", "--version"], Path(folder)).startswith("plcrt ")
+    print(f"{wheel.name}: plcrt starts")
+
+
+def try_wheel(wheel: Path, name: str, machine: Machine) -> None:
+    check_tools(machine.emulator, "apt-get", "dpkg-deb")
     with tempfile.TemporaryDirectory() as folder:
         trial = Trial(machine, make_root(machine), Path(folder))
         if machine.has_llvmlite:
@@ -166,6 +175,14 @@ def try_wheel(wheel: Path) -> None:
     print(f"{wheel.name}: works with Debian's Python for {machine.debian}")
 
 
+def main() -> None:
+    for wheel in (Path(argument).resolve() for argument in sys.argv[1:]):
+        name = re.sub(r".*linux_\d+_\d+_", "", wheel.stem)
+        if "musllinux" in wheel.name:
+            try_plcrt(wheel, MACHINES[name])
+        else:
+            try_wheel(wheel, name, MACHINES[name])
+
+
 if __name__ == "__main__":
-    for argument in sys.argv[1:]:
-        try_wheel(Path(argument).resolve())
+    main()
