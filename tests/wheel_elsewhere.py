@@ -51,10 +51,14 @@ def skip(reason: str) -> None:
     sys.exit(SKIPPED)
 
 
+def attempt(command: list[str], folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    env = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "PLC"))} | environment
+    return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
+
+
 def run(command: list[str], folder: Path, **environment: str) -> str:
     """The output of a command that has to succeed."""
-    env = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "PLC"))} | environment
-    done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
+    done = attempt(command, folder, **environment)
     if done.returncode:
         sys.exit(f"{' '.join(command)}\n{done.stdout[-4000:]}{done.stderr[-4000:]}")
     return done.stdout
@@ -84,9 +88,11 @@ def make_root(machine: Machine) -> Path:
     if (root / "complete").exists():
         return root
     settings = {"APT_CONFIG": str(apt_settings(machine, folder))}
-    run(["apt-get", "-qq", "update"], folder, **settings)
+    attempt(["apt-get", "-qq", "update"], folder, **settings)  # a part of the lists may be enough
     wanted = ["apt-get", "-qq", "-y", "--no-install-recommends", "--download-only", "install", *machine.packages]
-    run(wanted, folder, **settings)
+    done = attempt(wanted, folder, **settings)
+    if done.returncode:
+        skip(f"Debian's Python for {machine.debian} cannot be fetched: {done.stderr.strip()}")
     for package in (folder / "cache/archives").glob("*.deb"):
         run(["dpkg-deb", "--extract", str(package), str(root)], folder)
     (root / "complete").touch()
