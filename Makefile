@@ -12,6 +12,7 @@
 # make deb    dist/*.deb for this architecture (ARCHS="amd64 arm64"); make deb-test tries them in a small Debian
 # make test-windows  the simulator for Windows: its C tests, and all programs of tests/st, by Wine
 # make wheels-linux  dist/*.whl for 64-bit and 32-bit Arm and for musl; those for Arm are tried in QEMU's user mode
+# make wheel-macos  dist/*macosx*.whl for Macs with Arm, which was never run
 # make wheel-windows  dist/*win_amd64.whl; what cannot be tried here is said in the README
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500 --sanitized")
@@ -40,7 +41,7 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test test-whole test-windows wheel-windows wheels-linux run-wheels-elsewhere quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak changes edits fuzz properties habits tree-sitter vsix test-editors all clean
+.PHONY: demo test test-whole test-windows wheel-windows wheel-macos wheels-linux run-wheels-elsewhere quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak changes edits fuzz properties habits tree-sitter vsix test-editors all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm run-test-arm-system
 VSCODE := editors/vscode
 NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
@@ -96,6 +97,7 @@ test-windows: build-windows/build.ninja build/build.ninja
 
 # For other systems than this one, by their names in packages/make_wheel.py.
 run-wheels-elsewhere: $(VENV)/dev
+	$(BIN)/pip install --quiet macholib ziglang
 	rm -rf dist/local
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist/local .
 	set -e; for name in $(PLATFORMS); do $(BIN)/python packages/make_wheel.py $$name dist/local/*.whl dist; done
@@ -105,9 +107,11 @@ wheel-windows:
 	./bootstrap.sh --windows
 	$(MAKE) run-wheels-elsewhere PLATFORMS=x86_64-windows
 
-wheels-linux: $(VENV)/dev
+wheel-macos:
+	$(MAKE) run-wheels-elsewhere PLATFORMS=arm64-macos
+
+wheels-linux:
 	./bootstrap.sh --tests
-	$(BIN)/pip install --quiet ziglang
 	$(MAKE) run-wheels-elsewhere PLATFORMS="aarch64-linux armv7-linux x86_64-musl aarch64-musl"
 	$(BIN)/python tests/wheel_elsewhere.py dist/*_aarch64.whl dist/*_armv7l.whl dist/*musllinux*x86_64.whl || [ $$? -eq 77 ]
 

@@ -14,6 +14,7 @@ import base64
 import csv
 import hashlib
 import io
+import os
 import re
 import shlex
 import subprocess
@@ -24,6 +25,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from elftools.elf.elffile import ELFFile
+from macholib.MachO import MachO
+from macholib.SymbolTable import SymbolTable
 
 ROOT = Path(__file__).resolve().parents[1]
 SIM = Path("firmware/port/sim")
@@ -35,6 +38,8 @@ MINGW = "x86_64-w64-mingw32-"
 
 # What is part of each system, or of Python.
 OF_WINDOWS = re.compile(r"(python3|KERNEL32|msvcrt|api-ms-win-crt-[\w-]+)\.dll", re.IGNORECASE)
+OF_MACOS = re.compile(r"/usr/lib/libSystem\.B\.dylib|(@rpath/)?_plccore\.abi3\.so")
+OF_PYTHON = re.compile(r"_?Py|__clear_cache$")  # the latter is the compiler's, and of libSystem
 OF_LINUX = re.compile(r"lib(c|m|pthread|dl|rt)\.so(\.\d+)?|ld-linux[\w-]*\.so\.\d")
 
 
@@ -71,6 +76,7 @@ PLATFORMS = {
     ),
     "x86_64-musl": Platform("musllinux_1_2_x86_64", "linux", "x86_64", "EM_X86_64", target="x86_64-linux-musl"),
     "aarch64-musl": Platform("musllinux_1_2_aarch64", "linux", "aarch64", "EM_AARCH64", target="aarch64-linux-musl"),
+    "arm64-macos": Platform("macosx_11_0_arm64", "darwin", "aarch64", "ARM64", target="aarch64-macos.11.0"),
     "x86_64-windows": Platform(
         "win_amd64", "windows", "x86_64", "pei-x86-64",
         gcc=f"{MINGW}gcc-posix", cross="x86_64-windows.ini", module="_plccore.pyd",
@@ -161,7 +167,14 @@ def system_flags(platform: Platform, module: Path, folder: Path) -> list[str | P
     """How the names of Python are left to it."""
     if platform.system == "windows":
         return ["-static", python_library(module, folder)]
-    return []
+    return ["-undefined", "dynamic_lookup"] if platform.system == "darwin" else []
+
+
+def whole(platform: Platform, archives: list[Path]) -> list[str]:
+    """Flags of the linker, with which it takes all of archives."""
+    if platform.system == "darwin":
+        return [f"-Wl,-force_load,{archive}" for archive in archives]
+    return ["-Wl,--whole-archive", *map(str, archives), "-Wl,--no-whole-archive"]
 
 
 def link_module(platform: Platform, folder: Path) -> Path:
@@ -169,10 +182,9 @@ def link_module(platform: Platform, folder: Path) -> Path:
     port = folder / "build" / SIM
     boards = compile_c(platform, ROOT / SIM / "SimBoards.c", folder / "boards.o")
     module = compile_c(platform, write_module(platform, folder), folder / "_plccore.o")
-    whole = [port / "librts_sim_bus.a", *sorted(port.glob("libboard_facts_*.a"))]
-    archives = ["-Wl,--whole-archive", *whole, "-Wl,--no-whole-archive", port / "librts_sim.a"]
+    archives = whole(platform, [port / "librts_sim_bus.a", *sorted(port.glob("libboard_facts_*.a"))])
     result = folder / platform.module
-    run(*platform.compiler, "-shared", "-s", "-o", result, module, boards, *archives,
+    run(*platform.compiler, "-shared", "-s", "-o", result, module, boards, *archives, port / "librts_sim.a",
         *system_flags(platform, module, folder), "-pthread", "-lm")  # fmt: skip
     return result
 
@@ -198,6 +210,30 @@ def facts_of_elf(path: Path) -> Facts:
         return Facts(elf["e_machine"], needed, exported)
 
 
+# Of mach-o/loader.h, nlist.h and mach/machine.h.
+CPU_TYPE_ARM64 = 0x0100000C
+LC_CODE_SIGNATURE = 0x1D
+ORDINAL_UNKNOWN = 0  # as Zig has it for names that it did not find
+
+
+def symbol_name(name: bytes) -> str:
+    return name.rstrip(b"\0").decode().removeprefix("_")
+
+
+def facts_of_mach_o(path: Path) -> Facts:
+    macho = MachO(str(path))
+    (header,) = macho.headers
+    needed = {name for _, _, name in header.walkRelocatables()}
+    symbols = SymbolTable(macho, header)
+    unknown = {symbol_name(name) for at, name in symbols.undefsyms if at.n_desc >> 8 & 0xFF == ORDINAL_UNKNOWN}
+    if strange := sorted(name for name in unknown if not OF_PYTHON.match(name)):
+        sys.exit(f"{path.name} needs {', '.join(strange)}, which macOS does not have.")
+    if not any(command.cmd == LC_CODE_SIGNATURE for command, _, _ in header.commands):
+        sys.exit(f"{path.name} is not signed: macOS on Arm does not load it.")
+    exported = {symbol_name(name) for _, name in symbols.extdefsyms}
+    return Facts("ARM64" if header.header.cputype == CPU_TYPE_ARM64 else "", needed, exported)
+
+
 def facts_of_pe(path: Path) -> Facts:
     said = run(MINGW + "objdump", "-p", path)
     machine = re.search(r"file format (\S+)", said)
@@ -207,8 +243,11 @@ def facts_of_pe(path: Path) -> Facts:
 
 def check(platform: Platform, path: Path, exports: set[str]) -> None:
     """A file is for its platform, and needs nothing but Python and what each such system has."""
-    is_windows = platform.system == "windows"
-    reader, known = (facts_of_pe, OF_WINDOWS) if is_windows else (facts_of_elf, OF_LINUX)
+    reader, known = {
+        "linux": (facts_of_elf, OF_LINUX),
+        "darwin": (facts_of_mach_o, OF_MACOS),
+        "windows": (facts_of_pe, OF_WINDOWS),
+    }[platform.system]
     facts = reader(path)
     if facts.machine != platform.machine:
         sys.exit(f"{path.name} is for {facts.machine or 'another processor'}, not for {platform.machine}.")
@@ -264,8 +303,10 @@ def main() -> None:
     platform = PLATFORMS[args.platform]
     tag = f"cp311-abi3-{platform.tag}"
     name, version = args.wheel.name.split("-")[:2]
+    wheel, output = args.wheel.resolve(), args.output.resolve()
     folder = ROOT / f"build-wheel-{args.platform}"
     folder.mkdir(exist_ok=True)
+    os.chdir(folder)  # where Zig leaves what it makes beside
     build_firmware(platform, folder)
     module = link_module(platform, folder)
     check(platform, module, {"PyInit__plccore"})
@@ -274,8 +315,8 @@ def main() -> None:
         plcrt = folder / "build" / PLCRT
         check(platform, plcrt, set())
         parts[f"{name}-{version}.data/scripts/plcrt"] = plcrt
-    files = files_of(args.wheel, platform, tag, parts)
-    result = args.output / f"{name}-{version}-{tag}.whl"
+    files = files_of(wheel, platform, tag, parts)
+    result = output / f"{name}-{version}-{tag}.whl"
     write_wheel(result, files)
     print(f"{result.name}: {len(files)} files, module of {len(files[platform.module])} bytes")
 

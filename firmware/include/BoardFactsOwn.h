@@ -20,8 +20,14 @@ enum { HAS_ADDRESS = 0, ADDRESS = 0 };
 RTS_STATIC_ASSERT(sizeof(BOARD_DEVICE_NAME) <= BOARD_NAME_SIZE && sizeof(RTS_CONFIG_NAME) <= BOARD_NAME_SIZE,
                   names_fit);
 
+#ifdef __APPLE__
+#define BOARD_FACTS_SECTION "__DATA,board_facts"
+#else
+#define BOARD_FACTS_SECTION "board_facts"
+#endif
+
 /* Found by its section. The alignment is that of the struct, so that several are an array. */
-__attribute__((used, section("board_facts"), aligned(4))) static const BOARD_FACTS facts = {
+__attribute__((used, section(BOARD_FACTS_SECTION), aligned(4))) static const BOARD_FACTS facts = {
     .magic = BOARD_FACTS_MAGIC,
     .size = sizeof(BOARD_FACTS),
     .target_id = BOARD_TARGET_ID,

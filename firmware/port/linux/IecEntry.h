@@ -1,5 +1,5 @@
 /*
- * IecEntry.h - how compiled code is entered on Linux.
+ * IecEntry.h - how compiled code is entered on Linux and macOS.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -17,7 +17,7 @@
 /* As many as SysExcept.c keeps of each. */
 #if defined(__linux__) && defined(__x86_64__)
 #define EXCEPT_REGISTERS 19
-#elif defined(__linux__) && defined(__aarch64__)
+#elif (defined(__linux__) || defined(__APPLE__)) && defined(__aarch64__)
 #define EXCEPT_REGISTERS 35
 #elif defined(__linux__) && defined(__arm__)
 #define EXCEPT_REGISTERS 18

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Shared by the linux and the sim port, so it depends on no other file of a port. It also lives in processes that are
+ * Shared by the linux and the sim port, that on macOS too, so it depends on no other file of a port. It also lives in processes that are
  * not ours (Python): signal handlers are taken at first use, faults outside SysExceptTry go to those who had them
  * before, and SysExceptShutdown gives everything back.
  *
@@ -18,19 +18,16 @@
 #include "IecStack.h"
 #include "StepOver.h"
 #include "SysDebug.h"
+#if defined(__APPLE__)
+#include "../macos/ThreadState.h"
+#else
+#include "ThreadState.h"
+#endif
 
-#include <pthread.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include <time.h>
-#include <ucontext.h>
 
-enum {
-    MAX_CONTEXTS = 64,       /* threads that run IEC code at the same time */
-    BREAK_SIGNAL_OFFSET = 5, /* from SIGRTMIN: clear of what debuggers and libraries use */
-};
+enum { MAX_CONTEXTS = 64 }; /* threads that run IEC code at the same time */
 
 /* A thread that runs IEC code. The thread itself writes `stack.running`, `round` and `arg`; SysExceptBreak reads them
  * from another. */
@@ -93,26 +90,6 @@ static bool runs_iec_code(const CONTEXT *context)
 
 /* ---- in the handler ---- */
 
-/* Where a thread was when it was interrupted, and its link register, 0 without. */
-typedef struct {
-    uintptr_t address, stack, link;
-} PLACE;
-
-static PLACE place_of(const void *ucontext)
-{
-    const ucontext_t *at = ucontext;
-#if defined(__x86_64__)
-    const greg_t *registers = at->uc_mcontext.gregs;
-    return (PLACE){.address = (uintptr_t)registers[REG_RIP], .stack = (uintptr_t)registers[REG_RSP]};
-#elif defined(__aarch64__)
-    return (PLACE){.address = at->uc_mcontext.pc, .stack = at->uc_mcontext.sp, .link = at->uc_mcontext.regs[30]};
-#elif defined(__arm__)
-    return (PLACE){.address = at->uc_mcontext.arm_pc, .stack = at->uc_mcontext.arm_sp, .link = at->uc_mcontext.arm_lr};
-#else
-#error "SysExcept.c: say where this architecture keeps these registers in its ucontext_t."
-#endif
-}
-
 /* The stack is read as it is, whatever a sanitizer thinks of the gaps between its variables. */
 #define READS_STACK __attribute__((no_sanitize("address")))
 
@@ -158,39 +135,18 @@ static void leave(CONTEXT *context, RTS_UI32 code, PLACE place)
 }
 
 /* Keeps the registers of the fault that leave() is called for next. `fault`: the address that could not be accessed. */
-#if defined(__x86_64__)
 static void note_registers(const CONTEXT *context, const void *ucontext, uintptr_t fault)
 {
-    static const RTS_UI8 order[EXCEPT_REGISTERS - 1] = {REG_RAX, REG_RBX, REG_RCX, REG_RDX, REG_RSI, REG_RDI,
-                                                        REG_RBP, REG_RSP, REG_R8,  REG_R9,  REG_R10, REG_R11,
-                                                        REG_R12, REG_R13, REG_R14, REG_R15, REG_RIP, REG_EFL};
-    const greg_t *registers = ((const ucontext_t *)ucontext)->uc_mcontext.gregs;
+#if EXCEPT_REGISTERS > 0
     uintptr_t values[EXCEPT_REGISTERS];
-    for (size_t i = 0; i < RTS_COUNT(order); i++) {
-        values[i] = (uintptr_t)registers[order[i]];
-    }
-    values[RTS_COUNT(order)] = fault;
-    SysExceptNoteRegisters(readable(&context->stack, place_of(ucontext).stack), EXCEPT_REGISTERS_X86_64, values);
-}
-#elif defined(__aarch64__)
-static void note_registers(const CONTEXT *context, const void *ucontext, uintptr_t fault)
-{
-    enum { GENERAL = 31 };
-    const mcontext_t *at = &((const ucontext_t *)ucontext)->uc_mcontext;
-    uintptr_t values[EXCEPT_REGISTERS] = {[GENERAL] = at->sp, at->pc, at->pstate, fault};
-    memcpy(values, at->regs, GENERAL * sizeof(values[0]));
-    SysExceptNoteRegisters(readable(&context->stack, at->sp), EXCEPT_REGISTERS_AARCH64, values);
-}
+    read_registers(ucontext, fault, values);
+    SysExceptNoteRegisters(readable(&context->stack, place_of(ucontext).stack), REGISTERS_KIND, values);
 #else
-static void note_registers(const CONTEXT *context, const void *ucontext, uintptr_t fault)
-{
-    const mcontext_t *at = &((const ucontext_t *)ucontext)->uc_mcontext;
-    uintptr_t values[EXCEPT_REGISTERS] = {at->arm_r0, at->arm_r1, at->arm_r2, at->arm_r3, at->arm_r4,   at->arm_r5,
-                                          at->arm_r6, at->arm_r7, at->arm_r8, at->arm_r9, at->arm_r10,  at->arm_fp,
-                                          at->arm_ip, at->arm_sp, at->arm_lr, at->arm_pc, at->arm_cpsr, fault};
-    SysExceptNoteRegisters(readable(&context->stack, at->arm_sp), EXCEPT_REGISTERS_ARM, values);
-}
+    RTS_UNUSED(context);
+    RTS_UNUSED(ucontext);
+    RTS_UNUSED(fault);
 #endif
+}
 
 /* C code that IEC code called: the call that is nearest on the stack. */
 READS_STACK static uintptr_t last_return(const uintptr_t *word, const uintptr_t *end)
@@ -226,7 +182,8 @@ static SIGNAL *find_signal(int number)
 
 static RTS_UI32 fault_code(const CONTEXT *context, const SIGNAL *signal, const siginfo_t *info)
 {
-    bool overflow = signal->number == SIGSEGV && IecStackIsOverflow(&context->stack, (uintptr_t)info->si_addr);
+    bool is_access = signal->code == RTSEXCPT_ACCESS_VIOLATION; /* SIGBUS is that of a guard on macOS */
+    bool overflow = is_access && IecStackIsOverflow(&context->stack, (uintptr_t)info->si_addr);
     return overflow ? (RTS_UI32)RTSEXCPT_STACK_OVERFLOW : signal->code;
 }
 
@@ -286,6 +243,13 @@ static bool goes_on(const CONTEXT *context, RTS_UI32 code, const siginfo_t *info
         registers[REG_EFL] |= SINGLE_STEP;
     }
     return true;
+}
+#define abandon_step() ((void)0)
+#elif defined(__APPLE__) /* without traps; an exception is shown where it occurred */
+static bool goes_on(const CONTEXT *context, RTS_UI32 code, const siginfo_t *info, void *ucontext)
+{
+    RTS_UNUSED(info);
+    return ask_debugger(context, code, place_of(ucontext)) != SYS_DEBUG_LEAVE;
 }
 #define abandon_step() ((void)0)
 #else
@@ -444,7 +408,7 @@ static void detach(void *param)
 
 static void prepare(void)
 {
-    state.signal[RTS_COUNT(state.signal) - 1].number = SIGRTMIN + BREAK_SIGNAL_OFFSET;
+    state.signal[RTS_COUNT(state.signal) - 1].number = BREAK_SIGNAL;
     if (pthread_key_create(&state.key, detach) != 0) {
         fatal("no thread key left in this process");
     }
@@ -555,7 +519,7 @@ static void break_round(CONTEXT *context, RTS_UI32 round, RTS_UI32 code)
     if (context->break_round != round) {
         context->break_code = code;
         __atomic_store_n(&context->break_round, round, __ATOMIC_SEQ_CST);
-        pthread_kill(context->thread, SIGRTMIN + BREAK_SIGNAL_OFFSET);
+        pthread_kill(context->thread, BREAK_SIGNAL);
     }
 }
 
@@ -575,16 +539,6 @@ static void break_if_it_runs(CONTEXT *context, const void *arg, RTS_UI32 code)
     }
 }
 
-static RTS_I64 used_ns(const CONTEXT *context)
-{
-    clockid_t clock;
-    struct timespec used;
-    if (pthread_getcpuclockid(context->thread, &clock) != 0 || clock_gettime(clock, &used) != 0) {
-        return -1;
-    }
-    return (RTS_I64)used.tv_sec * 1000000000 + used.tv_nsec;
-}
-
 /* The lock keeps the thread from ending meanwhile. */
 RTS_I64 SysExceptGetUsedNs(const void *arg)
 {
@@ -592,7 +546,7 @@ RTS_I64 SysExceptGetUsedNs(const void *arg)
     pthread_mutex_lock(&state.lock);
     for (const CONTEXT *context = state.context; ns < 0 && context < state.context + MAX_CONTEXTS; context++) {
         if (runs(context, arg)) {
-            ns = used_ns(context);
+            ns = thread_used_ns(context->thread);
         }
     }
     pthread_mutex_unlock(&state.lock);

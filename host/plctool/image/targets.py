@@ -94,8 +94,9 @@ TARGETS: dict[str, Target] = {
             "x86_64-linux", "x86_64-unknown-linux-gnu", "x86-64", "", Machine.X86_64, "TARGET_ID_X86_64_LINUX",
             pointer_size=8, registers=(6, 8), stubs=False, unaligned=True, vectors=True, probes=True, hosted=True,
         ),
-        Target(
-            "aarch64-linux", "aarch64-unknown-linux-gnu", "generic", "", Machine.AARCH64, "TARGET_ID_AARCH64_LINUX",
+        Target(  # x18 is the system's on macOS, where the simulator runs the same code
+            "aarch64-linux", "aarch64-unknown-linux-gnu", "generic", "+reserve-x18", Machine.AARCH64,
+            "TARGET_ID_AARCH64_LINUX",
             pointer_size=8, registers=(8, 8), stubs=False, unaligned=True, probes=True, hosted=True,
         ),
         Target(  # of the simulator on Windows: as on Linux in all but the C functions that programs call
@@ -143,6 +144,8 @@ def host_target() -> str:
         return "x86_64-windows"
     if struct.calcsize("P") == _ARMV7_POINTER and machine.startswith(("arm", "aarch64")):
         machine = "armv7"  # also a process of 32 bits on a kernel of 64
+    elif machine == "arm64":
+        machine = "aarch64"  # as macOS names it
     here = f"{machine}-linux"
     return here if here in TARGETS else DEFAULT_TARGET
 
