@@ -92,7 +92,7 @@ def test_canopen_node_stays_in_operation(hub: CanHub, tmp_path: Path) -> None:  
     with Plcrt(tmp_path / "flash", *options), connect(f"can:slcan:{hub.paths[1]}?node=5") as plc:
         plc.add_symbols(result.symbols)
         plc.flash(result.image)
-        with ForeignNode(hub.paths[2]) as foreign:
+        with ForeignNode(f"slcan:{hub.paths[2]}") as foreign:
             eventually(lambda: plc.read("Valves.ok"))
             eventually(lambda: foreign.send_inputs(b"\x10\x27\x5a") or foreign.outputs[-1:] == [b"\x5a"])
             lost, since = plc.read("Main.lost"), len(foreign.outputs)

@@ -26,7 +26,8 @@ from plctool.compiler.front import check_sources
 from plctool.compiler.typed.nodes import TypedProgram
 
 UNOPTIMISED = 6  # of so many programs one is repeated without optimisation
-OF_ONE_DEVICE = ("wall_clock_is_read_and_set",)  # the clock of the runners is not set back for each program
+# The clock of the runners is not set back for each program, and the bare ones have none.
+OF_ONE_DEVICE = ("wall_clock_is_read_and_set", "time_passes_within_a_cycle_under_the_names_of_syslibtime")
 TARGETS_OF_ALL = 4  # so many targets, one after the other in RUNNERS, run all programs
 KEEPS_ALL = 2  # the highest level at which no variable is in registers only, and memory is that of -O0
 
