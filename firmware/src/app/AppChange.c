@@ -277,7 +277,7 @@ static void for_steps(CHANGE *change, WORK work)
     for (; (const RTS_UI8 *)step < end; step = next_step(step)) {
         if (has(step, IS_POINTERS) && work >= CHECK_POINTERS)
             handle_pointers(change, step, work);
-        else if (work == WRITE)
+        else if (work == WRITE && has(step, IS_TO))
             write_step(step);
         else if (work == WRITE_BACK && has(step, IS_COPIED))
             memmove(source_of(step), target_of(step), step->size);

@@ -220,8 +220,8 @@ static void remove_place(const APP_PLACE *place)
 
     if (i == force.count)
         return;
-    memmove(&force.list[i], &force.list[i + 1], (force.count - i) * sizeof force.list[0]);
     force.count--;
+    memmove(&force.list[i], &force.list[i + 1], (force.count - i) * sizeof force.list[0]);
 }
 
 static void sort_puts(void)
