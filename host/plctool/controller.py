@@ -237,14 +237,17 @@ class Controller(ABC):
         start: bool = True,
         force: bool = False,
         unchecked: bool = False,
+        boot: bool | None = None,
         progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> FlashResult:
         """Replaces the application and starts it. The old one runs until the new one has arrived and passed all checks.
 
         `force`: also when the controller has this very image already. `unchecked`: the image is not checked here;
-        the controller checks it anyway. `progress` gets the bytes that have arrived and their total. Other tools must
-        wait meanwhile. Raises LinkError when one of them is downloading, UsageError for what is not an image,
-        DeviceError when the controller refuses it.
+        the controller checks it anyway. `boot`: whether the program starts at power-up, in place of the previous one;
+        False: when `create_boot_project` makes it so. None: as a setting of the device says, which is True in most.
+        `progress` gets the bytes that have arrived and their total. Other tools must wait meanwhile. Raises LinkError
+        when one of them is downloading, UsageError for what is not an image, DeviceError when the controller refuses
+        it.
         """
         data = image if isinstance(image, bytes) else read_program(Path(image), unchecked)
         if not unchecked:
@@ -253,10 +256,16 @@ class Controller(ABC):
         with self._alone(f"downloading {what}"):
             if not isinstance(image, bytes):
                 _keep_symbols(Path(image), image_crc(data))
-            return self._flash(data, start, force, unchecked, progress)
+            return self._flash(data, start, force, unchecked, boot, progress)
 
     def _flash(
-        self, data: bytes, start: bool, force: bool, unchecked: bool, progress: Callable[[int, int], None]
+        self,
+        data: bytes,
+        start: bool,
+        force: bool,
+        unchecked: bool,
+        boot: bool | None,
+        progress: Callable[[int, int], None],
     ) -> FlashResult:
         crc = image_crc(data)
         status = self._status_before(data)
@@ -264,7 +273,7 @@ class Controller(ABC):
         skipped = is_there and status.exception is None and not force and not unchecked
         begin = self._now()
         if not skipped:
-            self._download(data, start, is_there or unchecked, lambda done: progress(done, len(data)))
+            self._download(data, start, is_there or unchecked, boot, lambda done: progress(done, len(data)))
         seconds = self._now() - begin
         persistent = None if skipped else self._kept_changes(status.image_crc, crc)
         if skipped and start and status.state is not AppState.RUN:
@@ -276,6 +285,10 @@ class Controller(ABC):
             raise went_down()
         boots = bool(now.operating_state & lib.OS_BOOTPROJECT_VALID)
         return FlashResult(len(data), seconds, skipped, now.state, persistent, boots)
+
+    @abstractmethod
+    def create_boot_project(self) -> None:
+        """Makes the program what starts at power-up, if it is not yet. Raises DeviceError without one."""
 
     def change(
         self,
@@ -876,9 +889,12 @@ class Controller(ABC):
         return nullcontext()
 
     @abstractmethod
-    def _download(self, data: bytes, start: bool, restart: bool, progress: Callable[[int], None]) -> None:
+    def _download(
+        self, data: bytes, start: bool, restart: bool, boot: bool | None, progress: Callable[[int], None]
+    ) -> None:
         """Makes an image the application. With `start` it is started if the controller does that with the download,
-        else stopped. `restart`: from the first byte. Raises DeviceError with the reason when it is refused."""
+        else stopped. `restart`: from the first byte. `boot`: as of `flash`. Raises DeviceError with the reason when it
+        is refused."""
 
     @abstractmethod
     def _reset(self, option: int) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from plctool.archives import MAX_BYTES, ArchiveError, inflate
-from plctool.controller import Closed, Controller, FlashResult, OtherTool
+from plctool.controller import Closed, Controller, OtherTool
 from plctool.core import lib
 from plctool.debug.breakpoints import Debugger
 from plctool.debug.forced import ForcedPlace, ForceList
@@ -157,7 +157,6 @@ class Plc(Controller):
         self._symbol_file = symbols
         self._reader: tuple[list[Symbol], Reader] = ([], Reader([]))  # of what was read last
         self._prepared: services.Prepared | None = None  # of the download that follows
-        self._boot: bool | None = None  # of the download that `flash` makes
 
     def close(self) -> None:
         if not self._closed:
@@ -287,26 +286,7 @@ class Plc(Controller):
         """How late the cycles of each task began, in the order of `tasks`."""
         return services.read_lateness(self._session)
 
-    def flash(
-        self,
-        image: Path | str | bytes,
-        *,
-        start: bool = True,
-        force: bool = False,
-        unchecked: bool = False,
-        boot: bool | None = None,
-        progress: Callable[[int, int], None] = lambda done, total: None,
-    ) -> FlashResult:
-        """As `Controller.flash`. `boot`: whether the program starts at power-up, in place of the previous one; False:
-        when `create_boot_project` makes it so. None: as a setting of the device says, which is True in most."""
-        self._boot = boot
-        try:
-            return super().flash(image, start=start, force=force, unchecked=unchecked, progress=progress)
-        finally:
-            self._boot = None
-
     def create_boot_project(self) -> None:
-        """Makes the program what starts at power-up, if it is not yet. Raises DeviceError without one."""
         with self._alone("making the boot project"):
             services.create_boot_project(self._session)
 
@@ -316,9 +296,11 @@ class Plc(Controller):
     def _alone(self, purpose: str) -> AbstractContextManager[None]:
         return self._session.exclusive(purpose)
 
-    def _download(self, data: bytes, start: bool, restart: bool, progress: Callable[[int], None]) -> None:
+    def _download(
+        self, data: bytes, start: bool, restart: bool, boot: bool | None, progress: Callable[[int], None]
+    ) -> None:
         prepared, self._prepared = self._prepared, None
-        services.download(self._session, data, restart, progress, prepared, start=start, boot=self._boot)
+        services.download(self._session, data, restart, progress, prepared, start=start, boot=boot)
 
     def _change(self, data: bytes, progress: Callable[[int], None]) -> None:
         prepared, self._prepared = self._prepared, None

@@ -128,7 +128,7 @@ class Simulator(Controller):
         self._closed = False
         try:
             self._power_on(cycle_limit_ms)
-            self._download(image, start=False, restart=True, progress=lambda done: None)
+            self._download(image, start=False, restart=True, boot=None, progress=lambda done: None)
             if self._watcher is not None:
                 self._watcher.made(self)
             if start:
@@ -231,9 +231,15 @@ class Simulator(Controller):
         reason = self._ffi.string(self._lib.AppTakeReason()).decode("latin-1")
         l7.check_result(result, action, reason if result == lib.ERR_OPERATION_DENIED else "")
 
-    def _download(self, data: bytes, start: bool, restart: bool, progress: Callable[[int], None]) -> None:
+    def _download(
+        self, data: bytes, start: bool, restart: bool, boot: bool | None, progress: Callable[[int], None]
+    ) -> None:
         self._check_allowed(lib.OPERATION_DOWNLOAD, "download")
-        self._send(data, self._lib.AppDownloadEnd, "download", progress)
+        end = self._lib.AppDownloadTry if boot is False else self._lib.AppDownloadEnd
+        self._send(data, end, "download", progress)
+
+    def create_boot_project(self) -> None:
+        l7.check_result(self._lib.AppCreateBootProject(), "boot")
 
     def _change(self, data: bytes, progress: Callable[[int], None]) -> None:
         self._check_allowed(lib.OPERATION_ONLINE_CHANGE, "online change")

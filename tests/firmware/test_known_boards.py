@@ -19,9 +19,9 @@ def configurations(board: Path) -> set[str]:
     match = re.search(r"configs = \[(.*?)\] \+ \(board_has_second_uart \? \[(.*?)\] : \[\]\)", build)
     assert match
     text = (board / "meson.build").read_text()
-    own_can = {"can"} if "board_can_sources = " in text else set()
+    own_can = {"can", "canopen", "canopen-manager"} if "board_can_sources = " in text else set()
     return own_can | set(
-        re.findall(r"'(\w+)'", match[1] + (match[2] if "board_has_second_uart = true" in text else ""))
+        re.findall(r"'([\w-]+)'", match[1] + (match[2] if "board_has_second_uart = true" in text else ""))
     )
 
 
