@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from shutil import rmtree
 from subprocess import PIPE
+from threading import Timer
 
 import pytest
 
@@ -25,7 +26,7 @@ from plctool.device import Plc
 from plctool.errors import EXIT_INTERRUPTED, DeviceError
 from plctool.link.tcp import TcpTransport
 from plctool.testing.plcrt import Plcrt
-from plctool.testing.waiting import eventually
+from plctool.testing.waiting import PATIENCE, eventually
 
 
 @pytest.fixture
@@ -308,6 +309,8 @@ def test_saved_file_runs_and_a_mistake_in_it_is_only_said(project: Path, plcrt: 
         connect(f"tcp:{plcrt.tcp}") as plc,
     ):
         assert watching.stdout is not None and watching.stderr is not None
+        ends = Timer(3 * PATIENCE, watching.kill)  # and with it what is read here
+        ends.start()
         try:
             assert "already" in watching.stdout.readline()
             (project / "main.st").write_text(program(BODY + " mistake;"))
@@ -321,6 +324,7 @@ def test_saved_file_runs_and_a_mistake_in_it_is_only_said(project: Path, plcrt: 
             assert next(line for line in lines if line.startswith("changed: "))
             assert plc.raw_status().state == "run"
         finally:
+            ends.cancel()
             watching.send_signal(signal.SIGINT)
         assert watching.wait(60) == EXIT_INTERRUPTED
 
