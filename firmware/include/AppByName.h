@@ -41,7 +41,7 @@ RTS_RESULT AppFindVariableByName(const char *name, RTS_UI32 signature, APP_NAMED
 RTS_RESULT AppCallFunction(const APP_NAMED *function, void *parameters, RTS_SIZE size);
 
 /* Copies the value of a variable. The same errors, without ERR_EXCEPTION: values can be looked at then. Interrupts are locked
- * meanwhile; where tasks run beside main, a value of more than 8 bytes may be of two moments. */
+ * meanwhile; where tasks run beside main, a task may change a value of more than 8 bytes while it is copied. */
 RTS_RESULT AppReadVariable(const APP_NAMED *variable, void *value, RTS_SIZE size);
 RTS_RESULT AppWriteVariable(const APP_NAMED *variable, const void *value, RTS_SIZE size);
 

@@ -33,7 +33,7 @@ typedef struct {
     RTS_UI32 bus_off;  /* times */
 } CAN_BUS_COUNTERS;
 
-/* From main. ERR_DEVICE: there is no such controller, or it cannot be opened; ERR_DUPLICATE: it is attached already. */
+/* From main. ERR_DEVICE: the controller does not exist or cannot be opened; ERR_DUPLICATE: `user` is attached already. */
 RTS_RESULT CanAttach(RTS_UI32 index, CAN_USER *user);
 void CanDetach(RTS_UI32 index, CAN_USER *user);
 

@@ -286,7 +286,7 @@ enum {
     DLF_REPLYMAYWAIT = 0x100, /* own, of the service: the next block follows at once, and its reply will do for both */
     DLF_START = 0x200,        /* own, of the service: the application starts when its last block has installed it */
     DLF_CHANGE = 0x400,       /* own, of the service: an online change, or nothing */
-    DLF_TRY = 0x800,          /* own, of the service: it is no boot project until SRV_APP_CREATE_BOOTPROJECT */
+    DLF_TRY = 0x800,          /* own, of the service: not the boot project until SRV_APP_CREATE_BOOTPROJECT */
 };
 
 /* Device identities that plctool compiles for. Vendor 0 is the open default; a vendor's own id comes from SysTarget. */

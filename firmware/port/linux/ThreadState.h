@@ -16,7 +16,7 @@
 
 #define BREAK_SIGNAL (SIGRTMIN + 5) /* clear of what debuggers and libraries use; known at run time only */
 
-/* Where a thread was when it was interrupted, and its link register, 0 without. */
+/* Where a thread was interrupted. `link`: the link register, 0 on processors without one. */
 typedef struct {
     uintptr_t address, stack, link;
 } PLACE;

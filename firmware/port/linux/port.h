@@ -163,7 +163,7 @@ bool PortSockAddress(SYSSOCK_PURPOSE purpose, SOCKADDRESS *own);
 RTS_RESULT PortSockBind(const SOCKADDRESS *own, RTS_HANDLE *socket);
 /* Main no longer waits for a socket. */
 void PortSockQuiet(RTS_HANDLE socket);
-/* What poll() reports of a socket at once, and how many bytes can be read. */
+/* The events that poll() reports of a socket, without waiting; *waiting: bytes that can be read. */
 short PortSockPoll(RTS_HANDLE socket, RTS_UI32 *waiting);
 /* Lets programs reach the addresses of a list "ADDRESS[/BITS][:PORT[-PORT]],..."; without one those of this machine. False
  * if the list is not valid. */

@@ -103,7 +103,7 @@ static RTS_RESULT find(const char *name, bool is_variable, CDL_EXPORT *entry)
     return result == ERR_OK ? (RTS_RESULT)ERR_NO_OBJECT : result;
 }
 
-/* Code is read only: it is no place of a value. */
+/* A variable in the area of code is refused: code cannot be written. */
 static bool is_in_areas(const CDL_EXPORT *entry)
 {
     return entry->area < APP_AREA_CODE && AppGetAreaAddress(entry->area, entry->offset, entry->size) != NULL;

@@ -106,7 +106,8 @@ def written_tree(tree: KnownTree, source: Source) -> bytes | None:
 
 
 def _this_source() -> Source:
-    raise NotImplementedError  # `_Reader` has one in its place
+    """Stands for the source of a tree in its file. It is never called: `_Reader` puts the reader's source there."""
+    raise NotImplementedError
 
 
 def read_tree(data: bytes, source: Source) -> KnownTree | None:
