@@ -19,6 +19,7 @@
 #include "CmpLog.h"
 #include "CmpMemPool.h"
 #include "CmpStd.h"
+#include "SysExceptCatch.h"
 #include "SysTime.h"
 #include "rts_config.h"
 
@@ -115,6 +116,23 @@ static inline RTS_RESULT V3SysTimeGetUs(RTS_SYSTIME *us)
 #define GET_EventUnregisterCallback ERR_OK
 #define CHK_EventUnregisterCallback 1
 #define CAL_EventUnregisterCallback EventUnregisterCallback
+
+#define USE_SysExceptRegisterJmpBuf
+#define EXT_SysExceptRegisterJmpBuf
+#define GET_SysExceptRegisterJmpBuf ERR_OK
+#define CHK_SysExceptRegisterJmpBuf RTS_STRUCTURED_EXCEPTION_HANDLING
+#define CAL_SysExceptRegisterJmpBuf SysExceptRegisterJmpBuf
+
+#define USE_SysExceptUnregisterJmpBuf
+#define EXT_SysExceptUnregisterJmpBuf
+#define GET_SysExceptUnregisterJmpBuf ERR_OK
+#define CHK_SysExceptUnregisterJmpBuf RTS_STRUCTURED_EXCEPTION_HANDLING
+#define CAL_SysExceptUnregisterJmpBuf SysExceptUnregisterJmpBuf
+
+#define USE_SysExceptCatch /* what rts_try does itself */
+#define EXT_SysExceptCatch
+#define GET_SysExceptCatch ERR_OK
+#define CHK_SysExceptCatch RTS_STRUCTURED_EXCEPTION_HANDLING
 
 #define USE_CMUtlsnprintf
 #define EXT_CMUtlsnprintf

@@ -14,6 +14,10 @@
 #define APP_ENTRY_MODE_BIT 1
 #endif
 
+#if defined(__linux__)
+#define RTS_STRUCTURED_EXCEPTION_HANDLING 1
+#endif
+
 /* As many as SysExcept.c keeps of each. */
 #if defined(__linux__) && defined(__x86_64__)
 #define EXCEPT_REGISTERS 19

@@ -18,6 +18,7 @@
 #include "IecStack.h"
 #include "StepOver.h"
 #include "SysDebug.h"
+#include "SysExceptCatch.h"
 #if defined(__APPLE__)
 #include "../macos/ThreadState.h"
 #else
@@ -38,6 +39,9 @@ typedef struct {
     RTS_UI32 break_code;
     const void *arg;         /* of the running SysExceptTry */
     RTS_EXCEPTION exception; /* on the way from the handler to SysExceptTry */
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    RTS_TRY *tries; /* SysExceptCatch.h */
+#endif
     pthread_t thread;
     int used;
 } CONTEXT;
@@ -203,6 +207,25 @@ static void chain(const SIGNAL *signal, siginfo_t *info, void *ucontext)
     }
 }
 
+/* ---- rts_try ---- */
+
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+/* Goes to the rts_try around C code that failed, if there is one. An exception in code of the program is the program's. */
+static void catch_in_c(CONTEXT *context, RTS_UI32 code, PLACE place)
+{
+    RTS_TRY *found = NULL;
+    if (context != NULL && !SysExceptIsCode(place.address)) {
+        RTS_UI32 stack = __atomic_load_n(&context->stack.running, __ATOMIC_RELAXED);
+        found = SysExceptCatch(&context->tries, stack, code, place.address, place.stack);
+    }
+    if (found != NULL) {
+        longjmp(found->buffer, 1);
+    }
+}
+#else
+#define catch_in_c(context, code, place) ((void)0)
+#endif
+
 /* ---- the debugger ---- */
 
 void SysDebugSetHandler(PF_SYS_DEBUG handler)
@@ -301,6 +324,9 @@ static void on_fault(int number, siginfo_t *info, void *ucontext)
     IecStackResetFlags();
     CONTEXT *context = self();
     SIGNAL *signal = find_signal(number);
+    if (info->si_code > 0) { /* none that another process sent */
+        catch_in_c(context, signal->code, place_of(ucontext));
+    }
     if (is_debugged(context) && goes_on(context, fault_code(context, signal, info), info, ucontext)) {
         return;
     }
@@ -488,8 +514,15 @@ static void begin_round(CONTEXT *context, const void *arg)
 bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     CONTEXT *context = own_context();
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    RTS_TRY *outer = context->tries;
+#endif
     begin_round(context, arg);
-    if (!IecStackRun(&context->stack, fn, arg)) {
+    bool ended = IecStackRun(&context->stack, fn, arg);
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    context->tries = outer; /* an exception leaves those within registered */
+#endif
+    if (!ended) {
         *exception = context->exception;
         return false;
     }
@@ -498,11 +531,21 @@ bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     return true;
 }
 
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+RTS_TRY **SysExceptTries(RTS_UI32 *place)
+{
+    CONTEXT *context = own_context();
+    *place = __atomic_load_n(&context->stack.running, __ATOMIC_RELAXED);
+    return &context->tries;
+}
+#endif
+
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
     IecStackResetFlags();
     CONTEXT *context = self();
     PLACE place = {.address = address, .stack = (uintptr_t)stack};
+    catch_in_c(context, code, place);
     if (is_debugged(context)) {
         (void)ask_debugger(context, code, place);
     }

@@ -36,6 +36,7 @@
 
 #include "BareMetal.h"
 #include "SysDebug.h"
+#include "SysExceptCatch.h"
 #include "ThumbStep.h"
 #include "rts_config.h"
 
@@ -71,6 +72,9 @@ typedef struct {
     RTS_UI32 outer_control; /* of the depth below, or of main */
     RTS_UI32 gate;          /* where a function that has a gate returns to; 0: none runs */
 #endif
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    RTS_TRY *outer_tries;
+#endif
 } TRY;
 
 typedef RTS_UI8 IEC_STACK[RTS_IEC_STACK_SIZE];
@@ -91,6 +95,9 @@ __attribute__((section(".bss.iec_stack"), aligned(IEC_STACK_ALIGN))) static IEC_
 static struct {
     TRY *top; /* past the innermost that runs */
     TRY tries[APP_MAX_TASKS];
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    RTS_TRY *newest; /* of rts_try, in all contexts: they nest as interrupts do */
+#endif
 } state;
 
 static FRAME *process_stack(void)
@@ -103,6 +110,13 @@ static FRAME *process_stack(void)
 static void set_process_stack(FRAME *pointer)
 {
     __asm__ volatile("msr psp, %0" ::"r"(pointer) : "memory");
+}
+
+static bool in_try(void)
+{
+    RTS_UI32 control;
+    __asm__ volatile("mrs %0, control" : "=r"(control));
+    return (control & CONTROL_SPSEL) != 0;
 }
 
 static uintptr_t stack_slot(const TRY *try)
@@ -283,6 +297,9 @@ __attribute__((used)) static RTS_UI32 enter_try(FRAME *caller, RTS_UI32 exc_retu
     try->entered = caller;
     try->outer_process = process_stack();
     try->exc_return = exc_return;
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    try->outer_tries = state.newest;
+#endif
     frame->r0 = caller->r1;
     frame->lr = (RTS_UI32)(uintptr_t)try_return;
     frame->pc = caller->r0 & ~1u;
@@ -307,6 +324,9 @@ __attribute__((used)) static RTS_UI32 leave_try(RTS_UI32 code, RTS_UI32 address,
         SysExceptTrace(address, (const uintptr_t *)stack, (const uintptr_t *)(try->first + 1), link);
     try->entered->r0 = code;
     try->entered->r1 = address;
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    state.newest = try->outer_tries;
+#endif
     set_process_stack(try->outer_process);
     give_back_rights(try);
     return try->exc_return;
@@ -418,6 +438,142 @@ static uintptr_t address_of(RTS_UI32 cfsr, RTS_UI32 code, const FRAME *frame, co
         return (frame->lr & ~1u) - 2;
     return frame->pc;
 }
+
+/* ---- rts_try ---- */
+
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+
+#ifdef __ARM_FP
+#define SAVE_FPU "vstm r0, {s16-s31}\n\t"
+#define LOAD_FPU "vldm r0, {s16-s31}\n\t"
+enum { SAVED_BY_TRY = (10 + 16) * 4 };
+#else
+#define SAVE_FPU ""
+#define LOAD_FPU ""
+enum { SAVED_BY_TRY = 10 * 4 };
+#endif
+RTS_STATIC_ASSERT(sizeof(RTS_JMP_BUF) >= SAVED_BY_TRY, buffer_holds_what_is_saved);
+
+__attribute__((naked)) int SysExceptSetJmp(RTS_JMP_BUF buffer)
+{
+    RTS_UNUSED(buffer);
+    __asm__ volatile("mov r1, sp\n\tstmia r0!, {r1, r4-r11, lr}\n\t" SAVE_FPU "movs r0, #0\n\tbx lr");
+}
+
+/* Goes on after it. */
+__attribute__((naked, noreturn)) static void go_to_catch(const uintptr_t *buffer)
+{
+    RTS_UNUSED(buffer);
+    __asm__ volatile("ldmia r0!, {r1, r4-r11, lr}\n\t" LOAD_FPU "mov sp, r1\n\tmovs r0, #1\n\tbx lr");
+}
+
+/* Places: the number of the exception that runs, 0 for main; above those the depth of a Try. */
+enum { PLACE_IN_TRY = 0x200, PLACE_UNKNOWN = 0x1FF };
+
+static RTS_UI32 place_in_try(void)
+{
+    return PLACE_IN_TRY + (RTS_UI32)(state.top - state.tries);
+}
+
+/* What is called without a gate may not write the list. */
+static bool may_catch_in_try(void)
+{
+#if RTS_IEC_UNPRIVILEGED
+    return state.top[-1].gate != 0;
+#else
+    return true;
+#endif
+}
+
+RTS_TRY **SysExceptTries(RTS_UI32 *place)
+{
+    if (!in_try()) {
+        *place = CpuExceptionNumber();
+        return &state.newest;
+    }
+    *place = place_in_try();
+    return may_catch_in_try() ? &state.newest : NULL;
+}
+
+/* Registers of the FPU that wait to be saved are of what is left. */
+static void forget_fpu(RTS_UI32 exc_return)
+{
+#ifdef __ARM_FP
+    enum { FPCCR_LSPACT = 1 };
+    if (!(exc_return & EXC_RETURN_BASIC))
+        FPU_FPCCR &= ~(RTS_UI32)FPCCR_LSPACT;
+#else
+    RTS_UNUSED(exc_return);
+#endif
+}
+
+/* Makes the frame that leads there, below what is live on the stack of rts_try. */
+static FRAME *frame_to(const RTS_TRY *found, RTS_UI32 number)
+{
+    FRAME *frame = (FRAME *)(found->buffer[0] & ~(uintptr_t)7) - 1;
+
+    frame->r0 = (RTS_UI32)(uintptr_t)found->buffer;
+    frame->pc = (RTS_UI32)(uintptr_t)go_to_catch & ~1u;
+    frame->xpsr = XPSR_THUMB | number;
+    __asm__ volatile("msr basepri, %0" ::"r"(0) : "memory");
+    return frame;
+}
+
+/* Where a fault in a Try returns to; 0: none caught it. An exception in code of the program is the program's. */
+static RTS_UI32 catch_in_try(RTS_UI32 code, uintptr_t address, const FRAME *frame, RTS_UI32 exc_return)
+{
+    RTS_TRY *found = NULL;
+
+    if (may_catch_in_try() && !SysExceptIsCode(address))
+        found = SysExceptCatch(&state.newest, place_in_try(), code, address, (uintptr_t)frame);
+    if (found == NULL)
+        return 0;
+    forget_fpu(exc_return);
+    set_process_stack(frame_to(found, 0));
+    return (RTS_UI32)EXC_RETURN_THREAD_PSP;
+}
+
+static void clear_fault(RTS_UI32 cfsr);
+
+/* A fault on the main stack, handled on a stack of its own: where to return to in the high word, with which stack pointer
+ * in the low one. */
+__attribute__((used)) static RTS_UI64 catch_in_runtime(FRAME *frame, RTS_UI32 exc_return)
+{
+    enum { EXC_RETURN_THREAD = 8, XPSR_EXCEPTION = 0x1FF };
+    RTS_UI32 cfsr = SCB_CFSR;
+    bool lost = (cfsr & CFSR_STACKING) != 0;
+    RTS_UI32 main_or_not = exc_return & EXC_RETURN_THREAD ? 0 : PLACE_UNKNOWN;
+    RTS_UI32 place = lost ? main_or_not : frame->xpsr & XPSR_EXCEPTION;
+    uintptr_t address = lost ? 0 : frame->pc;
+    RTS_UI32 code = lost ? (RTS_UI32)RTSEXCPT_STACK_OVERFLOW : code_of(cfsr);
+    RTS_TRY *found = SysExceptCatch(&state.newest, place, code, address, (uintptr_t)frame);
+
+    if (found == NULL)
+        ResetNow(RESET_FATAL, address);
+    clear_fault(cfsr);
+    forget_fpu(exc_return);
+    return (RTS_UI64)(exc_return | EXC_RETURN_BASIC) << 32 | (uintptr_t)frame_to(found, place);
+}
+
+static __attribute__((aligned(8), used)) RTS_UI32 fault_stack[48];
+#define FAULT_STACK_TOP "fault_stack + 192"
+
+/* SysExceptRaise: the same stack and rights. */
+static void catch_raised(RTS_UI32 code, uintptr_t address, const void *stack)
+{
+    RTS_UI32 place;
+    RTS_TRY **list = SysExceptTries(&place);
+    RTS_TRY *found = NULL;
+
+    if (list != NULL && !SysExceptIsCode(address))
+        found = SysExceptCatch(list, place, code, address, (uintptr_t)stack);
+    if (found != NULL)
+        go_to_catch(found->buffer);
+}
+#else
+#define catch_in_try(code, address, frame, exc_return) 0
+#define catch_raised(code, address, stack) ((void)0)
+#endif
 
 /* ---- the debugger ---- */
 
@@ -713,6 +869,15 @@ static RTS_UI32 debug_fault(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved, 
 #define LOAD_THE_OTHERS ""
 #endif
 
+static void clear_fault(RTS_UI32 cfsr)
+{
+    SCB_CFSR = cfsr;
+    SCB_HFSR = SCB_HFSR;
+    /* What could not be stacked stays pending: it belongs to the function that is left now. */
+    SCB_SHCSR &= ~(RTS_UI32)SHCSR_PENDING;
+    CpuRestore(0); /* the fault may have been in a place where interrupts are masked */
+}
+
 __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved)
 {
     RTS_UI32 goes_to;
@@ -723,11 +888,10 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     RTS_UI32 code = is_overflow(cfsr, frame, stack_end(try)) ? RTSEXCPT_STACK_OVERFLOW : code_of(cfsr);
     uintptr_t address = address_of(cfsr, code, frame, try);
     note_fault(cfsr);
-    SCB_CFSR = cfsr;
-    SCB_HFSR = SCB_HFSR;
-    /* What could not be stacked stays pending: it belongs to the function that is left now. */
-    SCB_SHCSR &= ~(RTS_UI32)SHCSR_PENDING;
-    CpuRestore(0); /* the fault may have been in a place where interrupts are masked */
+    clear_fault(cfsr);
+    goes_to = catch_in_try(code, address, frame, exc_return);
+    if (goes_to != 0)
+        return goes_to;
     if (cfsr & CFSR_STACKING)
         return leave_try(code, address, 0, 0);
     goes_to = debug_fault(frame, exc_return, saved, code);
@@ -739,12 +903,22 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
 
 /* A fault on the main stack is one of the runtime; that stack may be at its end, so it is given up. */
 __attribute__((naked)) void FaultHandler(void);
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+void FaultHandler(void)
+{
+    __asm__ volatile("tst lr, #4\n\tbne 1f\n\tmrs r0, msp\n\tldr r1, =" FAULT_STACK_TOP "\n\tmsr msp, r1\n\t"
+                     "mov r1, lr\n\tbl catch_in_runtime\n\tmsr msp, r0\n\tbx r1\n\t.ltorg\n"
+                     "1:\tmrs r0, psp\n\tmov r1, lr\n\t" SAVE_THE_OTHERS "bl fault_dispatch\n\t" LOAD_THE_OTHERS
+                     "bx r0");
+}
+#else
 void FaultHandler(void)
 {
     __asm__ volatile("tst lr, #4\n\tbne 1f\n\tmrs r0, msp\n\tldr r1, =stack_top\n\tmsr msp, r1\n\tmov r1, lr\n\t"
                      "b fault_dispatch\n\t.ltorg\n1:\tmrs r0, psp\n\tmov r1, lr\n\t" SAVE_THE_OTHERS
                      "bl fault_dispatch\n\t" LOAD_THE_OTHERS "bx r0");
 }
+#endif
 
 __attribute__((used)) static RTS_UI32 nmi_dispatch(FRAME *frame, RTS_UI32 exc_return)
 {
@@ -769,15 +943,9 @@ bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     return exception->code == RTSEXCPT_NOEXCEPTION;
 }
 
-static bool in_try(void)
-{
-    RTS_UI32 control;
-    __asm__ volatile("mrs %0, control" : "=r"(control));
-    return (control & CONTROL_SPSEL) != 0;
-}
-
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
+    catch_raised(code, address & ~(uintptr_t)1, stack);
     if (!in_try())
         ResetNow(RESET_FATAL, (RTS_UI32)address);
 #if BP_MAX > 0

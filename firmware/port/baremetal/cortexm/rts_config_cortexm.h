@@ -13,6 +13,9 @@
 /* EXCEPT_REGISTERS_ARMV7M; what is saved for a debugger. */
 #define EXCEPT_REGISTERS (BP_MAX > 0 ? 19 : 0)
 
+/* What rts_try saves (SysExceptCatch.h): sp, r4 to r11, lr, s16 to s31. */
+#define RTS_JMP_BUF_WORDS (10 + (CPU_HAS_FPU ? 16 : 0))
+
 /* Of RTS_IEC_STACK_SIZE these are not the program's [bytes]: what IecCall saves at most, the frame that the processor
  * pushes when the program is interrupted, larger with an FPU (BOARD_TARGET_ID), and the guard. */
 #define RTS_IEC_STACK_GUARD (RTS_IEC_UNPRIVILEGED ? 0 : 32)

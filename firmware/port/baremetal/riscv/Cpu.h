@@ -86,6 +86,7 @@ void CpuInit(void);
 void CpuTaskSetLevel(RTS_UI32 timer, RTS_UI32 level);
 void CpuTaskTrigger(RTS_UI32 timer);
 void CpuTaskForget(RTS_UI32 timer);
+RTS_UI32 CpuTaskLevel(void); /* of the task that runs; 255: main */
 
 static inline void CpuTaskEnable(RTS_UI32 timer, RTS_UI32 level)
 {
@@ -108,6 +109,9 @@ RTS_STATIC_ASSERT(sizeof(FRAME) == 80, frame_is_what_trap_c_says);
 void SysExceptTrap(FRAME *frame, RTS_UI32 cause);
 /* With BP_MAX: a fault. `saved`: s0 to s11, which may be changed. */
 void SysExceptFault(FRAME *frame, RTS_UI32 cause, RTS_UI32 *saved);
+
+/* A fault of the runtime: goes on at the rts_try around it, if there is one. */
+void SysExceptCatchFault(RTS_UI32 cause, uintptr_t address, uintptr_t stack);
 
 /* The clock's interrupt, and that of tasks. */
 void ClockInterrupt(void);

@@ -31,6 +31,7 @@
 #include "BareMetal.h"
 #include "RiscvStep.h"
 #include "SysDebug.h"
+#include "SysExceptCatch.h"
 #include "rts_config.h"
 
 #include <string.h>
@@ -52,6 +53,9 @@ typedef struct {
     uintptr_t slot; /* its stack; never changes */
     const void *arg;
     RTS_UI32 gate; /* where a function that has a gate returns to; 0: none runs */
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    RTS_TRY *outer_tries;
+#endif
 } TRY;
 
 typedef RTS_UI8 IEC_STACK[RTS_IEC_STACK_SIZE];
@@ -64,7 +68,16 @@ __attribute__((section(".bss.iec_stack"), aligned(RTS_IEC_STACK_SIZE))) static I
 static struct {
     TRY *top; /* past the innermost that runs */
     TRY tries[APP_MAX_TASKS];
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    RTS_TRY *newest; /* of rts_try, in all contexts: they nest as interrupts do */
+#endif
 } state;
+
+/* Whether the caller is: by the stack pointer, which is as high as the end of a stack that nothing is on. */
+static bool in_try(void)
+{
+    return (uintptr_t)__builtin_frame_address(0) - (uintptr_t)stacks - 1 < sizeof(stacks);
+}
 
 /* ---- rights ---- */
 
@@ -211,6 +224,9 @@ bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     state.top = try + 1;
     try->arg = arg;
     try->gate = 0;
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    try->outer_tries = state.newest;
+#endif
     allow_stack(try->slot);
     RTS_UI64 result = try_enter(fn, arg, try, try->slot + RTS_IEC_STACK_SIZE);
     exception->code = (RTS_UI32)result;
@@ -229,6 +245,9 @@ __attribute__((noreturn)) static void leave(RTS_UI32 code, RTS_UI32 address, uin
     TRY *try = --state.top;
     if (code != RTSEXCPT_NOEXCEPTION && is_readable(try, stack))
         SysExceptTrace(address, (const uintptr_t *)stack, (const uintptr_t *)(try->slot + RTS_IEC_STACK_SIZE), link);
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    state.newest = try->outer_tries;
+#endif
     if (try > state.tries)
         allow_stack(try[-1].slot);
     try_leave(code, address, try->frame + 1);
@@ -309,6 +328,92 @@ static uintptr_t address_of(RTS_UI32 cause, RTS_UI32 code, const FRAME *frame)
         return frame->ra - 2;
     return frame->pc;
 }
+
+/* ---- rts_try ---- */
+
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+
+__attribute__((naked)) int SysExceptSetJmp(RTS_JMP_BUF buffer)
+{
+    RTS_UNUSED(buffer);
+    __asm__ volatile("sw sp, 0(a0)\n\tsw s0, 4(a0)\n\tsw s1, 8(a0)\n\tsw s2, 12(a0)\n\tsw s3, 16(a0)\n\t"
+                     "sw s4, 20(a0)\n\tsw s5, 24(a0)\n\tsw s6, 28(a0)\n\tsw s7, 32(a0)\n\tsw s8, 36(a0)\n\t"
+                     "sw s9, 40(a0)\n\tsw s10, 44(a0)\n\tsw s11, 48(a0)\n\tsw ra, 52(a0)\n\tli a0, 0\n\tret");
+}
+
+/* Goes on after it, with interrupts. */
+__attribute__((naked, noreturn)) static void go_to_catch(const uintptr_t *buffer)
+{
+    RTS_UNUSED(buffer);
+    __asm__ volatile("lw sp, 0(a0)\n\tlw s0, 4(a0)\n\tlw s1, 8(a0)\n\tlw s2, 12(a0)\n\tlw s3, 16(a0)\n\t"
+                     "lw s4, 20(a0)\n\tlw s5, 24(a0)\n\tlw s6, 28(a0)\n\tlw s7, 32(a0)\n\tlw s8, 36(a0)\n\t"
+                     "lw s9, 40(a0)\n\tlw s10, 44(a0)\n\tlw s11, 48(a0)\n\tlw ra, 52(a0)\n\tli a0, 1\n\t"
+                     "csrsi mstatus, %0\n\tret" ::"i"(MSTATUS_MIE));
+}
+
+/* Places: the level of the task in whose interrupt the runtime is, or that of main; above those the depth of a Try. */
+enum { PLACE_IN_TRY = 0x200 };
+
+static RTS_UI32 place_in_try(void)
+{
+    return PLACE_IN_TRY + (RTS_UI32)(state.top - state.tries);
+}
+
+/* What is called without a gate may not write the list. */
+RTS_TRY **SysExceptTries(RTS_UI32 *place)
+{
+    if (!in_try()) {
+        *place = CpuTaskLevel();
+        return &state.newest;
+    }
+    *place = place_in_try();
+    return state.top[-1].gate != 0 ? &state.newest : NULL;
+}
+
+/* An exception in code of the program is the program's. */
+static RTS_TRY *find_catch(RTS_TRY **list, RTS_UI32 place, RTS_UI32 code, uintptr_t address, uintptr_t stack)
+{
+    return list == NULL || SysExceptIsCode(address) ? NULL : SysExceptCatch(list, place, code, address, stack);
+}
+
+/* True if a fault in a Try was caught: the frame leads there. */
+static bool catch_in_try(const TRY *try, RTS_UI32 code, uintptr_t address, FRAME *frame)
+{
+    RTS_TRY **list = try->gate != 0 ? &state.newest : NULL;
+    RTS_TRY *found = find_catch(list, place_in_try(), code, address, frame->sp);
+
+    if (found == NULL)
+        return false;
+    frame->a0 = (RTS_UI32)(uintptr_t)found->buffer;
+    frame->pc = (RTS_UI32)(uintptr_t)go_to_catch;
+    frame->sp = found->buffer[0];
+    return true;
+}
+
+void SysExceptCatchFault(RTS_UI32 cause, uintptr_t address, uintptr_t stack)
+{
+    /* Without interrupts it is one of a device's, or its own: the level says which task it interrupts. */
+    bool interruptible = (CSR_READ("mstatus") & MSTATUS_MPIE) != 0;
+    RTS_TRY *found = interruptible ? find_catch(&state.newest, CpuTaskLevel(), code_of(cause), address, stack) : NULL;
+
+    if (found != NULL)
+        go_to_catch(found->buffer);
+}
+
+/* SysExceptRaise: the same stack and rights. */
+static void catch_raised(RTS_UI32 code, uintptr_t address, const void *stack)
+{
+    RTS_UI32 place;
+    RTS_TRY **list = SysExceptTries(&place);
+    RTS_TRY *found = find_catch(list, place, code, address, (uintptr_t)stack);
+
+    if (found != NULL)
+        go_to_catch(found->buffer);
+}
+#else
+#define catch_in_try(try, code, address, frame) false
+#define catch_raised(code, address, stack) ((void)0)
+#endif
 
 #if BP_MAX > 0
 
@@ -496,7 +601,7 @@ __attribute__((used)) void SysExceptFault(FRAME *frame, RTS_UI32 cause, RTS_UI32
 {
     TRY *try = state.top - 1;
     RTS_UI32 code = is_overflow(try, frame, cause) ? RTSEXCPT_STACK_OVERFLOW : code_of(cause);
-    if (!debug_fault(frame, saved, code)) {
+    if (!catch_in_try(try, code, address_of(cause, code, frame), frame) && !debug_fault(frame, saved, code)) {
         note_registers(frame, saved, cause, CSR_READ("mtval"));
         leave(code, address_of(cause, code, frame), frame->sp, frame->ra);
     }
@@ -512,19 +617,16 @@ void SysExceptTrap(FRAME *frame, RTS_UI32 cause)
         return;
     }
     RTS_UI32 code = is_overflow(try, frame, cause) ? RTSEXCPT_STACK_OVERFLOW : code_of(cause);
+    if (catch_in_try(try, code, address_of(cause, code, frame), frame))
+        return;
     leave(code, address_of(cause, code, frame), frame->sp, frame->ra);
 }
 
 /* ---- for the runtime ---- */
 
-/* The stack pointer, which is as high as the end of a stack that nothing is on. */
-static bool in_try(void)
-{
-    return (uintptr_t)__builtin_frame_address(0) - (uintptr_t)stacks - 1 < sizeof(stacks);
-}
-
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
+    catch_raised(code, address & ~(uintptr_t)1, stack);
     if (!in_try())
         ResetNow(RESET_FATAL, (RTS_UI32)address);
 #if BP_MAX > 0

@@ -15,6 +15,9 @@
 /* EXCEPT_REGISTERS_RISCV32; what is saved for a debugger. */
 #define EXCEPT_REGISTERS (BP_MAX > 0 ? 32 : 0)
 
+/* What rts_try saves (SysExceptCatch.h): sp, s0 to s11, ra. */
+#define RTS_JMP_BUF_WORDS 14
+
 /* Of RTS_IEC_STACK_SIZE this is not the program's [bytes]: what IecCall saves. Traps are on the main stack. */
 #define RTS_IEC_STACK_LOST 16
 

@@ -28,6 +28,11 @@ void CpuTaskTrigger(RTS_UI32 timer)
     (void)CLINT_MSIP; /* it has arrived: a better task runs before the caller goes on */
 }
 
+RTS_UI32 CpuTaskLevel(void)
+{
+    return waiting.running;
+}
+
 void CpuTaskForget(RTS_UI32 timer)
 {
     __atomic_fetch_and(&waiting.pending, ~(1u << timer), __ATOMIC_RELAXED);

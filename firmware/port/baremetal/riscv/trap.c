@@ -16,8 +16,19 @@ __attribute__((naked, section(".vectors"), used)) void start(void)
 }
 
 /* A fault of the runtime; it may be that its stack was at its end, so it is given up. */
-__attribute__((used, noreturn)) static void runtime_fault(RTS_UI32 pc)
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+static __attribute__((aligned(16), used)) RTS_UI32 fault_stack[64];
+#define FAULT_STACK "csrrw a1, mscratch, zero\n\tla sp, fault_stack + 256\n\t"
+#else
+#define FAULT_STACK "la sp, stack_top\n\t"
+#endif
+__attribute__((used, noreturn)) static void runtime_fault(RTS_UI32 pc, uintptr_t stack)
 {
+#if RTS_STRUCTURED_EXCEPTION_HANDLING
+    SysExceptCatchFault(CpuFaultStatus(), pc, stack);
+#else
+    RTS_UNUSED(stack);
+#endif
     ResetNow(RESET_FATAL, pc);
 }
 
@@ -94,9 +105,7 @@ __attribute__((naked, aligned(4))) static void trap_entry(void)
                      "3:\tlw t0, 4(sp)\n\t"
                      "addi sp, sp, 80\n\t"
                      "mret\n"
-                     "4:\tcsrr a0, mepc\n\t"
-                     "la sp, stack_top\n\t"
-                     "tail runtime_fault");
+                     "4:\tcsrr a0, mepc\n\t" FAULT_STACK "tail runtime_fault");
 }
 
 void CpuInit(void)

@@ -20,6 +20,7 @@
 #define SCHED_LEVEL_EVENTS 0
 #define IEC_TASK_HANDLER 0
 #define LOG_KEEP 0
+#define RTS_STRUCTURED_EXCEPTION_HANDLING 0
 
 /* A second connection has no room in its 64 KiB. */
 #define COMM_MAX_CLIENTS 1
