@@ -101,3 +101,38 @@ def write_guarded_program(folder: Path, *, guard: str = GUARD, others: str = OTH
     listed = "[OptionalObjects]\nSupportedObjects=13\n12=0x100C\n13=0x100D"
     eds.write_text(eds.read_text().replace("[OptionalObjects]\nSupportedObjects=11", listed) + GUARD_OBJECTS)
     return path
+
+
+def eight_nodes(folder: Path) -> Path:
+    """The sources of a program that runs by a SYNC of 10 ms, with eight nodes that follow it."""
+    folder.mkdir(exist_ok=True)
+    shutil.copy(VALVES, folder / "valves.eds")
+    numbers = range(1, 9)
+    variables = ", ".join(f"in{n}, out{n}" for n in numbers)
+    moves = " ".join(f"out{n} := in{n};" for n in numbers)
+    path = folder / "app.st"
+    path.write_text(
+        f"""
+VAR_GLOBAL motions : UDINT; END_VAR
+PROGRAM Main VAR {variables} : BYTE; END_VAR {moves} motions := motions + 1; END_PROGRAM
+CONFIGURATION Plant RESOURCE Cpu ON Plc
+TASK Motion(EVENT := 'Bus.sync', PRIORITY := 1);
+PROGRAM m WITH Motion : Main;
+END_RESOURCE END_CONFIGURATION
+"""
+    )
+    nodes = "".join(
+        f"""
+[[canopen.device]]
+name = "N{n}"
+node = {n}
+eds = "valves.eds"
+heartbeat = "T#1s"
+transmission = "sync"
+in = {{ "6000:01" = "m.in{n}" }}
+out = {{ "6200:01" = "m.out{n}" }}
+"""
+        for n in numbers
+    )
+    (folder / "app.io.toml").write_text('[[canopen]]\nname = "Bus"\nnode = 127\nsync = { every = "T#10ms" }\n' + nodes)
+    return path

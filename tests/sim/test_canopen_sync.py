@@ -10,7 +10,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from canopen_programs import write_program
+from canopen_programs import eight_nodes, write_program
 
 from plctool.compiler.syntax.diagnostics import CompileError
 from plctool.sim import Simulator
@@ -126,6 +126,21 @@ def test_sync_goes_on_while_the_program_is_stopped_and_ends_with_its_description
         plc.start()
         plc.run_for(100)
         assert plc.read("Valves.ok")
+
+
+def test_eight_nodes_exchange_their_values_at_each_sync_of_a_minute(tmp_path: Path) -> None:
+    path = eight_nodes(tmp_path)
+    with Simulator.from_sources(path) as plc:
+        plc.run_for(3000)
+        before = plc.read("motions")
+        plc.run_for(58_000)
+        plc.can_receive()
+        plc.run_for(2000)
+        ids = [f.id for f in plc.can_receive()]
+        assert plc.read("motions") - before == 6000
+        assert [ids.count(SYNC)] + [ids.count(base + n) for base in (0x180, 0x200) for n in range(1, 9)] == [200] * 17
+        assert all(plc.read(f"N{n}.ok") for n in range(1, 9))
+        assert [entry.text for entry in plc.log() if "lost" in entry.text] == []
 
 
 @pytest.mark.parametrize(

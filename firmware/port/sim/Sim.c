@@ -428,6 +428,14 @@ static void run_timer(TIMER *timer)
 
 const SIM_BUS *SimBus;
 
+static void want_pass(RTS_I64 due_ns)
+{
+    if (due_ns < sim.last_comm_ns + COMM_PAUSE_NS)
+        due_ns = sim.last_comm_ns + COMM_PAUSE_NS;
+    if (due_ns < sim.next_comm_ns)
+        sim.next_comm_ns = due_ns;
+}
+
 /* The next pass is when a bus needs it, or a call of the program. */
 static void serve_bus(void)
 {
@@ -437,10 +445,21 @@ static void serve_bus(void)
     if (AppCallsWait())
         due_ns = sim.now_ns;
 #endif
-    if (due_ns < sim.last_comm_ns + COMM_PAUSE_NS)
-        due_ns = sim.last_comm_ns + COMM_PAUSE_NS;
-    if (due_ns < sim.next_comm_ns)
-        sim.next_comm_ns = due_ns;
+    want_pass(due_ns);
+}
+
+static RTS_I64 next_of_bus(void)
+{
+    return SimBus != NULL ? SimBus->next_ns() : NEVER;
+}
+
+/* Frames of a bus pass without main, unless it has to look at one. */
+static void run_bus(RTS_I64 due_ns)
+{
+    if (due_ns > sim.now_ns)
+        sim.now_ns = due_ns;
+    if (SimBus->run(sim.now_ns))
+        want_pass(sim.now_ns);
 }
 
 static void run_comm_cycle(void)
@@ -469,7 +488,12 @@ static void run_group(TIMER *timer)
 static bool run_next(RTS_I64 end_ns)
 {
     TIMER *timer = next_timer();
+    RTS_I64 bus_ns = next_of_bus();
 
+    if (bus_ns < end_ns && bus_ns < sim.next_comm_ns && (timer == NULL || bus_ns < timer->due_ns)) {
+        run_bus(bus_ns);
+        return true;
+    }
     if (timer != NULL && timer->due_ns < end_ns && timer->due_ns <= sim.next_comm_ns) {
         run_group(timer);
         return true;
@@ -605,6 +629,11 @@ static void exchange(const IEC_CONTEXT *context)
     serve_bus();
 }
 
+static RTS_I64 earlier(RTS_I64 a, RTS_I64 b)
+{
+    return a < b ? a : b;
+}
+
 static void run_devices_until(RTS_I64 end_ns, RTS_I64 interval_ns, const IEC_CONTEXT *context)
 {
     RTS_I64 due_ns = sim.now_ns;
@@ -614,11 +643,11 @@ static void run_devices_until(RTS_I64 end_ns, RTS_I64 interval_ns, const IEC_CON
             exchange(context);
             due_ns += interval_ns;
         }
+        if (next_of_bus() <= sim.now_ns)
+            run_bus(sim.now_ns);
         if (sim.next_comm_ns <= sim.now_ns)
             run_comm_cycle();
-        sim.now_ns = sim.next_comm_ns < due_ns ? sim.next_comm_ns : due_ns;
-        if (sim.now_ns > end_ns)
-            sim.now_ns = end_ns;
+        sim.now_ns = earlier(earlier(sim.next_comm_ns, next_of_bus()), earlier(due_ns, end_ns));
     }
     exchange(context);
 }

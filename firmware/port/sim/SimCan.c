@@ -21,6 +21,7 @@ enum {
     WARNING = 96,
     PASSIVE = 128,
     OFF = 256,
+    KNOWN = 2048,
 };
 
 typedef struct {
@@ -44,7 +45,8 @@ typedef struct {
     RTS_UI32 destroy;
     RTS_UI32 lose_period;
     RTS_UI32 received;
-    bool sends; /* its first frame is on the bus */
+    bool sends;   /* its first frame is on the bus */
+    bool refused; /* the last frame that it was to send, for want of room */
 } NODE;
 
 static struct {
@@ -58,6 +60,8 @@ static struct {
     bool broken;    /* what is on the bus ends with an error */
     RTS_I64 busy_ns;
     RTS_UI32 frames;
+    RTS_UI32 count; /* of nodes, up to the last one that was started */
+    RTS_UI32 off;   /* nodes that are off, at most */
     NODE node[SIM_CAN_NODES];
 } bus;
 
@@ -183,7 +187,7 @@ static RTS_I64 bits_ns(RTS_UI32 bits, RTS_UI32 bit_rate)
     return (RTS_I64)bits * NS_PER_S / bit_rate;
 }
 
-RTS_I64 SimCanFrameNs(const CAN_FRAME *frame)
+static RTS_I64 count_frame_ns(const CAN_FRAME *frame)
 {
     BITS bits = {0, 0, 0, 0, 0};
     bool fd = (frame->flags & CAN_FLAG_FD) != 0;
@@ -196,6 +200,28 @@ RTS_I64 SimCanFrameNs(const CAN_FRAME *frame)
     if (fd) /* count of stuffed bits, check sum, the bits that are always stuffed there */
         body += frame->size <= 16 ? 27 : 32;
     return bits_ns(slow + TAIL_BITS, bus.bit_rate) + bits_ns(body, fast ? bus.data_bit_rate : bus.bit_rate);
+}
+
+/* The last classic frame of an identifier, since most frames have the data of the one before. */
+static struct {
+    CAN_FRAME frame;
+    RTS_I64 ns; /* 0: unknown */
+} known[KNOWN];
+
+static bool is_same(const CAN_FRAME *a, const CAN_FRAME *b)
+{
+    return a->flags == b->flags && a->size == b->size && memcmp(a->data, b->data, a->size) == 0;
+}
+
+RTS_I64 SimCanFrameNs(const CAN_FRAME *frame)
+{
+    RTS_UI32 place = frame->id % KNOWN;
+
+    if (known[place].ns == 0 || known[place].frame.id != frame->id || !is_same(&known[place].frame, frame)) {
+        known[place].frame = *frame;
+        known[place].ns = count_frame_ns(frame);
+    }
+    return known[place].ns;
 }
 
 /* ---- the bus ---- */
@@ -215,11 +241,6 @@ static RTS_UI32 arbitration_key(const CAN_FRAME *frame)
     return frame->id >> 18 << 21 | 1u << 20 | 1u << 19 | (frame->id & 0x3FFFF) << 1 | remote;
 }
 
-static bool is_same(const CAN_FRAME *a, const CAN_FRAME *b)
-{
-    return a->flags == b->flags && a->size == b->size && memcmp(a->data, b->data, a->size) == 0;
-}
-
 static bool wants_to_send(const NODE *node)
 {
     return takes_part(node) && node->out.count != 0;
@@ -230,7 +251,7 @@ static NODE *find_winner(void)
 {
     NODE *winner = NULL;
 
-    for (NODE *node = bus.node; node < bus.node + SIM_CAN_NODES; node++)
+    for (NODE *node = bus.node; node < bus.node + bus.count; node++)
         if (wants_to_send(node) &&
             (winner == NULL || arbitration_key(peek(&node->out)) < arbitration_key(peek(&winner->out))))
             winner = node;
@@ -246,7 +267,7 @@ static void start_frame(void)
     const CAN_FRAME *frame = peek(&winner->out);
     RTS_I64 takes = SimCanFrameNs(frame);
     bus.broken = false;
-    for (NODE *node = bus.node; node < bus.node + SIM_CAN_NODES; node++) {
+    for (NODE *node = bus.node; node < bus.node + bus.count; node++) {
         node->sends = wants_to_send(node) && arbitration_key(peek(&node->out)) == arbitration_key(frame);
         if (node->sends && (node->destroy != 0 || !is_same(peek(&node->out), frame)))
             bus.broken = true;
@@ -267,6 +288,7 @@ static void count_error(NODE *node, RTS_UI32 *counter, RTS_UI32 by)
     if (node->tx_errors >= OFF) {
         node->off = true;
         node->back_ns = NEVER;
+        bus.off++;
     }
 }
 
@@ -302,7 +324,7 @@ static void deliver(NODE *node, const CAN_FRAME *frame)
 /* A frame without another node to acknowledge it is an error, which alone takes no node off the bus. */
 static bool is_acknowledged(void)
 {
-    for (const NODE *node = bus.node; node < bus.node + SIM_CAN_NODES; node++)
+    for (const NODE *node = bus.node; node < bus.node + bus.count; node++)
         if (takes_part(node) && !node->sends)
             return true;
     return false;
@@ -310,7 +332,7 @@ static bool is_acknowledged(void)
 
 static void end_with_error(bool acknowledged)
 {
-    for (NODE *node = bus.node; node < bus.node + SIM_CAN_NODES; node++) {
+    for (NODE *node = bus.node; node < bus.node + bus.count; node++) {
         if (!takes_part(node))
             continue;
         if (!node->sends)
@@ -331,14 +353,14 @@ static void end_frame(void)
         return;
     }
     bus.frames++;
-    for (NODE *node = bus.node; node < bus.node + SIM_CAN_NODES; node++) {
+    for (NODE *node = bus.node; node < bus.node + bus.count; node++) {
         if (takes_part(node) && node->sends) {
             frame = *peek(&node->out);
             drop(&node->out);
             count_success(&node->tx_errors);
         }
     }
-    for (NODE *node = bus.node; node < bus.node + SIM_CAN_NODES; node++) {
+    for (NODE *node = bus.node; node < bus.node + bus.count; node++) {
         if (takes_part(node) && !node->sends)
             deliver(node, &frame);
         node->sends = false;
@@ -347,9 +369,10 @@ static void end_frame(void)
 
 static void bring_back(void)
 {
-    for (NODE *node = bus.node; node < bus.node + SIM_CAN_NODES; node++) {
+    for (NODE *node = bus.node; node < bus.node + bus.count && bus.off != 0; node++) {
         if (node->off && node->back_ns <= bus.now_ns) {
             node->off = false;
+            bus.off--;
             node->tx_errors = 0;
             node->rx_errors = 0;
         }
@@ -360,7 +383,7 @@ static RTS_I64 next_back(void)
 {
     RTS_I64 next = NEVER;
 
-    for (const NODE *node = bus.node; node < bus.node + SIM_CAN_NODES; node++)
+    for (const NODE *node = bus.node; node < bus.node + bus.count && bus.off != 0; node++)
         if (node->off && node->back_ns < next)
             next = node->back_ns;
     return next;
@@ -407,6 +430,7 @@ RTS_UI32 SimCanFrames(void)
 void SimCanReset(RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
 {
     memset(&bus, 0, sizeof(bus));
+    memset(known, 0, sizeof(known));
     bus.bit_rate = bit_rate;
     bus.data_bit_rate = data_bit_rate;
     bus.end_ns = NEVER;
@@ -428,6 +452,8 @@ void SimCanSetAddress(RTS_UI32 node, RTS_UI32 base)
 void SimCanStart(RTS_UI32 node)
 {
     bus.node[node].started = true;
+    if (bus.count <= node)
+        bus.count = node + 1;
 }
 
 /* A frame that is on the bus is not finished: no node gets it. */
@@ -461,7 +487,9 @@ RTS_RESULT SimCanSend(RTS_UI32 node, const CAN_FRAME *frame)
         return ERR_DEVICE;
     QUEUE *out = &bus.node[node].out;
     bool is_urgent = (frame->flags & CAN_FLAG_EXTENDED) == 0;
-    return (is_urgent ? push_urgent(out, frame, bus.node[node].sends) : push(out, frame)) ? ERR_OK : ERR_NOBUFFER;
+    bool fits = is_urgent ? push_urgent(out, frame, bus.node[node].sends) : push(out, frame);
+    bus.node[node].refused = !fits;
+    return fits ? ERR_OK : ERR_NOBUFFER;
 }
 
 RTS_RESULT SimCanReceive(RTS_UI32 node, CAN_FRAME *frame)
@@ -473,6 +501,13 @@ RTS_RESULT SimCanReceive(RTS_UI32 node, CAN_FRAME *frame)
     *frame = *peek(in);
     drop(in);
     return ERR_OK;
+}
+
+bool SimCanHasWork(RTS_UI32 node)
+{
+    const NODE *asked = &bus.node[node];
+
+    return asked->in.count != 0 || (asked->refused && asked->out.count < SIM_CAN_QUEUE);
 }
 
 static CAN_BUS_STATE state_of(const NODE *node)

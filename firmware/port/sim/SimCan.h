@@ -30,6 +30,9 @@ void SimCanStop(RTS_UI32 node);
 RTS_RESULT SimCanSetFilters(RTS_UI32 node, const CAN_FILTER *filters, RTS_UI32 count);
 RTS_RESULT SimCanSend(RTS_UI32 node, const CAN_FRAME *frame);
 RTS_RESULT SimCanReceive(RTS_UI32 node, CAN_FRAME *frame);
+
+/* True if a frame has arrived, or there is room again for one that was refused. */
+bool SimCanHasWork(RTS_UI32 node);
 void SimCanGetState(RTS_UI32 node, CAN_STATE *state);
 void SimCanRestart(RTS_UI32 node);
 

@@ -21,7 +21,7 @@ enum { TEST = 1, HEARD = 4096 };
 
 static struct {
     bool is_catching_up;
-    RTS_UI32 frames; /* on the bus when main made its last pass */
+    CAN_BUS_STATE state; /* of the device when main made its last pass */
     RTS_UI32 first;
     RTS_UI32 count;
     CAN_FRAME heard[HEARD];
@@ -41,7 +41,7 @@ static void hear(void)
     }
 }
 
-static RTS_I64 next_ns(void)
+RTS_I64 SimCanBusGetNextNs(void)
 {
     RTS_I64 of_bus = SimCanNext();
     RTS_I64 of_nodes = SimCanopenGetDueNs();
@@ -55,7 +55,7 @@ static void advance(RTS_I64 now_ns)
     RTS_I64 next;
 
     SimCanopenRun(SimCanNow()); /* what a test has changed */
-    while ((next = next_ns()) <= now_ns) {
+    while ((next = SimCanBusGetNextNs()) <= now_ns) {
         SimCanAdvance(next > SimCanNow() ? next : SimCanNow());
         SimCanopenRun(SimCanNow());
         hear();
@@ -74,15 +74,28 @@ static void catch_up(void)
     sim_bus.is_catching_up = false;
 }
 
-RTS_I64 SimCanBusGetDueNs(RTS_I64 now_ns)
+static CAN_BUS_STATE get_state(void)
+{
+    CAN_STATE state;
+
+    SimCanGetState(SIM_CAN_DEVICE, &state);
+    return state.bus;
+}
+
+bool SimCanBusRun(RTS_I64 now_ns)
 {
     advance(now_ns);
-    if (IecCanWaits() || SimCanFrames() != sim_bus.frames)
+    return SimCanHasWork(SIM_CAN_DEVICE) || IoDrvCanopenDeviceGetDueNs(now_ns) <= now_ns ||
+           get_state() != sim_bus.state;
+}
+
+RTS_I64 SimCanBusGetDueNs(RTS_I64 now_ns)
+{
+    if (SimCanBusRun(now_ns) || IecCanWaits())
         return now_ns;
     RTS_I64 of_manager = IoDrvCanopenGetDueNs(now_ns);
     RTS_I64 of_device = IoDrvCanopenDeviceGetDueNs(now_ns);
-    RTS_I64 due_ns = of_manager < of_device ? of_manager : of_device;
-    return due_ns < next_ns() ? due_ns : next_ns();
+    return of_manager < of_device ? of_manager : of_device;
 }
 
 RTS_RESULT SimCanPut(const SIM_CAN_FRAME *frame)
@@ -119,7 +132,7 @@ RTS_RESULT SimCanBus_Hook(CMP_HOOK hook)
     }
     if (hook == CH_COMM_CYCLE) {
         advance(SysTimeGetNs());
-        sim_bus.frames = SimCanFrames();
+        sim_bus.state = get_state();
     }
     return ERR_OK;
 }

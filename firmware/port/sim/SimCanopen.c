@@ -42,6 +42,7 @@ typedef struct {
     RTS_UI32 read;
     RTS_UI32 count;
     OBJECT objects[OBJECTS];
+    bool has_new_objects; /* what `pdos` has of them may be old */
     RTS_UI32 faults[IO_SIM_FAULTS];
 } NODE;
 
@@ -50,8 +51,19 @@ static NODE nodes[CANOPEN_MAX_DEVICES];
 static struct {
     RTS_UI8 data[CANOPEN_PDO_SIZE]; /* what the node measures, or has got */
     bool changed;
-    RTS_I64 event_ns; /* when an input is sent next though nothing changes */
+    bool is_sent;      /* an input that was configured */
+    RTS_UI32 event_ms; /* its event timer */
+    RTS_I64 event_ns;  /* when an input is sent next though nothing changes */
 } pdos[CANOPEN_MAX_PDOS];
+
+/* A bus has thousands of frames a second, so what they need is found by number. */
+static struct {
+    RTS_UI16 output[CANOPEN_COB_ID + 1]; /* the PDO with an identifier that a node receives, from 1 on; 0: none */
+    NODE *node[CANOPEN_MAX_NODE + 1];
+    NODE *of_pdo[CANOPEN_MAX_PDOS];
+    bool is_due_known;
+    RTS_I64 due_ns;
+} find;
 
 static CANOPEN_SETUP *setup(void)
 {
@@ -96,6 +108,7 @@ static bool store(NODE *node, const OBJECT *object, RTS_I64 now_ns)
     if (place == NULL)
         place = &node->objects[node->count++];
     *place = *object;
+    node->has_new_objects = true;
     if (object->index == OBJECT_HEARTBEAT) {
         RTS_UI32 ms = BytesGet16(object->data);
         node->heartbeat_ns = ms != 0 ? now_ns + ms * NS_PER_MS : NEVER;
@@ -144,16 +157,30 @@ static void send_state(const NODE *node)
     send(CANOPEN_HEARTBEAT + (RTS_UI32)device_of(node)->node.node, &node->state, 1);
 }
 
-static void send_input(NODE *node, RTS_UI32 pdo, RTS_I64 now_ns)
+/* What the objects of a node say of its inputs. */
+static void follow_objects(NODE *node)
+{
+    const CANOPEN_DEVICE *device = device_of(node);
+    RTS_UI32 first = (RTS_UI32)(device->pdos - setup()->pdos);
+
+    for (RTS_UI32 i = first; i < first + device->pdo_count && node->has_new_objects; i++) {
+        RTS_UI32 parameters = find_tpdo(node, setup()->pdos[i].cob);
+        pdos[i].is_sent = parameters != 0;
+        pdos[i].event_ms = parameters != 0 ? number_of(node, parameters, EVENT_TIMER) : 0;
+    }
+    node->has_new_objects = false;
+}
+
+static void send_input(RTS_UI32 pdo, RTS_I64 now_ns)
 {
     const CANOPEN_PDO_STATE *described = &setup()->pdos[pdo];
-    RTS_UI32 parameters = find_tpdo(node, described->cob);
-    RTS_UI32 event_ms = parameters != 0 ? number_of(node, parameters, EVENT_TIMER) : 0;
 
     pdos[pdo].changed = false;
-    bool is_synchronous = (described->flags & CANOPEN_PDO_SYNC) != 0;
-    pdos[pdo].event_ns = event_ms != 0 && !is_synchronous ? now_ns + event_ms * NS_PER_MS : NEVER;
-    if (parameters != 0)
+    if ((described->flags & CANOPEN_PDO_SYNC) == 0) {
+        pdos[pdo].event_ns = pdos[pdo].event_ms != 0 ? now_ns + pdos[pdo].event_ms * NS_PER_MS : NEVER;
+        find.is_due_known = false;
+    }
+    if (pdos[pdo].is_sent)
         send(described->cob, pdos[pdo].data, CanopenPdoSize(described));
 }
 
@@ -162,13 +189,14 @@ static void send_inputs(NODE *node, bool of_sync, bool all, RTS_I64 now_ns)
     const CANOPEN_DEVICE *device = device_of(node);
     RTS_UI32 first = (RTS_UI32)(device->pdos - setup()->pdos);
 
+    follow_objects(node);
     for (RTS_UI32 i = first; i < first + device->pdo_count && node->state == NODE_OPERATIONAL; i++) {
         RTS_UI32 flags = setup()->pdos[i].flags;
         bool is_synchronous = (flags & CANOPEN_PDO_SYNC) != 0;
         if ((flags & CANOPEN_PDO_OUTPUT) != 0 || is_synchronous != of_sync)
             continue;
         if (all || pdos[i].changed || pdos[i].event_ns <= now_ns)
-            send_input(node, i, now_ns);
+            send_input(i, now_ns);
     }
 }
 
@@ -179,20 +207,24 @@ static void power_on(NODE *node, RTS_I64 now_ns)
     node->state = NODE_BOOTS;
     node->toggle = 0;
     node->count = 0;
+    node->has_new_objects = true;
     node->boot_ns = now_ns + BOOT_NS;
     node->heartbeat_ns = node->reply_ns = NEVER;
+    find.is_due_known = false;
 }
 
 static void power_off(NODE *node)
 {
     node->state = OFF;
     node->boot_ns = node->heartbeat_ns = node->reply_ns = NEVER;
+    find.is_due_known = false;
 }
 
 static void command(NODE *node, RTS_UI8 command, RTS_I64 now_ns)
 {
     if (node->state == OFF || node->state == NODE_BOOTS)
         return;
+    find.is_due_known = false;
     switch (command) {
     case NMT_START:
         node->state = NODE_OPERATIONAL;
@@ -294,6 +326,7 @@ static void serve(NODE *node, RTS_UI8 *data, RTS_I64 now_ns)
 {
     OBJECT object = {.index = BytesGet16(data + 1), .sub = data[3]};
 
+    find.is_due_known = false;
     if (data[0] == SDO_ABORT)
         return;
     if (fault_of(node, IO_SIM_ANSWERS) != 0) {
@@ -332,35 +365,49 @@ static void reply_state(NODE *node)
     node->toggle ^= CANOPEN_GUARD_TOGGLE;
 }
 
-static void take_output(NODE *node, const CAN_FRAME *frame)
+static bool take_output(const CAN_FRAME *frame)
 {
-    const CANOPEN_DEVICE *device = device_of(node);
-    RTS_UI32 first = (RTS_UI32)(device->pdos - setup()->pdos);
+    RTS_UI32 place = find.output[frame->id];
 
-    for (RTS_UI32 i = first; i < first + device->pdo_count && node->state == NODE_OPERATIONAL; i++) {
-        const CANOPEN_PDO_STATE *pdo = &setup()->pdos[i];
-        if (pdo->cob == frame->id && (pdo->flags & CANOPEN_PDO_OUTPUT) != 0 && frame->size >= CanopenPdoSize(pdo))
-            memcpy(pdos[i].data, frame->data, CanopenPdoSize(pdo));
-    }
+    if (place == 0)
+        return false;
+    const CANOPEN_PDO_STATE *pdo = &setup()->pdos[place - 1];
+    if (find.of_pdo[place - 1]->state == NODE_OPERATIONAL && frame->size >= CanopenPdoSize(pdo))
+        memcpy(pdos[place - 1].data, frame->data, CanopenPdoSize(pdo));
+    return true;
 }
 
 static void take_of_node(NODE *node, CAN_FRAME *frame, RTS_I64 now_ns)
 {
-    RTS_UI8 number = device_of(node)->node.node;
     bool can_serve = node->state == NODE_OPERATIONAL || node->state == NODE_PREOPERATIONAL;
+    RTS_UI32 function = frame->id & CANOPEN_FUNCTION_MASK;
 
-    if (frame->id == CANOPEN_NMT && frame->size == 2 && (frame->data[1] == 0 || frame->data[1] == number))
-        command(node, frame->data[0], now_ns);
-    else if (frame->id == CANOPEN_SYNC)
-        send_inputs(node, true, true, now_ns);
-    else if (frame->id == CANOPEN_SDO_REQUEST + (RTS_UI32)number && frame->size == 8 && can_serve)
+    if (function == CANOPEN_HEARTBEAT && (frame->flags & CAN_FLAG_REMOTE) != 0 && node->state != OFF)
+        reply_state(node);
+    else if (function == CANOPEN_SDO_REQUEST && (frame->flags & CAN_FLAG_REMOTE) == 0 && frame->size == 8 && can_serve)
         serve(node, frame->data, now_ns);
-    else
-        take_output(node, frame);
+}
+
+static void take(CAN_FRAME *frame, RTS_I64 now_ns)
+{
+    bool is_remote = (frame->flags & CAN_FLAG_REMOTE) != 0;
+    NODE *addressed = find.node[frame->id & CANOPEN_NODE_MASK];
+
+    if (frame->id == CANOPEN_SYNC && !is_remote) {
+        FOR_EACH_NODE (node)
+            send_inputs(node, true, true, now_ns);
+    } else if (frame->id == CANOPEN_NMT && !is_remote && frame->size == 2) {
+        FOR_EACH_NODE (node)
+            if (frame->data[1] == 0 || frame->data[1] == device_of(node)->node.node)
+                command(node, frame->data[0], now_ns);
+    } else if ((is_remote || !take_output(frame)) && addressed != NULL) {
+        take_of_node(addressed, frame, now_ns);
+    }
 }
 
 static void run_node(NODE *node, RTS_I64 now_ns)
 {
+    find.is_due_known = false;
     if (node->boot_ns <= now_ns) {
         node->boot_ns = NEVER;
         send_state(node);
@@ -382,15 +429,10 @@ void SimCanopenRun(RTS_I64 now_ns)
     CAN_FRAME frame;
 
     while (SimCanReceive(SIM_CANOPEN_NODE, &frame) == ERR_OK)
-        FOR_EACH_NODE (node) {
-            CAN_FRAME own = frame;
-            if (node->state == OFF || (frame.flags & CAN_FLAG_EXTENDED) != 0)
-                continue;
-            if ((frame.flags & CAN_FLAG_REMOTE) == 0)
-                take_of_node(node, &own, now_ns);
-            else if (frame.id == CANOPEN_HEARTBEAT + (RTS_UI32)device_of(node)->node.node)
-                reply_state(node);
-        }
+        if ((frame.flags & CAN_FLAG_EXTENDED) == 0)
+            take(&frame, now_ns);
+    if (SimCanopenGetDueNs() > now_ns)
+        return;
     FOR_EACH_NODE (node)
         run_node(node, now_ns);
 }
@@ -400,7 +442,7 @@ static RTS_I64 earlier(RTS_I64 a, RTS_I64 b)
     return a < b ? a : b;
 }
 
-RTS_I64 SimCanopenGetDueNs(void)
+static RTS_I64 find_due_ns(void)
 {
     RTS_I64 due_ns = NEVER;
 
@@ -412,6 +454,14 @@ RTS_I64 SimCanopenGetDueNs(void)
             due_ns = earlier(due_ns, pdos[i].event_ns);
     }
     return due_ns;
+}
+
+RTS_I64 SimCanopenGetDueNs(void)
+{
+    if (!find.is_due_known)
+        find.due_ns = find_due_ns();
+    find.is_due_known = true;
+    return find.due_ns;
 }
 
 /* ---- channels and faults ---- */
@@ -440,6 +490,7 @@ RTS_RESULT SimCanopenSet(const IoConfigConnector *connector, const SIM_IO_PLACE 
         pdos[pdo].changed = true;
         if ((setup()->pdos[pdo].flags & (CANOPEN_PDO_SYNC | CANOPEN_PDO_OUTPUT)) == 0)
             pdos[pdo].event_ns = SimNow(); /* at once */
+        find.is_due_known = false;
     }
     return result;
 }
@@ -493,8 +544,22 @@ void SimCanopenForget(void)
 {
     memset(nodes, 0, sizeof(nodes));
     memset(pdos, 0, sizeof(pdos));
+    memset(&find, 0, sizeof(find));
     for (RTS_UI32 i = 0; i < CANOPEN_MAX_DEVICES; i++)
         power_off(&nodes[i]);
+}
+
+static void number_node(NODE *node)
+{
+    const CANOPEN_DEVICE *device = device_of(node);
+    RTS_UI32 first = (RTS_UI32)(device->pdos - setup()->pdos);
+
+    find.node[device->node.node & CANOPEN_NODE_MASK] = node;
+    for (RTS_UI32 i = first; i < first + device->pdo_count; i++) {
+        find.of_pdo[i] = node;
+        if ((setup()->pdos[i].flags & CANOPEN_PDO_OUTPUT) != 0)
+            find.output[setup()->pdos[i].cob] = (RTS_UI16)(i + 1);
+    }
 }
 
 void SimCanopenMake(RTS_I64 now_ns)
@@ -506,4 +571,6 @@ void SimCanopenMake(RTS_I64 now_ns)
         power_on(node, now_ns);
     for (RTS_UI32 i = 0; i < CANOPEN_MAX_PDOS; i++)
         pdos[i].event_ns = NEVER;
+    FOR_EACH_NODE (node)
+        number_node(node);
 }

@@ -509,8 +509,9 @@ static void cancel(EVENT_PARAM *event)
 
 RTS_RESULT SimModbus_Hook(CMP_HOOK hook)
 {
-    static const SIM_BUS bus = {SimWireOpen,      SimWireClose, SimWireRead, SimWireWrite, SimWireDiscard,
-                                SimWireGetByteNs, set_place,    get_place,   set_fault,    due_ns};
+    static const SIM_BUS bus = {SimWireOpen,    SimWireClose,     SimWireRead,        SimWireWrite,
+                                SimWireDiscard, SimWireGetByteNs, set_place,          get_place,
+                                set_fault,      due_ns,           SimCanBusGetNextNs, SimCanBusRun};
 
     if (hook == CH_INIT)
         SimBus = &bus;

@@ -58,6 +58,10 @@ typedef struct {
     RTS_RESULT (*fail)(const IoConfigConnector *connector, RTS_UI32 fault, RTS_UI32 value);
     /* When main has something to do for a bus, INT64_MAX: never. */
     RTS_I64 (*due_ns)(RTS_I64 now_ns);
+    /* When something happens on a bus that main may have nothing to do with, INT64_MAX: never. */
+    RTS_I64 (*next_ns)(void);
+    /* Lets it happen. True if main has something to do. */
+    bool (*run)(RTS_I64 now_ns);
 } SIM_BUS;
 
 extern const SIM_BUS *SimBus;

@@ -346,6 +346,8 @@ RTS_UI32 CanopenDeviceGetWaitMs(const CANOPEN_SLAVE *slave, RTS_UI32 now_ms)
         return AGAIN_MS;
     if (slave->state == NODE_BOOTS)
         return UINT32_MAX;
+    if ((slave->errors & CANOPEN_ERROR_SHORT) != 0 && slave->counters.received != slave->received_before_short)
+        return 0;
     bool is_late = CanopenPdoIsLate(slave, now_ms, &wait_ms);
     if (is_late != ((slave->errors & CANOPEN_ERROR_LATE) != 0) ||
         (slave->emergency_count != 0 && slave->state != NODE_STOPPED))
