@@ -136,3 +136,56 @@ out = {{ "6200:01" = "m.out{n}" }}
     )
     (folder / "app.io.toml").write_text('[[canopen]]\nname = "Bus"\nnode = 127\nsync = { every = "T#10ms" }\n' + nodes)
     return path
+
+
+def of_many_writes(folder: Path, nodes: int, writes: int) -> Path:
+    """The sources of a program with nodes into each of which so many values are written before they start."""
+    folder.mkdir(exist_ok=True)
+    indices = range(0x2100, 0x2100 + writes)
+    text = VALVES.read_text().replace("[ManufacturerObjects]\nSupportedObjects=2", "[ManufacturerObjects]\n{listed}")
+    listed = [f"SupportedObjects={writes + 2}", *(f"{n}=0x{index:X}" for n, index in enumerate(indices, 3))]
+    objects = (f"[{index:X}]\nParameterName=x\nDataType=0x0006\nAccessType=rw\n\n" for index in indices)
+    (folder / "many.eds").write_text(text.replace("{listed}", "\n".join(listed)) + "\n" + "".join(objects))
+    values = ", ".join(f'"{index:X}" = {index & 0xFF}' for index in indices)
+    described = "".join(
+        f"""
+[[canopen.device]]
+name = "N{n}"
+node = {n}
+eds = "many.eds"
+set = {{ {values} }}
+out = {{ "6200:01" = "Main.out{n}" }}
+"""
+        for n in range(1, nodes + 1)
+    )
+    (folder / "app.io.toml").write_text('[[canopen]]\nname = "Bus"\nnode = 127\n' + described)
+    path = folder / "app.st"
+    variables = ", ".join(f"out{n}" for n in range(1, nodes + 1))
+    path.write_text(f"PROGRAM Main VAR {variables} : BYTE; END_VAR END_PROGRAM")
+    return path
+
+
+SUB_OBJECT = "[{index:04X}sub{sub}]\nParameterName=x\nDataType=0x{type:04X}\nAccessType={access}\n{more}\n"
+
+
+def with_more_pdos(text: str, count: int) -> str:
+    """valves.eds with `count` TPDOs, and three more inputs of 64 bits."""
+    added = []
+    for n in range(1, count):
+        added.append(f"[{0x1800 + n:04X}]\nParameterName=x\nObjectType=0x9\nSubNumber=3\n\n")
+        for sub, kind, value in ((0, 5, "5"), (1, 7, f"$NODEID+0x{0x80000180 + n:X}"), (2, 5, "255"), (5, 6, "0")):
+            access, more = "rw" if sub else "const", f"DefaultValue={value}\n"
+            added.append(SUB_OBJECT.format(index=0x1800 + n, sub=sub, type=kind, access=access, more=more))
+        added.append(f"[{0x1A00 + n:04X}]\nParameterName=x\nObjectType=0x9\nSubNumber=2\n\n")
+        for sub, kind in ((0, 5), (1, 7)):
+            added.append(SUB_OBJECT.format(index=0x1A00 + n, sub=sub, type=kind, access="rw", more="DefaultValue=0\n"))
+    added.append(f"[6444]\nParameterName=x\nObjectType=0x8\nSubNumber={count + 4}\n\n")
+    added.append(SUB_OBJECT.format(index=0x6444, sub=0, type=5, access="const", more=f"DefaultValue={count + 3}\n"))
+    for sub in range(1, count + 4):
+        added.append(SUB_OBJECT.format(index=0x6444, sub=f"{sub:X}", type=0x1B, access="ro", more="PDOMapping=1\n"))
+    listed = [*(0x1800 + n for n in range(1, count)), *(0x1A00 + n for n in range(1, count)), 0x6444]
+    text = text.replace(
+        "[OptionalObjects]\nSupportedObjects=11", f"[OptionalObjects]\nSupportedObjects={11 + len(listed)}"
+    )
+    lines = "".join(f"{12 + i}=0x{index:04X}\n" for i, index in enumerate(listed))
+    return text.replace("11=0x6401\n", "11=0x6401\n" + lines) + "\n" + "".join(added)

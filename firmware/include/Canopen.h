@@ -8,11 +8,12 @@
 
 #include "CmpStd.h"
 
-/* Identifiers of 11 bits; + node, but for NMT and SYNC. */
+/* Identifiers of 11 bits; + node, but for NMT, SYNC and TIME. */
 enum {
     CANOPEN_NMT = 0x000,
     CANOPEN_SYNC = 0x080,
     CANOPEN_EMCY = 0x080,
+    CANOPEN_TIME = 0x100,
     CANOPEN_TPDO = 0x180,
     CANOPEN_SDO_REPLY = 0x580,
     CANOPEN_SDO_REQUEST = 0x600,

@@ -4,7 +4,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * A node is reset (communication only), identified, configured by its concise DCF, started, and watched by its heartbeat.
- * What goes wrong is repeated after 0, 1, 2, 4, 8, 8 .. s; other nodes are not disturbed. From main; time is an argument.
+ * What goes wrong is repeated after 0, 1, 2, 4, 8, 8 .. s, also for a node that restarts again and again or shares its
+ * number with another one; other nodes are not disturbed. From main; time is an argument.
  * Frames are sent by the function of the owner; false: no room, it is called again in the next pass.
  */
 #ifndef CANOPENMASTER_H
@@ -42,6 +43,7 @@ enum {
     MASTER_WHY_BUS = 'o',       /* bus off */
     MASTER_WHY_HELD = 'n',      /* a program has commanded another state */
     MASTER_WHY_HALTED = 'q',    /* stopped for the loss of another node */
+    MASTER_WHY_DUPLICATE = 'd', /* two devices have its number */
 };
 
 enum { CANOPEN_SDO_BUFFER = 8 }; /* bytes that can be read of an identity, which has four */
@@ -69,11 +71,17 @@ typedef struct {
     RTS_UI32 guard_life;   /* periods without a reply until it is lost */
     /* Of the master. */
     MASTER_STATE state;
-    RTS_UI8 why;             /* MASTER_WHY_* of the last failure */
-    RTS_UI8 nmt_state;       /* of its last heartbeat */
-    RTS_UI8 command;         /* what starts it; NMT_STOP, NMT_PREOPERATIONAL: a program does not want it to run */
-    bool is_heard;           /* there was a heartbeat */
-    RTS_UI32 heard_ms;       /* when the last one was */
+    RTS_UI8 why;       /* MASTER_WHY_* of the last failure */
+    RTS_UI8 nmt_state; /* of its last heartbeat */
+    RTS_UI8 command;   /* what starts it; NMT_STOP, NMT_PREOPERATIONAL: a program does not want it to run */
+    bool is_heard;     /* there was a heartbeat */
+    RTS_UI32 heard_ms; /* when the last one was */
+    bool has_booted;   /* since its last reset, at `booted_ms` */
+    RTS_UI32 booted_ms;
+    RTS_UI32 ran_ms;  /* since when it runs */
+    RTS_UI8 restarts; /* by itself, without a steady run between them */
+    RTS_UI8 beats;    /* heartbeats since `beats_ms` */
+    RTS_UI32 beats_ms;
     bool is_asked_elsewhere; /* of the owner: another client of SDO is at it, so the manager waits */
     bool must_wait;          /* of the owner: it is not to be started yet */
     RTS_UI8 guard_toggle;    /* that the next guarding reply has */

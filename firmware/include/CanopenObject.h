@@ -67,6 +67,7 @@ enum {
     CANOPEN_DEVICE_STORE = 1, /* flags: 1010h and 1011h */
     CANOPEN_DEVICE_LSS = 2,
     CANOPEN_DEVICE_DOWNLOAD = 4, /* 1F50h to 1F57h */
+    CANOPEN_DEVICE_TIME = 8,     /* TIME sets the clock */
 };
 
 /* Entry `number` of the firmware's own objects of communication, without those of PDOs. False: there are no more. */

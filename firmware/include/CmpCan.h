@@ -26,6 +26,7 @@ typedef struct CAN_USER {
     /* From main. True: this user sends or receives the identifier of 11 bits, so programs must not send it. */
     bool (*reserves)(RTS_UI32 index, RTS_UI32 id);
     struct CAN_USER *next; /* of CmpCan */
+    bool has_short;        /* of CmpCan: frames of 11 bits pass its filters */
 } CAN_USER;
 
 typedef struct {

@@ -42,13 +42,15 @@ typedef struct {
 } CANOPEN_PDO;
 
 enum {
-    CANOPEN_PARAM_NETWORK = 1,        /* of a network: number of the CAN controller, 0 if missing */
-    CANOPEN_PARAM_NODE = 2,           /* 1..127; of a network our own, 0 or missing: no heartbeat of ours */
-    CANOPEN_PARAM_HEARTBEAT = 3,      /* [ms] of a network: ours; of a node: its own, 0 or missing: none */
-    CANOPEN_PARAM_SYNC = 4,           /* of a network: CANOPEN_SYNC_* */
-    CANOPEN_PARAM_TIMEOUT = 5,        /* of a node [ms]: for a reply to SDO, 1000 if missing */
-    CANOPEN_PARAM_EXPECTED = 6,       /* of a node: 1000h and 1018h:1 to 3, u32 each, 0: any */
-    CANOPEN_PARAM_CONFIG = 7,         /* of a node: its concise DCF (1F22h), bytes */
+    CANOPEN_PARAM_NETWORK = 1,         /* of a network: number of the CAN controller, 0 if missing */
+    CANOPEN_PARAM_NODE = 2,            /* 1..127; of a network our own, 0 or missing: no heartbeat of ours */
+    CANOPEN_PARAM_HEARTBEAT = 3,       /* [ms] of a network: ours; of a node: its own, 0 or missing: none */
+    CANOPEN_PARAM_SYNC = 4,            /* of a network: CANOPEN_SYNC_* */
+    CANOPEN_PARAM_TIMEOUT = 5,         /* of a node [ms]: for a reply to SDO, 1000 if missing */
+    CANOPEN_PARAM_EXPECTED = 6,        /* of a node: 1000h and 1018h:1 to 3, u32 each, 0: any */
+    CANOPEN_PARAM_CONFIG = 7,          /* of a node: its concise DCF (1F22h), bytes */
+    CANOPEN_PARAM_SYNC_COUNTER = 0x58, /* of a network, whose SYNC has a counter up to it, 0 or missing: none */
+    CANOPEN_PARAM_TIME = 0x59,         /* of a network [ms]: how often we send TIME, 0 or missing: never */
     CANOPEN_PARAM_REQUIRED = 0xC0,    /* of a node, 1: no node is started before this one is ready for the first time */
     CANOPEN_PARAM_ON_LOST = 0xC1,     /* of a node: CANOPEN_LOST_* */
     CANOPEN_PARAM_GUARD = 0xC2,       /* of a node without heartbeat [ms]: period of guarding, 0 or missing: none */

@@ -23,6 +23,8 @@ from plctool.sim import Simulator
 
 TPDO, SDO, SDO_REQUEST, HEARTBEAT, EMCY = 0x180 + NODE, 0x580 + NODE, 0x600 + NODE, 0x700 + NODE, 0x80 + NODE
 OWN_NODE = 0x8001
+RESERVED = 0x202
+TIME_IS = "DT#2027-10-22-01:00:00"  # of the frame below
 FRAME_NS = 300_000  # the longest frame at 500 kbit/s, with its pause
 START, STOP, PREOPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x82
 
@@ -330,3 +332,34 @@ def test_inputs_and_outputs_are_objects_of_the_device(plc: Simulator) -> None:
     plc.run_for(50)
     assert (plc.read("Main.setpoint"), plc.output("Field.2104")) == (321, 321)
     assert client_of(SimNetwork(plc)).upload(0x2200, 0) == (321).to_bytes(2, "little")
+
+
+@pytest.mark.parametrize("number", [0x000, TPDO, 0x200 + NODE, SDO, SDO_REQUEST, HEARTBEAT, EMCY, 0x7E4])
+def test_program_cannot_send_what_the_device_does(tmp_path: Path, number: int) -> None:
+    source = write_device(tmp_path)
+    more = "frame : CAN_SEND; id : DWORD; go : BOOL; bytes : ARRAY[0..7] OF BYTE; END_VAR"
+    call = "frame(Execute := go, ID := id, Data := bytes);"
+    source.write_text(source.read_text().replace("END_VAR", f"{more}\n{call}", 1))
+    with Simulator.from_sources(source) as plc:
+        plc.run_for(20)
+        plc.write({"Main.id": number, "Main.go": True})
+        plc.run_cycles(3)
+        assert plc.read("Main.frame.ErrorID") == RESERVED
+        plc.write({"Main.go": False})
+        plc.run_cycles(2)
+        plc.write({"Main.id": 0x123, "Main.go": True})
+        plc.run_cycles(3)
+        assert plc.read("Main.frame.ErrorID") == 0
+
+
+def test_time_frame_sets_the_wall_clock(tmp_path: Path) -> None:
+    path = write_device(tmp_path, device=f"node = {NODE}\ntime = true")
+    path.write_text(path.read_text().replace("END_VAR", "now : DT; END_VAR\nnow := UTC_NOW();", 1))
+    with Simulator.from_sources(path) as plc:
+        plc.run_for(20)
+        for data in (b"", bytes(5), b"\xff" * 6):  # not a time
+            plc.can_send(0x100, data)
+            plc.run_for(20)
+        plc.can_send(0x100, (3_600_000).to_bytes(4, "little") + (16000).to_bytes(2, "little"))
+        plc.run_for(50)
+        assert plc.read("Main.now") == TIME_IS, plc.read("Main.now")

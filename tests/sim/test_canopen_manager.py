@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import datetime
 import re
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from canopen_programs import GUARD, OTHERS, write_guarded_program, write_program
+from canopen_programs import GUARD, OTHERS, of_many_writes, with_more_pdos, write_guarded_program, write_program
 
 from plctool.compiler.syntax.diagnostics import CompileError
 from plctool.errors import UsageError
@@ -282,32 +284,6 @@ def test_optional_node_that_is_refused_is_not_started(tmp_path: Path, monkeypatc
         assert any("its concise DCF is damaged" in entry.text for entry in plc.log())
 
 
-SUB = "[{index:04X}sub{sub}]\nParameterName=x\nDataType=0x{type:04X}\nAccessType={access}\n{more}\n"
-
-
-def with_more_pdos(text: str, count: int) -> str:
-    """valves.eds with `count` TPDOs, and three more inputs of 64 bits."""
-    added = []
-    for n in range(1, count):
-        added.append(f"[{0x1800 + n:04X}]\nParameterName=x\nObjectType=0x9\nSubNumber=3\n\n")
-        for sub, kind, value in ((0, 5, "5"), (1, 7, f"$NODEID+0x{0x80000180 + n:X}"), (2, 5, "255"), (5, 6, "0")):
-            access, more = "rw" if sub else "const", f"DefaultValue={value}\n"
-            added.append(SUB.format(index=0x1800 + n, sub=sub, type=kind, access=access, more=more))
-        added.append(f"[{0x1A00 + n:04X}]\nParameterName=x\nObjectType=0x9\nSubNumber=2\n\n")
-        for sub, kind in ((0, 5), (1, 7)):
-            added.append(SUB.format(index=0x1A00 + n, sub=sub, type=kind, access="rw", more="DefaultValue=0\n"))
-    added.append(f"[6444]\nParameterName=x\nObjectType=0x8\nSubNumber={count + 4}\n\n")
-    added.append(SUB.format(index=0x6444, sub=0, type=5, access="const", more=f"DefaultValue={count + 3}\n"))
-    for sub in range(1, count + 4):
-        added.append(SUB.format(index=0x6444, sub=f"{sub:X}", type=0x1B, access="ro", more="PDOMapping=1\n"))
-    listed = [*(0x1800 + n for n in range(1, count)), *(0x1A00 + n for n in range(1, count)), 0x6444]
-    text = text.replace(
-        "[OptionalObjects]\nSupportedObjects=11", f"[OptionalObjects]\nSupportedObjects={11 + len(listed)}"
-    )
-    lines = "".join(f"{12 + i}=0x{index:04X}\n" for i, index in enumerate(listed))
-    return text.replace("11=0x6401\n", "11=0x6401\n" + lines) + "\n" + "".join(added)
-
-
 def of_many_pdos(folder: Path, count: int, inputs: int) -> Path:
     names = [f"big{n}" for n in range(1, inputs + 1)]
     source = (
@@ -499,3 +475,109 @@ def test_all_127_nodes_of_a_network_run_and_one_is_lost_alone(tmp_path: Path) ->
         plc.fault("N77", "absent", 0)
         plc.run_for(3000)
         assert plc.read("N77.ok")
+
+
+WRITES, CONFIGURED = 40, 16
+START_LIMIT_MS = 1500
+
+
+def test_sixteen_nodes_with_forty_writes_are_in_operation_in_time(tmp_path: Path) -> None:
+    with Simulator.from_sources(of_many_writes(tmp_path, CONFIGURED, WRITES)) as plc:
+        plc.run_for(START_LIMIT_MS)
+        assert in_operation(plc, *(f"N{n}" for n in range(1, CONFIGURED + 1)))
+        assert len(written(plc, 7)) > WRITES
+
+
+# ---- devices that should not be there --------------------------------------------------------------------------------
+
+
+def of_driver(plc: Simulator) -> list[str]:
+    return [entry.text for entry in plc.log() if entry.component == "IoDrvCanopen"]
+
+
+def beginnings(plc: Simulator, node: int) -> int:
+    """How often the manager has begun with a node since the last call: it reads 1000h first."""
+    return sum(f.id == SDO + node and f.data[:3] == b"\x40\x00\x10" for f in plc.can_receive())
+
+
+def test_node_that_restarts_again_and_again_is_tried_later_each_time(plc: Simulator) -> None:
+    plc.can_receive()
+    begun = []
+    for _ in range(6):
+        count = 0
+        for _ in range(10):  # it restarts 10 times in 4 s
+            plc.can_send(HEARTBEAT + 9, b"\0")
+            plc.run_for(400)
+            count += beginnings(plc, 9)
+        begun.append(count)
+    assert begun[0] >= 2
+    assert sum(begun[2:]) <= 4
+    assert in_operation(plc, "Second", "Third")
+    plc.run_for(10_000)
+    assert in_operation(plc)
+    plc.run_for(11_000)  # a steady run
+    plc.can_send(HEARTBEAT + 9, b"\0")
+    plc.run_for(BOOT_MS)
+    assert in_operation(plc)
+
+
+def test_two_nodes_with_one_number_are_not_started(plc: Simulator) -> None:
+    """Each boot-up comes from both."""
+    plc.can_send(HEARTBEAT + 9, b"\0")
+    begun = 0
+    for _ in range(4000):
+        plc.run_for(5)
+        frames = plc.can_receive()
+        begun += sum(f.id == NMT and f.data == b"\x01\x09" for f in frames)
+        if any(f.id == HEARTBEAT + 9 and f.data == b"\0" for f in frames):
+            plc.run_for(20)
+            plc.can_receive()
+            plc.can_send(HEARTBEAT + 9, b"\0")
+    assert begun <= 1
+    assert not plc.read("Valves.ok")
+    assert in_operation(plc, "Second", "Third")
+    plc.run_for(20_000)
+    assert in_operation(plc)  # the other one is away
+
+
+def test_heartbeats_of_two_nodes_with_one_number_are_noticed(plc: Simulator) -> None:
+    for _ in range(12):
+        plc.can_send(HEARTBEAT + 9, b"\5")
+        plc.run_for(200)
+    assert "Valves is lost: two devices have its number" in of_manager(plc)
+    assert in_operation(plc, "Second", "Third")
+
+
+def test_second_master_is_named_once_a_minute_and_nodes_run_on(plc: Simulator) -> None:
+    for _ in range(20):
+        plc.can_send(NMT, b"\x01\x00")
+        plc.run_for(50)
+    assert of_driver(plc) == ["Bus: another NMT master sends commands"]
+    assert in_operation(plc)
+    plc.can_send(NMT, b"\x02\x00")
+    plc.run_for(2000)
+    assert in_operation(plc)  # what it has stopped is started again
+
+
+def test_device_with_our_number_is_named(plc: Simulator) -> None:
+    plc.can_send(HEARTBEAT + 127, b"\5")
+    plc.run_for(50)
+    assert of_driver(plc) == ["Bus: another device has number 127, as we"]
+    assert in_operation(plc)
+
+
+# ---- TIME ------------------------------------------------------------------------------------------------------------
+
+
+def test_time_of_the_wall_clock_is_sent(tmp_path: Path) -> None:
+    with Simulator.from_sources(write_program(tmp_path, line='time = "T#1s"')) as plc:
+        plc.run_for(500)
+        plc.can_receive()
+        plc.run_for(3000)
+        frames = [f.data for f in plc.can_receive() if f.id == 0x100]
+        assert [len(data) for data in frames] == [6, 6, 6]
+        parts = [(int.from_bytes(data[:4], "little"), int.from_bytes(data[4:], "little")) for data in frames]
+        times = [ms + 86_400_000 * days for ms, days in parts]
+        assert [b - a for a, b in pairwise(times)] == [1000, 1000]
+        days = datetime.date(1984, 1, 1) + datetime.timedelta(days=times[0] // 86_400_000)
+        assert datetime.date(2000, 1, 1) <= days < datetime.date(2002, 1, 1)  # where clocks of simulators begin

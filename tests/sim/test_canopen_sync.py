@@ -16,6 +16,7 @@ from plctool.compiler.syntax.diagnostics import CompileError
 from plctool.sim import Simulator
 
 SYNC, NMT, TPDO, RPDO = 0x080, 0x000, 0x189, 0x209
+SYNCS = 100_000
 FRAME_NS = 300_000  # the longest frame at 500 kbit/s, with its pause
 SOURCE = """
 VAR_GLOBAL motions, answers : UDINT; END_VAR
@@ -81,6 +82,21 @@ def test_tasks_run_at_each_sync_and_at_the_end_of_each_window(tmp_path: Path) ->
         assert (plc.read("motions") - before[0], plc.read("answers") - before[1]) == (200, 200)
 
 
+def test_sync_counts_and_the_nodes_know_how_far(tmp_path: Path) -> None:
+    line = 'sync = { every = "T#5ms", counter = 3 }'
+    path = write_program(tmp_path, line=line, source=SOURCE.replace("{tasks}", CYCLIC))
+    eds = path.with_name("valves.eds")
+    listed = "[OptionalObjects]\nSupportedObjects=12\n12=0x1019"
+    text = eds.read_text().replace("[OptionalObjects]\nSupportedObjects=11", listed)
+    eds.write_text(text + "\n[1019]\nParameterName=x\nDataType=0x0005\nAccessType=rw\nDefaultValue=0\n")
+    with Simulator.from_sources(path) as plc:
+        plc.run_for(100)
+        frames = plc.can_receive()
+        counters = [f.data for f in frames if f.id == SYNC]
+        assert counters[:7] == [bytes([n]) for n in (1, 2, 3, 1, 2, 3, 1)]
+        assert bytes.fromhex("2f19100003000000") in [f.data for f in frames if f.id == 0x609]
+
+
 def test_outputs_of_a_task_that_runs_by_sync_leave_after_it(tmp_path: Path) -> None:
     with of(tmp_path, IN_SYNC) as plc:
         plc.run_for(500)
@@ -128,16 +144,16 @@ def test_sync_goes_on_while_the_program_is_stopped_and_ends_with_its_description
         assert plc.read("Valves.ok")
 
 
-def test_eight_nodes_exchange_their_values_at_each_sync_of_a_minute(tmp_path: Path) -> None:
+def test_eight_nodes_exchange_their_values_at_each_sync(tmp_path: Path) -> None:
     path = eight_nodes(tmp_path)
     with Simulator.from_sources(path) as plc:
         plc.run_for(3000)
         before = plc.read("motions")
-        plc.run_for(58_000)
+        plc.run_for(SYNCS * 10 - 2000)
         plc.can_receive()
         plc.run_for(2000)
         ids = [f.id for f in plc.can_receive()]
-        assert plc.read("motions") - before == 6000
+        assert plc.read("motions") - before == SYNCS
         assert [ids.count(SYNC)] + [ids.count(base + n) for base in (0x180, 0x200) for n in range(1, 9)] == [200] * 17
         assert all(plc.read(f"N{n}.ok") for n in range(1, 9))
         assert [entry.text for entry in plc.log() if "lost" in entry.text] == []
@@ -149,7 +165,8 @@ def test_eight_nodes_exchange_their_values_at_each_sync_of_a_minute(tmp_path: Pa
         ("sync = {}", "needs every"),
         ('sync = { every = "T#5ms", window = "T#5ms" }', "the window has to end before the next SYNC of Bus"),
         ("sync = 3", "sync is"),
-        ('sync = { every = "T#5ms", counter = 3 }', "there is no 'counter' here"),
+        ('sync = { every = "T#5ms", counter = 1 }', "counter is 1; it can be 2 to 240"),
+        ("sync = { produce = false, counter = 3 }", "the device that sends SYNC counts it"),
     ],
 )
 def test_mistakes_of_sync_are_reported(tmp_path: Path, line: str, message: str) -> None:

@@ -202,7 +202,7 @@ static RTS_I64 count_frame_ns(const CAN_FRAME *frame)
     return bits_ns(slow + TAIL_BITS, bus.bit_rate) + bits_ns(body, fast ? bus.data_bit_rate : bus.bit_rate);
 }
 
-/* The last classic frame of an identifier, since most frames have the data of the one before. */
+/* The last classic frame of an identifier, since most frames have the same data as the previous one. */
 static struct {
     CAN_FRAME frame;
     RTS_I64 ns; /* 0: unknown */

@@ -90,7 +90,7 @@ static bool take_urgent(RTS_UI32 index, const CAN_FRAME *frame)
         if (user->take_urgent != NULL)
             is_done = user->take_urgent(index, frame) && is_done;
         else
-            is_done = is_done && !CanPasses(user->filters, user->filter_count, frame);
+            is_done = is_done && !user->has_short; /* main looks whether it passes */
     }
     return is_done;
 }
@@ -146,9 +146,14 @@ static bool merge(CONTROLLER *controller, FILTERS *filters)
 {
     bool fits = true;
 
-    FOR_EACH_USER (controller, user)
-        for (RTS_UI32 i = 0; i < user->filter_count; i++)
+    FOR_EACH_USER (controller, user) {
+        bool has_short = false;
+        for (RTS_UI32 i = 0; i < user->filter_count; i++) {
             fits = add_filter(filters, &user->filters[i]) && fits;
+            has_short = has_short || !user->filters[i].extended;
+        }
+        user->has_short = has_short;
+    }
     return fits;
 }
 

@@ -19,6 +19,10 @@ enum {
     ENTRY_HEAD = 7,  /* of a concise DCF: index, sub-index, size */
     COUNT_SIZE = 4,
     EMCY_MIN = 2,
+    STEADY_MS = 10000,   /* a run of so long ends a series of restarts */
+    DUPLICATE_MS = 200,  /* two boot-ups within it are those of two devices */
+    BEATS = 8,           /* periods in which heartbeats are counted, */
+    TOO_MANY_BEATS = 13, /* and those of more than one device */
 };
 
 static const struct {
@@ -50,15 +54,31 @@ void CanopenNodeBegin(CANOPEN_NODE *node, RTS_UI32 timeout_ms, RTS_UI32 now_ms)
     enter(node, MASTER_RESET, now_ms);
 }
 
+/* At once after the first restart, then later each time. */
+static RTS_UI32 wait_of_restart_ms(CANOPEN_NODE *node)
+{
+    RTS_UI32 doubled = node->restarts;
+
+    if (node->restarts < UINT8_MAX)
+        node->restarts++;
+    if (doubled == 0)
+        return 0;
+    return doubled > 3 ? MAX_WAIT_MS : (RTS_UI32)FIRST_WAIT_MS << (doubled - 1);
+}
+
 /* The next attempt: at once after a loss, then later each time. */
 static void fail(CANOPEN_NODE *node, RTS_UI8 why, RTS_UI32 now_ms)
 {
     bool ran = node->state == MASTER_RUNS || node->state == MASTER_HELD;
 
+    if (ran && now_ms - node->ran_ms >= STEADY_MS)
+        node->restarts = 0;
     node->counters.lost += ran;
     node->failures++;
     node->why = why;
-    if (ran)
+    if (why == MASTER_WHY_RESTARTED)
+        node->wait_ms = wait_of_restart_ms(node);
+    else if (ran && why != MASTER_WHY_DUPLICATE)
         node->wait_ms = 0;
     else
         node->wait_ms = node->wait_ms == 0 ? FIRST_WAIT_MS : 2 * node->wait_ms;
@@ -245,6 +265,8 @@ static void run(CANOPEN_NODE *node, RTS_UI32 now_ms)
     node->counters.boots++;
     node->why = MASTER_WHY_NONE;
     node->wait_ms = 0;
+    node->ran_ms = node->beats_ms = now_ms;
+    node->beats = 0;
     enter(node, MASTER_RUNS, now_ms);
 }
 
@@ -305,16 +327,52 @@ static bool is_expected_reply(CANOPEN_NODE *node, RTS_UI8 byte)
     return true;
 }
 
+/* The boot-up of a node that waits for its next attempt: it has power again, so it need not wait. One that restarts again
+ * and again, or is one of two, waits. */
+static bool may_begin(const CANOPEN_NODE *node)
+{
+    if (node->state == MASTER_WAITS)
+        return node->why != MASTER_WHY_DUPLICATE && (node->why != MASTER_WHY_RESTARTED || node->wait_ms == 0);
+    return node->state == MASTER_BOOTS;
+}
+
+static void take_boot_up(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    bool is_second = node->has_booted && now_ms - node->booted_ms < DUPLICATE_MS;
+
+    node->has_booted = true;
+    node->booted_ms = now_ms;
+    if (is_second && node->state != MASTER_WAITS)
+        fail(node, MASTER_WHY_DUPLICATE, now_ms);
+    else if (CanopenNodeIsReady(node) || node->state == MASTER_CONFIGURE)
+        fail(node, MASTER_WHY_RESTARTED, now_ms);
+    if (may_begin(node))
+        enter(node, MASTER_IDENTIFY, now_ms); /* it has just been reset: no need to do it again */
+}
+
+/* True if there were about twice as many heartbeats as one device sends. */
+static bool are_of_two(CANOPEN_NODE *node, RTS_UI32 now_ms)
+{
+    if (node->heartbeat_ms == 0)
+        return false;
+    if (now_ms - node->beats_ms >= BEATS * node->heartbeat_ms) {
+        node->beats_ms = now_ms;
+        node->beats = 0;
+    }
+    if (node->beats < UINT8_MAX)
+        node->beats++;
+    return node->beats >= TOO_MANY_BEATS;
+}
+
 static void take_heartbeat(CANOPEN_NODE *node, RTS_UI8 state, RTS_UI32 now_ms)
 {
     node->nmt_state = state;
     node->is_heard = true;
     node->heard_ms = now_ms;
     if (state == NODE_BOOTS) {
-        if (CanopenNodeIsReady(node) || node->state == MASTER_CONFIGURE)
-            fail(node, MASTER_WHY_RESTARTED, now_ms);
-        if (node->state == MASTER_BOOTS || node->state == MASTER_WAITS)
-            enter(node, MASTER_IDENTIFY, now_ms); /* it has just been reset: no need to do it again */
+        take_boot_up(node, now_ms);
+    } else if (node->state == MASTER_RUNS && are_of_two(node, now_ms)) {
+        fail(node, MASTER_WHY_DUPLICATE, now_ms);
     } else if (node->state == MASTER_STARTS && state == NODE_OPERATIONAL) {
         run(node, now_ms);
     } else if ((node->state == MASTER_RUNS && state == NODE_OPERATIONAL) || node->state == MASTER_HELD ||
@@ -380,6 +438,7 @@ static void poll_state(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RT
         if (!CanopenSendNmt(send, owner, NMT_RESET_COMMUNICATION, node->node))
             break;
         node->guard_toggle = 0;
+        node->has_booted = false;
         enter(node, MASTER_BOOTS, now_ms);
         break;
     case MASTER_BOOTS:

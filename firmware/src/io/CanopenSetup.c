@@ -41,27 +41,28 @@ static bool is_pdo_good(const CANOPEN_PDO *pdo)
 /* Returns where the identifier is in the list of inputs, or belongs. */
 static RTS_UI32 place_of(const CANOPEN_LINE *line, RTS_UI32 cob)
 {
-    RTS_UI32 first = 0;
-    RTS_UI32 count = line->input_count;
+    const RTS_UI32 *first = line->inputs;
+    RTS_UI32 key = cob << CANOPEN_INPUT_COB;
 
-    while (count > 0) {
+    for (RTS_UI32 count = line->input_count; count > 0;) {
         RTS_UI32 half = count / 2;
-        if (line->pdos[line->inputs[first + half]].cob < cob) {
+        if (first[half] < key) {
             first += half + 1;
             count -= half + 1;
         } else {
             count = half;
         }
     }
-    return first;
+    return (RTS_UI32)(first - line->inputs);
 }
 
 CANOPEN_PDO_STATE *CanopenFindInput(const CANOPEN_LINE *line, RTS_UI32 cob)
 {
     RTS_UI32 place = place_of(line, cob);
-    CANOPEN_PDO_STATE *state = place < line->input_count ? line->pdos + line->inputs[place] : NULL;
 
-    return state != NULL && state->cob == cob ? state : NULL;
+    if (place == line->input_count || line->inputs[place] >> CANOPEN_INPUT_COB != cob)
+        return NULL;
+    return line->pdos + (line->inputs[place] & ((1u << CANOPEN_INPUT_COB) - 1));
 }
 
 static void add_input(CANOPEN_SETUP *setup, CANOPEN_LINE *line, RTS_UI32 cob)
@@ -69,7 +70,7 @@ static void add_input(CANOPEN_SETUP *setup, CANOPEN_LINE *line, RTS_UI32 cob)
     RTS_UI32 place = place_of(line, cob);
 
     memmove(line->inputs + place + 1, line->inputs + place, (line->input_count - place) * sizeof(*line->inputs));
-    line->inputs[place] = (RTS_UI16)setup->pdo_count;
+    line->inputs[place] = cob << CANOPEN_INPUT_COB | setup->pdo_count;
     line->input_count++;
     setup->input_count++;
 }
@@ -162,6 +163,7 @@ static bool read_sync(CANOPEN_SYNC_STATE *sync, const IoConfigConnector *connect
     sync->kind = number(connector, CANOPEN_PARAM_SYNC, CANOPEN_SYNC_NONE);
     sync->every_us = number(connector, CANOPEN_PARAM_SYNC_EVERY, 0);
     sync->window_us = number(connector, CANOPEN_PARAM_SYNC_WINDOW, 0);
+    sync->last = (RTS_UI8)number(connector, CANOPEN_PARAM_SYNC_COUNTER, 0);
     sync->timer = sync->window_timer = sync->sync_event = sync->window_event = RTS_INVALID_HANDLE;
     return sync->every_us <= MAX_US && sync->window_us <= MAX_US &&
            (sync->kind != CANOPEN_SYNC_BY_TIMER || sync->every_us >= LEAST_SYNC_US);
@@ -186,6 +188,7 @@ static RTS_RESULT add_line(CANOPEN_SETUP *setup, const IO_DRIVER *driver, const 
     line->network = network;
     line->own_node = (RTS_UI8)number(connector, CANOPEN_PARAM_NODE, 0);
     line->heartbeat_ms = number(connector, CANOPEN_PARAM_HEARTBEAT, 0);
+    line->time_ms = number(connector, CANOPEN_PARAM_TIME, 0);
     if (!read_sync(&line->sync, connector))
         return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its SYNC cannot be.");
     line->devices = setup->devices + setup->device_count;

@@ -49,6 +49,8 @@ typedef struct {
     RTS_UI32 kind; /* CANOPEN_SYNC_* */
     RTS_UI32 every_us;
     RTS_UI32 window_us; /* 0: there is none */
+    RTS_UI8 last;       /* its counter goes from 1 to this one, 0: it has none */
+    RTS_UI8 counter;    /* of the last SYNC */
     RTS_HANDLE timer;
     RTS_HANDLE window_timer;
     RTS_HANDLE sync_event;
@@ -57,6 +59,11 @@ typedef struct {
 } CANOPEN_SYNC_STATE;
 
 typedef struct CANOPEN_LINE CANOPEN_LINE;
+
+enum { CANOPEN_INPUT_COB = 16 };
+
+/* Devices that should not be on the bus: another NMT master, and one with our number. */
+enum { CANOPEN_OTHER_MASTER, CANOPEN_OTHER_WITH_OUR_NUMBER, CANOPEN_OTHERS };
 
 typedef struct {
     const IoConfigConnector *connector;
@@ -80,6 +87,9 @@ struct CANOPEN_LINE {
     RTS_UI8 own_node;
     RTS_UI32 heartbeat_ms;
     RTS_UI32 heartbeat_sent_ms;
+    RTS_UI32 time_ms; /* how often TIME is sent, 0: never */
+    RTS_UI32 time_sent_ms;
+    RTS_UI32 noted_ms[CANOPEN_OTHERS]; /* when a device that should not be there was last in the log, 0: never */
     CANOPEN_SYNC_STATE sync;
     RTS_UI32 is_safe; /* outputs are those of the safe state; for tasks */
     bool attached;
@@ -90,7 +100,7 @@ struct CANOPEN_LINE {
     CAN_USER user;
     RTS_UI8 by_node[CANOPEN_MAX_NODE + 1]; /* the number of its device, from 1 on; 0: there is none */
     CANOPEN_PDO_STATE *pdos;               /* of the setup */
-    RTS_UI16 *inputs;                      /* numbers of those that are received, by their identifiers */
+    RTS_UI32 *inputs; /* those that are received, ascending: identifier << CANOPEN_INPUT_COB, and number in `pdos` */
     RTS_UI32 input_count;
 };
 
@@ -102,7 +112,7 @@ typedef struct {
     CANOPEN_LINE lines[CAN_CONTROLLERS];
     CANOPEN_DEVICE devices[CANOPEN_ROOM(CANOPEN_MAX_DEVICES)];
     CANOPEN_PDO_STATE pdos[CANOPEN_ROOM(CANOPEN_MAX_PDOS)];
-    RTS_UI16 inputs[CANOPEN_ROOM(CANOPEN_MAX_PDOS)];
+    RTS_UI32 inputs[CANOPEN_ROOM(CANOPEN_MAX_PDOS)];
 } CANOPEN_SETUP;
 
 /* The PDO of a channel, NULL: none. */

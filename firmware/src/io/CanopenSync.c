@@ -32,8 +32,14 @@ static void note_sync(CANOPEN_LINE *line)
 
 static void send_sync(CANOPEN_LINE *line)
 {
-    static const CAN_FRAME frame = {.id = CANOPEN_SYNC};
+    CANOPEN_SYNC_STATE *sync = &line->sync;
+    CAN_FRAME frame = {.id = CANOPEN_SYNC};
 
+    if (sync->last != 0) {
+        sync->counter = sync->counter < sync->last ? sync->counter + 1 : 1;
+        frame.size = 1;
+        frame.data[0] = sync->counter;
+    }
     (void)CanSend(line->network, &frame);
     note_sync(line);
 }

@@ -15,15 +15,17 @@
 #include "CanopenCalls.h"
 #include "CanopenDriver.h"
 #include "CanopenSync.h"
+#include "CanopenTime.h"
 #include "CmpIoMgrEmbedded.h"
 #include "CmpLog.h"
 #include "SysAtomic.h"
 #include "SysLock.h"
 #include "SysTime.h"
+#include "SysTimeRtc.h"
 
 #if CANOPEN_MAX_DEVICES > 0
 
-enum { READ_TRIES = 4, NS_PER_MS = 1000000, EMCY_LOG_MS = 1000 };
+enum { READ_TRIES = 4, NS_PER_MS = 1000000, EMCY_LOG_MS = 1000, OTHER_LOG_MS = 60000 };
 
 static CANOPEN_SETUP setup;
 static bool is_running; /* between IoDrvUpdateMapping and the next configuration */
@@ -74,7 +76,8 @@ static bool take_urgent(RTS_UI32 index, const CAN_FRAME *frame)
         return false; /* main counts it */
     RTS_UI32 next = state->of.in.number + 1;
     memcpy(state->of.in.data[next % 2], frame->data, CANOPEN_PDO_SIZE); /* a frame has as many, wanted or not */
-    SysAtomicStore(&state->of.in.received_ms, SysTimeGetMs());
+    if (state->within_ms != 0)
+        SysAtomicStore(&state->of.in.received_ms, SysTimeGetMs());
     SysAtomicStore(&state->of.in.number, next);
     return true;
 }
@@ -86,12 +89,38 @@ static void count_short(const CANOPEN_LINE *line, const CANOPEN_PDO_STATE *state
             device->node.counters.short_pdos++;
 }
 
+/* At most one entry a minute. */
+static void log_other(CANOPEN_LINE *line, RTS_UI32 what, RTS_UI32 now_ms)
+{
+    const char *name = IoMgrConfigGetName(line->connector);
+
+    if (line->noted_ms[what] != 0 && now_ms - line->noted_ms[what] < OTHER_LOG_MS)
+        return;
+    line->noted_ms[what] = now_ms | 1;
+    if (what == CANOPEN_OTHER_MASTER)
+        LogAdd(CMPID_IoDrvCanopen, LOG_WARNING, ERR_DUPLICATE, "%s: another NMT master sends commands", name);
+    else
+        LogAdd(CMPID_IoDrvCanopen, LOG_WARNING, ERR_DUPLICATE, "%s: another device has number %u, as we", name,
+               (unsigned)line->own_node);
+}
+
+static void note_others(CANOPEN_LINE *line, const CAN_FRAME *frame, RTS_UI32 now_ms)
+{
+    if ((frame->flags & CAN_FLAG_REMOTE) != 0)
+        return;
+    if (frame->id == CANOPEN_NMT && frame->size == 2)
+        log_other(line, CANOPEN_OTHER_MASTER, now_ms);
+    else if (line->own_node != 0 && frame->id == CANOPEN_HEARTBEAT + (RTS_UI32)line->own_node)
+        log_other(line, CANOPEN_OTHER_WITH_OUR_NUMBER, now_ms);
+}
+
 static void take(RTS_UI32 index, const CAN_FRAME *frame, RTS_UI32 now_ms)
 {
-    const CANOPEN_LINE *line = &setup.lines[index];
+    CANOPEN_LINE *line = &setup.lines[index];
     CANOPEN_DEVICE *device = CanopenFindNode(line, frame->id & CANOPEN_NODE_MASK);
     const CANOPEN_PDO_STATE *input = CanopenFindInput(line, frame->id);
 
+    note_others(line, frame, now_ms);
     if (input != NULL) {
         if (frame->size < CanopenPdoSize(input))
             count_short(line, input);
@@ -112,7 +141,7 @@ static bool is_reserved(RTS_UI32 network, RTS_UI32 id)
     for (RTS_UI32 i = 0; i < setup.pdo_count; i++)
         if (setup.pdos[i].cob == id)
             return true;
-    return id == CANOPEN_NMT || id == CANOPEN_SYNC ||
+    return id == CANOPEN_NMT || id == CANOPEN_SYNC || (id == CANOPEN_TIME && line->time_ms != 0) ||
            ((function == CANOPEN_SDO_REPLY || function == CANOPEN_SDO_REQUEST || function == CANOPEN_HEARTBEAT ||
              function == CANOPEN_EMCY) &&
             (line->by_node[node] != 0 || node == line->own_node));
@@ -340,6 +369,8 @@ static const char *describe_step(const CANOPEN_NODE *node)
         return "one of its PDOs is late";
     case MASTER_WHY_BUS:
         return "the bus is off";
+    case MASTER_WHY_DUPLICATE:
+        return "two devices have its number";
     case MASTER_WHY_HALTED:
         return "it waits for a node that is lost";
     case MASTER_WHY_HELD:
@@ -463,6 +494,20 @@ static void send_heartbeat(CANOPEN_LINE *line, RTS_UI32 now_ms)
     (void)send(line, &frame);
 }
 
+/* Only while the wall clock is set. */
+static void send_time(CANOPEN_LINE *line, RTS_UI32 now_ms)
+{
+    RTS_I64 utc_ns;
+
+    if (line->time_ms == 0 || now_ms - line->time_sent_ms < line->time_ms)
+        return;
+    line->time_sent_ms = now_ms;
+    if (SysTimeRtcGet(&utc_ns) != ERR_OK)
+        return;
+    const CAN_FRAME frame = CanopenTimeMake(utc_ns);
+    (void)send(line, &frame);
+}
+
 static void note_bus(CANOPEN_LINE *line, RTS_UI32 now_ms)
 {
     CAN_STATE state;
@@ -517,6 +562,7 @@ static void poll_line(CANOPEN_LINE *line, RTS_UI32 now_ms)
     FOR_EACH_DEVICE (line, device)
         poll_device(line, device, now_ms);
     send_heartbeat(line, now_ms);
+    send_time(line, now_ms);
 }
 
 static RTS_UI32 get_wait_ms(const CANOPEN_LINE *line, RTS_UI32 now_ms)
@@ -527,6 +573,11 @@ static RTS_UI32 get_wait_ms(const CANOPEN_LINE *line, RTS_UI32 now_ms)
     if (line->own_node != 0 && line->heartbeat_ms != 0) {
         RTS_UI32 since_ms = now_ms - line->heartbeat_sent_ms;
         wait_ms = since_ms < line->heartbeat_ms ? line->heartbeat_ms - since_ms : 0;
+    }
+    if (line->time_ms != 0) {
+        RTS_UI32 since_ms = now_ms - line->time_sent_ms;
+        RTS_UI32 left_ms = since_ms < line->time_ms ? line->time_ms - since_ms : 0;
+        wait_ms = left_ms < wait_ms ? left_ms : wait_ms;
     }
     FOR_EACH_DEVICE (line, device) {
         RTS_UI32 of_node = CanopenNodeGetWaitMs(&device->node, now_ms);

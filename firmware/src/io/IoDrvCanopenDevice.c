@@ -16,6 +16,7 @@
 #include "CanopenDeviceDriver.h"
 #include "CanopenDevicePdo.h"
 #include "CanopenStore.h"
+#include "CanopenTime.h"
 #include "CmpBytes.h"
 #include "CmpCan.h"
 #include "CmpChecksum.h"
@@ -24,6 +25,7 @@
 #include "SysLock.h"
 #include "SysTarget.h"
 #include "SysTime.h"
+#include "SysTimeRtc.h"
 
 #if CANOPEN_DEVICE_DATA > 0
 
@@ -102,10 +104,22 @@ static RTS_UI32 get_bit_rate(void)
     return state.bit_rate / BITS_PER_KBIT;
 }
 
+static bool is_time(const CAN_FRAME *frame)
+{
+    return (device.slave.flags & CANOPEN_DEVICE_TIME) != 0 && frame->id == CANOPEN_TIME &&
+           (frame->flags & CAN_FLAG_REMOTE) == 0;
+}
+
 static void take(RTS_UI32 index, const CAN_FRAME *frame, RTS_UI32 now_ms)
 {
+    RTS_I64 utc_ns;
+
     RTS_UNUSED(index);
-    if (device.is_running)
+    if (!device.is_running)
+        return;
+    if (is_time(frame) && CanopenTimeGet(frame, &utc_ns))
+        (void)SysTimeRtcSet(utc_ns); /* if programs may */
+    else
         CanopenDeviceTake(&device.slave, frame, get_bit_rate(), now_ms);
 }
 
@@ -114,6 +128,32 @@ static void note_bus(RTS_UI32 index, bool off)
     RTS_UNUSED(index);
     if (device.is_running)
         CanopenDeviceNoteBus(&device.slave, off, SysTimeGetMs());
+}
+
+static bool is_of_pdo(RTS_UI32 direction, RTS_UI32 id)
+{
+    const CANOPEN_PDO_SETTING *pdos = device.slave.settings.pdos[direction];
+
+    for (RTS_UI32 i = 0; i < device.slave.pdo_count[direction]; i++)
+        if ((pdos[i].cob & CANOPEN_COB_INVALID) == 0 && (pdos[i].cob & CANOPEN_COB_ID) == id)
+            return true;
+    return false;
+}
+
+/* Programs must not send what the device does, or its manager. */
+static bool is_reserved(RTS_UI32 network, RTS_UI32 id)
+{
+    RTS_UI32 function = id & CANOPEN_FUNCTION_MASK;
+    RTS_UI32 node = device.slave.node;
+
+    if (!device.is_running || network != device.network)
+        return false;
+    if (id == CANOPEN_NMT || id == CANOPEN_LSS_REQUEST || id == CANOPEN_LSS_REPLY)
+        return true;
+    return is_of_pdo(CANOPEN_RPDOS, id) || is_of_pdo(CANOPEN_TPDOS, id) ||
+           (node != 0 && (id & CANOPEN_NODE_MASK) == node &&
+            (function == CANOPEN_SDO_REPLY || function == CANOPEN_SDO_REQUEST || function == CANOPEN_HEARTBEAT ||
+             function == CANOPEN_EMCY));
 }
 
 /* ---- configuration ---- */
@@ -262,7 +302,8 @@ static RTS_RESULT attach(void)
                              .filter_count = RTS_COUNT(filters),
                              .take_urgent = take_urgent,
                              .take = take,
-                             .note_bus = note_bus};
+                             .note_bus = note_bus,
+                             .reserves = is_reserved};
     device.is_running = true;
     RTS_RESULT result = CanAttach(device.network, &device.user);
     device.is_running = result == ERR_OK;

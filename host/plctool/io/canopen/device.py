@@ -73,6 +73,7 @@ _PROGRAM_PLACES = (
 )
 _DEVICE_TYPE, _NAME, _HARDWARE, _SOFTWARE, _IDENTITY, _SERVER = 0x1000, 0x1008, 0x1009, 0x100A, 0x1018, 0x1200
 _FIRST_OBJECT, _LAST_OBJECT = 0x2000, 0xBFFF
+_TIME, _TAKES_TIME = 0x1012, 0x8000_0100
 _KEY = re.compile(r"([0-9A-Fa-f]{4})(?::([0-9A-Fa-f]{1,2}))?")
 _SYNC = re.compile(r"sync(?:/(\d{1,3}))?")
 _DURATION_US = (10_000, 30_000_000)
@@ -375,11 +376,12 @@ def read_canopen_device(table: Table, context: Context) -> list[Connector]:
     made.node = table.number("node", 1, MAX_NODE, required=None if lss else 9) or 0
     take_number(table, context.nodes.setdefault(network, {}), made.node, f"this PLC as {made.name}")
     heartbeat = table.duration_us("heartbeat", *_DURATION_US) or 0
-    download = table.flag("download")
+    download, takes_time = table.flag("download"), table.flag("time")
     flags = (
         int(lib.CANOPEN_DEVICE_STORE) * table.flag("store", True)
         | int(lib.CANOPEN_DEVICE_LSS) * lss
         | int(lib.CANOPEN_DEVICE_DOWNLOAD) * download
+        | int(lib.CANOPEN_DEVICE_TIME) * takes_time
     )
     if download:
         made.add_program()
@@ -392,6 +394,8 @@ def read_canopen_device(table: Table, context: Context) -> list[Connector]:
         made.add(int(number), value, name)
     made.shows_program = table.flag("program")
     _identify(table, made)
+    if takes_time:
+        made.add_constant(_TIME, 0, UNSIGNED32, _TAKES_TIME)
     for key, writable in (("read", False), ("write", True)):
         _read_values(table, key, writable, made)
     for key, is_tpdo in (("rpdo", False), ("tpdo", True)):

@@ -26,7 +26,7 @@ _NAMES = {
     0x1000: "Device type", 0x1001: "Error register", 0x1003: "Pre-defined error field",
     0x1005: "COB-ID SYNC", 0x1008: "Manufacturer device name", 0x1009: "Manufacturer hardware version",
     0x100A: "Manufacturer software version", 0x1010: "Store parameters", 0x1011: "Restore default parameters",
-    0x1014: "COB-ID EMCY", 0x1015: "Inhibit time EMCY", 0x1016: "Consumer heartbeat time",
+    0x1012: "COB-ID TIME", 0x1014: "COB-ID EMCY", 0x1015: "Inhibit time EMCY", 0x1016: "Consumer heartbeat time",
     0x1017: "Producer heartbeat time", 0x1018: "Identity object", 0x1020: "Verify configuration",
     0x1019: "Synchronous counter overflow value",
     0x1029: "Error behaviour", 0x1200: "SDO server parameter",

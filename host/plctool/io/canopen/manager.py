@@ -46,6 +46,8 @@ _TYPE, _IDENTITY = 0x1000, 0x1018
 _DEFAULT_HEARTBEAT_US = 200_000
 _DURATION_US = (10_000, 30_000_000)
 _SYNC_US = (1000, 10_000_000)
+_TIME_US = (100_000, 86_400_000_000)
+_SYNC_COUNTER, LAST_SYNC_COUNTER = 0x1019, 240
 _LATE = 5  # halves of its event timer until an input is late
 _ON_CHANGE, _ON_SYNC = 255, 1  # transmission types
 _CHANNEL_BITS = (1, 8, 16, 32, 64)
@@ -64,6 +66,7 @@ class CanopenLine(Connector):
     faults = ("cut",)
     node: int = 0
     sync: bool = False
+    sync_counter: int = 0
     network: int = 0
     nodes: dict[int, str] = field(default_factory=dict)
     free_cobs: list[int] = field(default_factory=lambda: list(FREE_COBS))
@@ -109,10 +112,14 @@ def read_canopen(table: Table, context: Context) -> list[Connector]:
         (lib.CANOPEN_PARAM_SYNC, sync.kind, "sync"),
         (lib.CANOPEN_PARAM_SYNC_EVERY, sync.every_us, "sync_every"),
         (lib.CANOPEN_PARAM_SYNC_WINDOW, sync.window_us, "sync_window"),
+        (lib.CANOPEN_PARAM_SYNC_COUNTER, sync.counter, "sync_counter"),
+        (lib.CANOPEN_PARAM_TIME, (table.duration_us("time", *_TIME_US) or 0) // 1000, "time"),
     ):
         line.parameters.append(Parameter(int(number), UDINT, value, name))
     for number, event, name in sync.events(line.name):
         line.parameters.append(Parameter(number, StringType(len(event)), event, name))
+    line.parameters.sort(key=lambda p: p.id)
+    line.sync_counter = sync.counter
     line.nodes = context.nodes.setdefault(network, line.nodes)
     take_number(table, line.nodes, line.node, "this PLC")
     return [line, *each(table.tables("device"), lambda inner: _read_device(inner, line))]
@@ -120,11 +127,12 @@ def read_canopen(table: Table, context: Context) -> list[Connector]:
 
 @dataclass
 class Sync:
-    """Who sends SYNC (`kind`: CANOPEN_SYNC_*), how often, and when its window ends; 0: it has none."""
+    """Who sends SYNC (`kind`: CANOPEN_SYNC_*), how often, the end of its window, how far it counts; 0: it has none."""
 
     kind: int = int(lib.CANOPEN_SYNC_NONE)
     every_us: int = 0
     window_us: int = 0
+    counter: int = 0
 
     def events(self, line: str) -> Iterator[tuple[int, str, str]]:
         """Those that tasks may wait for: the parameter, the name, the name of the parameter."""
@@ -145,9 +153,12 @@ def _read_sync(table: Table, line: str) -> Sync:
     window = inner.duration_us("window", *_SYNC_US) or 0
     if every is not None and window >= every:
         inner.error(f"the window has to end before the next SYNC of {line}", "window")
+    counter = inner.number("counter", 2, LAST_SYNC_COUNTER) or 0
+    if counter and not produce:
+        inner.error("the device that sends SYNC counts it; leave out counter", "counter")
     inner.close()
     kind = lib.CANOPEN_SYNC_BY_TIMER if produce else lib.CANOPEN_SYNC_OF_OTHERS
-    return Sync(int(kind), every or 0, window)
+    return Sync(int(kind), every or 0, window, counter)
 
 
 def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
@@ -181,6 +192,9 @@ def _read_device(table: Table, line: CanopenLine) -> CanopenDevice:
     made.add_bytes(int(lib.CANOPEN_PARAM_EXPECTED), _expected(eds), "expected")
     if heartbeat:
         made.writes.append((_HEARTBEAT, 0, (heartbeat // 1000).to_bytes(2, "little")))
+    counted = eds.entry(_SYNC_COUNTER)
+    if line.sync_counter and counted is not None and counted.access in WRITABLE:
+        made.writes.append((_SYNC_COUNTER, 0, bytes([line.sync_counter])))
     made.writes += writes_of_dcf(eds, made.node, table.mistakes)
     if settings is not None:
         made.writes += _settings(settings, eds, table.mistakes)
