@@ -144,7 +144,7 @@ BENCHED := $(filter build build-cm3 build-cm4f,$(BUILDS))
 
 run-bench: $(BENCHED:%=%/build.ninja)
 	set -e; for build in $(BENCHED); do $(MESON) compile -C $$build; done
-	$(MESON) compile -C build can_share
+	$(MESON) compile -C build can_share canopen_share
 	PYTHONPATH=host:build/host PLCRT=build/firmware/port/linux/plcrt $(BIN)/python bench/run.py $(ARGS)
 
 run-size: build-cm3/build.ninja $(RISC_V:%=%/build.ninja) build/build.ninja $(LINUX_ARM:%=%/build.ninja)

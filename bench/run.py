@@ -11,6 +11,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import canopen_bench
 import compiling
 import editor_speed
 import latency
@@ -217,6 +218,7 @@ def main() -> None:
     bench_day()
     bench_serial()
     bench_can()
+    canopen_bench.main()
     links.main()
     tracing.main()
     page.main()

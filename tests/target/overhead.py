@@ -62,9 +62,15 @@ class Counter:
 
     def count(self, start: str, end: Range, work: Callable[[Plc], None] = lambda plc: time.sleep(0.05)) -> int:
         """The usual number of instructions from function `start` to the range `end`, while `work` is repeated."""
+        counts = self.counts(self.firmware.functions[start][0], end, work)
+        return max(counts, key=lambda number: counts[number])
+
+    def counts(
+        self, begin: int, end: Range, work: Callable[[Plc], None] = lambda plc: time.sleep(0.05)
+    ) -> dict[int, int]:
+        """How often there was which number of instructions from an address to the range `end`."""
         out = self.folder / "counts"
         out.unlink(missing_ok=True)
-        begin, _ = self.firmware.functions[start]
         plugin = f"file={self.plugin},start={begin:#x},lo={end[0]:#x},hi={end[1]:#x},out={out}"
         self.board.power_on(plugin=plugin)
         give_up = time.monotonic() + PATIENCE
@@ -76,9 +82,9 @@ class Counter:
                     lines = (line.split() for line in out.read_text().splitlines())
                     counts = {int(number): int(times) for number, times in lines}
                 if time.monotonic() > give_up:
-                    raise SystemExit(f"{start} was not seen often enough: {counts}")
+                    raise SystemExit(f"{begin:#x} was not seen often enough: {counts}")
         self.board.power_off()
-        return max(counts, key=lambda number: counts[number])
+        return counts
 
 
 IMAGE_BYTES = 32  # half of them inputs
