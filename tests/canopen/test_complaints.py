@@ -45,7 +45,24 @@ ANSWERS = {
     ),
     "synchronous values are lost between SYNCs (CANopenNode#23)": (
         "test_synchronous_values_are_of_one_sync", "test_values_of_all_nodes_pass_within_two_periods_of_sync",
+        "test_eight_nodes_exchange_their_values_at_each_sync",
     ),
+    "a request right after a block upload is dropped (CANopenNode#39)": (
+        "a_request_right_after_a_block_upload_is_served",
+    ),
+    "an early acknowledgement is mishandled (CANopenNode#426)": (
+        "an_acknowledgement_before_the_end_of_a_block_makes_no_wrong_data",
+    ),
+    "an LSS scan takes minutes (CANopenNode#597)": ("test_lss_scan_of_five_devices_takes_seconds",),
+    "TPDOs leave 0 to 1 ms after SYNC at random (CanOpenSTM32#97)": (
+        "test_synchronous_values_keep_their_sync_during_a_block_transfer",
+        "test_outputs_of_a_task_that_runs_by_sync_leave_after_it",
+    ),
+    "two TPDOs only (CanOpenSTM32#23, c-open#34)": ("test_node_may_have_more_than_four_pdos_in_a_direction",),
+    "no objects of single bits in PDOs (embedded-office#110)": ("test_values_go_both_ways",),
+    "the size of objects is fixed (embedded-office#160)": ("every_size_is_transferred_in_segments",),
+    "a time-out fires early (canfestival-rtt#3)": ("test_silent_node_is_a_time_out_and_blocks_nothing",),
+    "block transfer is slower than segments (node-canopen#50)": ("blocks_are_faster_than_segments",),
 }  # fmt: skip
 
 

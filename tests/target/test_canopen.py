@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import canopen
+import pytest
 from environment import TARGET
 from programs import compile_text
 from qemu import Board
@@ -26,9 +27,9 @@ sys.path.append(str(Path(__file__).parents[1]))
 from canopen_device_programs import DESCRIPTION, NODE, SOURCE, WRITE
 
 
-def load(board: Board, folder: Path) -> tuple[Plc, str]:
-    """The program on the board, and its EDS."""
-    (folder / "field.io.toml").write_text(DESCRIPTION + f"node = {NODE}" + WRITE)
+def load(board: Board, folder: Path, more: str = "") -> tuple[Plc, str]:
+    """The program on the board, and its EDS. `more`: keys of the device."""
+    (folder / "field.io.toml").write_text(DESCRIPTION + f"node = {NODE}\n{more}" + WRITE)
     built = compile_text(SOURCE, TARGET, folder)
     symbols = built.path.with_suffix(".sym")
     plc = Plc(Connection(board.line()), symbols)
@@ -73,3 +74,33 @@ def test_manager_reads_writes_maps_and_stores(make_board: Callable[..., Any], tm
         eventually(lambda: node.sdo.upload(0x1017, 0) == (350).to_bytes(2, "little"))
         assert node.sdo.upload(0x2202, 0) == text_of_100
     network.disconnect()
+
+
+def test_manager_replaces_the_program(make_board: Callable[..., Any], tmp_path: Path) -> None:
+    board = make_board("canopen-download")
+    board.power_on("host")
+    plc, text = load(board, tmp_path, "download = true")
+    second = compile_text(SOURCE.replace("'none'", "'second'"), TARGET, tmp_path).image
+    damaged = bytes([*second[:-20], second[-20] ^ 1, *second[-19:]])
+    network = canopen.Network(bus=open_bus(board.can, 500000, 0))
+    network.connect()
+    path = tmp_path / "field.eds"
+    path.write_text(text)
+    sdo = network.add_node(NODE, str(path)).sdo
+    sdo.RESPONSE_TIMEOUT = PATIENCE
+    with plc:
+        assert sdo.upload(0x2101, 0) == b"none"
+        write_program(sdo, damaged)
+        with pytest.raises(canopen.SdoAbortedError):
+            sdo.download(0x1F51, 1, b"\1")
+        assert sdo.upload(0x1F57, 1) != bytes(4)
+        assert sdo.upload(0x2101, 0) == b"none"
+        write_program(sdo, second)
+        sdo.download(0x1F51, 1, b"\1")
+        eventually(lambda: sdo.upload(0x2101, 0) == b"second")
+    network.disconnect()
+
+
+def write_program(sdo: Any, image: bytes) -> None:
+    with sdo.open(0x1F50, 1, "wb", size=len(image), block_transfer=True) as writer:
+        writer.write(image)
