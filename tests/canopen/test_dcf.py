@@ -11,6 +11,7 @@ import pytest
 from plctool.cli import main as cli
 from plctool.io.canopen.dcf import NodeOf, dcf_of
 from plctool.io.canopen.eds import read_eds
+from plctool.io.canopen.lock import locked
 from plctool.io.canopen.manager import CanopenDevice
 from plctool.io.description import load_description
 
@@ -163,3 +164,28 @@ def test_description_without_a_network_is_not_exported(
     path.write_text(text)
     assert cli.main(["canopen", "export", str(path), str(tmp_path / "out"), *options]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_tools_of_an_eds_are_in_the_dcf(tmp_path: Path) -> None:  # C405-39
+    description = write_program(tmp_path).with_name("app.io.toml")
+    eds = tmp_path / "valves.eds"
+    tools = "[Tools]\nItems=1\n\n[Tool1]\nName=Valve tool\nCommand=valves.exe $DCF\n"
+    eds.write_text(eds.read_text() + "\n" + tools)
+    assert cli.main(["canopen", "export", str(description), str(tmp_path / "files")]) == 0
+    assert tools in (tmp_path / "files/Valves.dcf").read_text()
+
+
+def test_folder_that_another_tool_has_locked_is_not_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:  # C405-38
+    description = write_program(tmp_path).with_name("app.io.toml")
+    files = tmp_path / "files"
+    files.mkdir()
+    with locked(files, "Network tool"):
+        assert cli.main(["canopen", "export", str(description), str(files)]) == 2
+        assert "Network tool has locked" in capsys.readouterr().err
+        assert [path.name for path in files.iterdir()] == ["lock"]
+    assert cli.main(["canopen", "export", str(description), str(files)]) == 0
+    assert (files / "lock").read_text() == ""
+    with locked(files):  # who reads need not wait
+        assert cli.main(["canopen", "import", str(files), "-o", str(tmp_path / "other.io.toml")]) == 0

@@ -290,3 +290,17 @@ def test_check_fails_for_errors_and_prints_one_document(tmp_path: Path, capsys: 
     assert document["device"]["vendor"] == 1
     assert cli.main(["canopen", "check", str(tmp_path / "none.eds")]) == 2
     assert "cannot be read: No such file" in capsys.readouterr().err
+
+
+def test_dynamic_channels_may_be_fewer_and_not_others() -> None:  # C405-35
+    def warnings(lines: str) -> list[str]:
+        text = f"[DeviceInfo]\nVendorNumber=1\n\n[DynamicChannels]\nNrOfSeg=1\n{lines}"
+        return [m.message for m in read_eds("x.eds", text.encode()).findings.found if "Range" in m.message]
+
+    assert warnings("Type1=0x02\nDir1=ro\nRange1=0xA000-0xA00F\nPPOffset1=0\n") == []
+    assert warnings("Type1=0x02\nDir1=rww\nRange1=0xA480-0xA4BF\nPPOffset1=0\n") == []
+    other = "Range1 is not that of CiA 405, which has the area 0xA000 to 0xA03F for this type."
+    for range_ in ("0xA040-0xA07F", "0xA000-0xA040", "0xA03F-0xA000", "0x2000-0x2FFF"):
+        assert warnings(f"Type1=0x02\nDir1=ro\nRange1={range_}\nPPOffset1=0\n") == [other]
+    assert "no area" in warnings("Type1=0x09\nDir1=ro\nRange1=0xA000-0xA00F\n")[0]
+    assert "is not a range" in warnings("Type1=0x02\nDir1=ro\nRange1=all\n")[0]

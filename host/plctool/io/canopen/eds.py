@@ -24,11 +24,14 @@ from plctool.io.canopen.data_types import (
     parse_whole,
 )
 from plctool.io.canopen.ini import Item, NotText, Section, read_sections, shown, text_of
+from plctool.io.canopen.profile import segment_of
 from plctool.io.mistakes import Mistakes
 
 MAX_EDS = 8 << 20
 """Bytes of a file. Those of large drives have less than 3 MiB."""
 MAX_FINDINGS = 200  # of one file
+MAX_SEGMENTS = 255  # of [DynamicChannels]
+_RANGE = re.compile(r"0x([0-9A-Fa-f]{4})-0x([0-9A-Fa-f]{4})")
 LAST_NODE = 127
 LAST_PDO = 511
 LAST_SUB = 254  # 255 describes the structure of the object
@@ -203,9 +206,28 @@ class _Reader:
             self._read_head()
             self._read_objects()
             self._check_mappings()
+            self._check_dynamic_channels()
         found = sorted(self.found.found, key=lambda m: (m.pos.line, m.pos.column))
         eds.findings.found, eds.more_findings = found[:MAX_FINDINGS], max(0, len(found) - MAX_FINDINGS)
         return eds
+
+    def _check_dynamic_channels(self) -> None:
+        """The areas of CiA 405 cannot be others; a device may have fewer, or parts of them."""
+        section = self.sections.get("dynamicchannels")
+        for number in range(1, MAX_SEGMENTS + 1):
+            item = None if section is None else section.get(f"Range{number}")
+            if section is None or item is None:
+                continue
+            kind, way = self.whole(section, f"Type{number}"), self.text(section, f"Dir{number}").strip().lower()
+            match = _RANGE.fullmatch(item.value.strip())
+            area = None
+            if kind in DATA_TYPES:
+                area = segment_of(DATA_TYPES[kind], is_output=way != "ro")
+            if match is None:
+                self.found.warning(item.pos, f"Range{number} is not a range such as 0xA000-0xA03F; it is ignored.")
+            elif area is None or not area.first <= int(match[1], 16) <= int(match[2], 16) <= area.last:
+                where = "no area" if area is None else f"the area 0x{area.first:04X} to 0x{area.last:04X}"
+                self.found.warning(item.pos, f"Range{number} is not that of CiA 405, which has {where} for this type.")
 
     # ---- values ----
 

@@ -14,6 +14,7 @@ from plctool.cli.parser import Parser
 from plctool.errors import UsageError, counted
 from plctool.files import check_inside, usable_path, write_atomically
 from plctool.io.canopen.eds import Eds, load_eds, mapping_of, setting_of
+from plctool.io.canopen.lock import locked
 from plctool.io.canopen.nodelist import FILE_NAME, ListedNode, NodeList, load_nodelist, nodelist_text
 
 if TYPE_CHECKING:
@@ -62,6 +63,13 @@ def export_nodes(description: Path, folder: Path, network: str | None, bit_rate:
     """Writes a DCF of each node and the list of them. Raises UsageError for a description with errors."""
     line, devices = _network(description, network)
     folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        files = _write_nodes(line, devices, folder, bit_rate)
+    return {"network": line.name, "files": files}
+
+
+def _write_nodes(line: CanopenLine, devices: list[CanopenDevice], folder: Path, bit_rate: int) -> list[str]:
+    """Returns the files."""
     files, listed = [], []
     for device in sorted(devices, key=lambda d: d.node):
         file = folder / f"{device.name}.dcf"
@@ -69,7 +77,7 @@ def export_nodes(description: Path, folder: Path, network: str | None, bit_rate:
         files.append(str(file))
         listed.append(ListedNode(device.node, device.pos, device.name, file.name))
     write_atomically(folder / FILE_NAME, nodelist_text(line.name, listed).encode())
-    return {"network": line.name, "files": [*files, str(folder / FILE_NAME)]}
+    return [*files, str(folder / FILE_NAME)]
 
 
 def _network(path: Path, name: str | None) -> tuple[CanopenLine, list[CanopenDevice]]:
