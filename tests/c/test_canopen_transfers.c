@@ -147,12 +147,12 @@ static void check_fault(PF_WRITE write, PF_READ read, RTS_UI32 size, RTS_UI32 fr
     CHECK(write(text, size) && read() && has_read(size));
 }
 
-static void check_faults(PF_WRITE write, PF_READ read)
+static void check_faults(PF_WRITE write, PF_READ read, RTS_UI32 longest)
 {
     static const RTS_UI32 sizes[] = {1, 4, 5, 7, 8, 14, 15, 50, 890};
 
     make_text(0);
-    for (RTS_UI32 i = 0; i < RTS_COUNT(sizes); i++) {
+    for (RTS_UI32 i = 0; i < RTS_COUNT(sizes) && sizes[i] <= longest; i++) {
         RTS_UI32 count = count_frames(write, read, sizes[i]);
         for (RTS_UI32 frame = 0; frame < count; frame++) {
             check_fault(write, read, sizes[i], frame, true);
@@ -163,12 +163,12 @@ static void check_faults(PF_WRITE write, PF_READ read)
 
 static void a_lost_or_doubled_frame_of_segments_never_makes_wrong_data(void)
 {
-    check_faults(write_text, read_text);
+    check_faults(write_text, read_text, 50);
 }
 
 static void a_lost_or_doubled_frame_of_blocks_never_makes_wrong_data(void)
 {
-    check_faults(write_blocks, read_blocks);
+    check_faults(write_blocks, read_blocks, 890); /* more than a block */
 }
 
 int main(void)
