@@ -14,4 +14,6 @@ Texts = dict[str, str]
 
 
 def diagnostic_document(diagnostic: Diagnostic) -> Document:
-    return {name: value for name, value in vars(diagnostic).items() if name != "missing"}
+    """The fields of a diagnostic; `element` is there if it is about a diagram."""
+    left_out = {"missing"} if diagnostic.element else {"missing", "element"}
+    return {name: value for name, value in vars(diagnostic).items() if name not in left_out}

@@ -210,6 +210,8 @@ def parse(
 ) -> Parsed:
     """Parses the files of a program. Those of its libraries are parsed as far as `declare` needs them."""
     declared = declared_names_asked_for(library, libraries, sources)
+    for source in sources:
+        diagnostics.knows(source)
     texts = [(source, trees.parse(source, declared, diagnostics)) for source in sources]
     trees.keep(sources)
     syntax = [d for d in diagnostics.sorted() if d.severity == "error"]

@@ -77,7 +77,7 @@ class Published:
         unused = diagnostic.code in ("unused", "unreachable", "uncalled")
         return lsp.Diagnostic(
             lsp.Range(first, last),
-            diagnostic.message,
+            f"{diagnostic.message} (in {diagnostic.element})" if diagnostic.element else diagnostic.message,
             severities.Error if diagnostic.severity == "error" else severities.Warning,
             diagnostic.code,
             source=SOURCE,

@@ -14,7 +14,7 @@ from bisect import bisect_right
 from dataclasses import field
 from functools import cached_property
 from pathlib import PurePath
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from plctool.compiler.typed.nodes import Pos
 from plctool.records import dataclass
@@ -48,6 +48,14 @@ class Piece:
     path: str = ""
 
 
+class ElementName(NamedTuple):
+    """From line and column (from 1) on, the file has an element of a diagram; `name` is "" after the end of one."""
+
+    line: int
+    column: int
+    name: str
+
+
 @dataclass(frozen=True)
 class Source:
     """A text to compile; `path` is what diagnostics and debug information call it.
@@ -55,7 +63,8 @@ class Source:
     `name`: what the list of globals in it is called, unless by the file. `shared`: the file had more than globals, so
     this is no part of their full names. `original`: the file, when the text was made from it, in `pieces` that begin at
     offset 0. `absent`: names, case-folded, of units whose files are missing; what needs them cannot be checked.
-    `lists`: the instructions of bodies in Instruction List, and the offset where their statements begin.
+    `lists`: the instructions of bodies in Instruction List, and the offset where their statements begin. `elements`: of
+    the diagrams in the file, in the order of their positions.
     """
 
     path: str
@@ -67,6 +76,7 @@ class Source:
     findings: tuple[Finding, ...] = field(default=(), compare=False)
     absent: frozenset[str] = field(default=frozenset(), compare=False)
     lists: tuple[tuple[int, str], ...] = field(default=(), repr=False, compare=False)
+    elements: tuple[ElementName, ...] = field(default=(), repr=False, compare=False)
 
     @property
     def is_unreadable(self) -> bool:
@@ -120,6 +130,11 @@ class Source:
         piece = self._piece(offset)
         more = offset - piece.offset if piece.copied else 0
         return Pos(piece.path or self.path, piece.line, piece.column + more)
+
+    def element_at(self, line: int, column: int) -> str:
+        """Returns the name of the element of a diagram at a position of the file; "" if there is none."""
+        number = bisect_right(self.elements, (line, column), key=lambda e: (e.line, e.column))
+        return self.elements[number - 1].name if number else ""
 
     def line_text(self, line: int) -> str:
         """The text of a line (from 1) of the file, without its end."""

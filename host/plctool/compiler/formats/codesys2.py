@@ -13,9 +13,10 @@ import re
 from dataclasses import dataclass
 from functools import cached_property
 
-from plctool.compiler.base.source import Source
+from plctool.compiler.base.source import ElementName, Source
 from plctool.compiler.formats import il_files
 from plctool.compiler.formats.codesys2_networks import Line, read_networks
+from plctool.compiler.formats.element_names import element_names
 from plctool.compiler.formats.library_units import parameters, parameters_of
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
 from plctool.compiler.formats.text import Findings, Part, Place, Text
@@ -88,6 +89,7 @@ class _Export:
         self._path = path
         self._text = text
         self._edits: list[_Edit] = []
+        self._named: list[ElementName] = []
         self._findings = Findings()
         self._next_id = 1  # of networks, so that no two need variables of the same name
         self._masked, self._plain = self._without_comments()
@@ -113,6 +115,7 @@ class _Export:
             return Source(self._path, self._text)
         made_text = Text()
         made_text.spliced(self._text, _apart(self._edits))
+        made_text.named(self._named)
         return made_text.source(self._path, self._text, findings=self._findings.all)
 
     def _place(self, offset: int) -> Place:
@@ -238,6 +241,7 @@ class _Export:
             )
             self._next_id = body.next_id
             self.drawn[name] = body.body
+            self._named += element_names(name, body.body)
             keeps = span.kind in ("PROGRAM", "FUNCTION_BLOCK", _BLOCK_IN_ONE_WORD)
             unit = Unit(name, keeps, dict(self._results))
             translate_networks(body.body, unit, made)

@@ -118,7 +118,7 @@ class _Wire:
 class Elements:
     """Builds a body of PLCopen XML. `contacts`: AND and OR of a ladder become contacts, as they are drawn; they are
     compiled as functions, so that several coils get the value of the same moment. An element has the same local id in
-    both. `first`: the first local id."""
+    both, and the number of its network. `first`: the first local id."""
 
     tag: str
     at: Place
@@ -126,6 +126,7 @@ class Elements:
     first: int = 1
     _root: Element = field(init=False)
     _count: int = 0
+    _networks: int = 0
     _rail: _Wire | None = None
     _branches: dict[str, list[_Wire]] = field(default_factory=dict)
 
@@ -145,6 +146,7 @@ class Elements:
     def add(self, network: TreeNetwork) -> None:
         """Adds a network. Raises NotTranslatedError."""
         self._branches = {}
+        self._networks += 1
         if network.label:
             self._element("label", network.at, {"label": network.label})
         for item in network.items:
@@ -255,7 +257,8 @@ class Elements:
     def _element(self, tag: str, at: Place, attributes: dict[str, str], children: list[Element] | None = None) -> _Wire:
         local_id = str(self.next_id)
         self._count += 1
-        self._root.children.append(Element(tag, {"localId": local_id} | attributes, at, children or []))
+        own = {"localId": local_id, "network": str(self._networks)}
+        self._root.children.append(Element(tag, own | attributes, at, children or []))
         return _Wire(local_id)
 
 

@@ -14,6 +14,7 @@ import re
 from plctool.compiler.base.source import Source
 from plctool.compiler.formats import instruction_list
 from plctool.compiler.formats import plcopen_types as types
+from plctool.compiler.formats.element_names import element_names
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
 from plctool.compiler.formats.plcopen_chart import Chart
 from plctool.compiler.formats.plcopen_graph import Network
@@ -237,6 +238,8 @@ class _Project:
         for part in element.all("body"):
             drawn = next(part.every("CFC"), None)
             for written in [drawn] if drawn is not None else part.children:
+                if written.tag in _DRAWN:
+                    self.text.named(element_names(name, written))
                 try:
                     _translate(written, unit, body)
                 except NotTranslatedError as error:
@@ -251,6 +254,7 @@ class _Project:
         return body
 
 
+_DRAWN = frozenset(("FBD", "LD", "CFC", "SFC"))
 _REFUSED = "the diagram {} cannot be compiled: {}"
 
 

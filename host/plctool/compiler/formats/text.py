@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
-from plctool.compiler.base.source import Finding, Piece, Source
+from plctool.compiler.base.source import ElementName, Finding, Piece, Source
 
 
 class Place(NamedTuple):
@@ -69,6 +69,7 @@ class Text:
         self._pieces: list[Piece] = []
         self._length = 0
         self._lists: list[tuple[int, str]] = []
+        self._elements: list[ElementName] = []
 
     def __bool__(self) -> bool:
         return bool(self._parts)
@@ -84,6 +85,10 @@ class Text:
             for part in _lines(chunk.text):
                 self._add(part, line, column, copied=True)
                 line, column = line + 1, 1
+
+    def named(self, elements: Iterable[ElementName]) -> None:
+        """Takes the names of elements of the file."""
+        self._elements += elements
 
     def parts(self, parts: Iterable[Part]) -> None:
         """Adds several parts."""
@@ -137,7 +142,8 @@ class Text:
         """The text as a source of that file."""
         pieces = tuple(self._pieces) or (Piece(0, 1, 1, copied=False),)
         text = "".join(self._parts)
-        return Source(path, text, name, shared, original, pieces, findings, lists=tuple(self._lists))
+        lists, elements = tuple(self._lists), tuple(sorted(self._elements))
+        return Source(path, text, name, shared, original, pieces, findings, lists=lists, elements=elements)
 
 
 def _lines(text: str) -> list[str]:

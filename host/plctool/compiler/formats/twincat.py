@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 
 from plctool.compiler.base.source import Source
+from plctool.compiler.formats.element_names import element_names
 from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
 from plctool.compiler.formats.text import Findings, Text
 from plctool.compiler.formats.tree_bodies import translate_networks
@@ -123,6 +124,7 @@ class _Object:
             try:
                 elements = read_networks(archive, first=self._next_id)
                 self._next_id = elements.next_id
+                self._text.named(element_names(name, elements.body))
                 translate_networks(elements.body, Unit(name, keeps, {}), made)
             except NotTranslatedError as error:
                 self._findings.add(error.at, "language", REFUSED.format(name, error))

@@ -44,6 +44,7 @@ class Diagnostic:
     code: str
     message: str
     missing: str = ""  # the name that nothing declares and that no other is like: maybe of a library
+    element: str = ""  # of a diagram, with the unit that it is in
 
 
 class TooManyErrors(Exception):
@@ -66,6 +67,7 @@ class Diagnostics:
         self.options = options
         self.dialect = dialect
         self._muted: dict[tuple[str, str], LineRanges] = {}
+        self._drawn: dict[str, Source] = {}  # files with diagrams, by path
         self._found: dict[Diagnostic, None] = {}
         self._reported: set[tuple[str, Pos]] = set()  # codes and where
         self.incomplete: set[str] = set()  # units, case-folded, that lack what has an unknown type or base
@@ -117,6 +119,11 @@ class Diagnostics:
         for code, ranges in switched_off(source).items():
             self._muted.setdefault((source.path, code), []).extend(ranges)
 
+    def knows(self, source: Source) -> None:
+        """Names the elements of diagrams in a file."""
+        if source.elements:
+            self._drawn[source.path] = source
+
     @contextmanager
     def apart(self, source: Source) -> Iterator[Callable[[], list[Diagnostic]]]:
         """Collects apart what is found inside the context, about a new text of a file; gives a function that returns
@@ -150,7 +157,9 @@ class Diagnostics:
     ) -> None:
         if len(message) > MAX_MESSAGE:
             message = message[: MAX_MESSAGE - 3] + "..."
-        diagnostic = Diagnostic(pos.file, pos.line, pos.column, severity, code, message, missing)
+        drawn = self._drawn.get(pos.file)
+        element = "" if drawn is None else drawn.element_at(pos.line, pos.column)
+        diagnostic = Diagnostic(pos.file, pos.line, pos.column, severity, code, message, missing, element)
         if diagnostic in self._found:
             return
         self._found[diagnostic] = None
@@ -186,17 +195,18 @@ class SourceDiagnostics:
 
 def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
     """`file.st:12:7: error: message`, and below it the source line with a caret when the file is among `sources`. A
-    warning ends with its name: `[integer-division]`."""
+    warning ends with its name: `[integer-division]`. In a diagram the unit and the element follow."""
     d = diagnostic
     is_warning = d.severity == "warning" or d.message.endswith(_BY_OPTION)
     name = f" [{d.code}]" if is_warning and d.code in MEANINGS else ""
     head = f"{d.file}:{d.line}:{d.column}: {d.severity}: {d.message}{name}"
     source = next((s for s in sources if s.path == d.file), None)
+    where = f"\n    in {d.element}" if d.element else ""
     if source is None or not source.text:  # "" of a file that is no text
-        return head
+        return f"{head}{where}"
     line, column = _part_of(source.line_text(d.line), d.column - 1)
     indent = "".join("\t" if c == "\t" else " " for c in line[:column])
-    return f"{head}\n{line}\n{indent}^"
+    return f"{head}\n{line}\n{indent}^{where}"
 
 
 def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> list[str]:
