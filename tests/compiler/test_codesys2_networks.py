@@ -171,4 +171,4 @@ def test_a_rung_that_is_too_deep_is_refused(tmp_path: Path) -> None:
 
 def test_an_error_stands_in_its_line(tmp_path: Path) -> None:
     ((line, message),) = messages(tmp_path, export("LD", [rung(contact("missing"), ("o", "="))], "o : BOOL;"))
-    assert (line, "missing" in message) == ("o", True)
+    assert (line, "missing" in message) == ("missing", True)

@@ -35,7 +35,7 @@ def found_in(folder: Path, name: str, text: str) -> tuple[list[Diagnostic], list
 
 
 def ladder() -> tuple[str, str]:
-    """The second of two rungs has a wrong coil."""
+    """The second of two rungs has a coil of another type."""
     good = (plcopen.contact(2, "a", "1"), plcopen.coil(3, "c", "2"))
     return xml(plcopen.ladder(*good, plcopen.contact(4, "a", "1"), plcopen.coil(5, "n", "4", row=40)))
 
@@ -43,6 +43,13 @@ def ladder() -> tuple[str, str]:
 def blocks() -> tuple[str, str]:
     timer = plcopen.block(2, "TON", {"IN": "1", "PT": "3"}, "Q ET", "t")
     return xml(plcopen.network(plcopen.given(1, "a"), timer, plcopen.given(3, "n"), plcopen.taken(4, "c", "2.Q")))
+
+
+def results() -> tuple[str, str]:
+    """The result of a function goes to an input of another type."""
+    added = plcopen.block(5, "ADD", {"IN1": "3", "IN2": "3"})
+    timer = plcopen.block(2, "TON", {"IN": "1", "PT": "5.OUT"}, "Q ET", "t")
+    return xml(plcopen.network(plcopen.given(1, "a"), plcopen.given(3, "n"), added, timer))
 
 
 def continuous() -> tuple[str, str]:
@@ -68,12 +75,13 @@ def codesys2_ladder() -> tuple[str, str]:
 @pytest.mark.parametrize(
     ("program", "element"),
     [
-        (ladder, "Main: network 2, coil n (localId 5)"),
-        (blocks, "Main: network 1, block t (localId 2)"),
-        (continuous, "Main: output c (localId 9)"),
+        (ladder, "Main: network 2, contact a (localId 4)"),
+        (blocks, "Main: network 1, input n (localId 3)"),
+        (results, "Main: network 1, block t (localId 2), input PT"),
+        (continuous, "Main: input n (localId 7)"),
         (sequence, "Main: transition (localId 2), condition"),
-        (twincat_ladder, "Main: network 2, coil n"),
-        (codesys2_ladder, "Main: network 2, coil n"),
+        (twincat_ladder, "Main: network 2, input a"),
+        (codesys2_ladder, "Main: network 2, input a"),
     ],
     ids=lambda p: getattr(p, "__name__", ""),
 )

@@ -210,10 +210,10 @@ def test_a_network_shown_as_il_says_what_to_do(tmp_path: Path) -> None:
     assert found.endswith("a network of it is shown as IL; show it as FBD or LD and save it")
 
 
-def test_an_error_stands_where_the_value_goes(tmp_path: Path) -> None:
+def test_an_error_stands_where_the_operand_is(tmp_path: Path) -> None:
     path = tmp_path / "Main.TcPOU"
     path.write_text(unit("PROGRAM Main\nVAR o : BOOL; END_VAR", archive(network(assign(given("wrong"), ("o", 0))))))
     (found,) = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
     line = path.read_text().splitlines()[found.line - 1]
-    assert line[found.column - 1 :].startswith('o"')
+    assert line[found.column - 1 :].startswith('wrong"')
     assert "wrong" in found.message

@@ -18,7 +18,7 @@ from plctool.compiler.formats import il_files
 from plctool.compiler.formats.codesys2_networks import Line, read_networks
 from plctool.compiler.formats.element_names import element_names
 from plctool.compiler.formats.library_units import parameters, parameters_of
-from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
+from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit, declared
 from plctool.compiler.formats.text import Findings, Part, Place, Text
 from plctool.compiler.formats.tree_bodies import translate_networks, units_of
 from plctool.compiler.formats.twincat import REFUSED
@@ -250,10 +250,10 @@ class _Export:
             made = Body()
         self._edits.append((start, end, [("\n", self._place(start)), *made.parts]))
         if made.variables:
-            declared = _DECLARED.search(self._text, span.start, start)
-            at = start if declared is None else declared.start()
-            declared_here = [(f"VAR {n} : {spec}; END_VAR\n", place) for n, (spec, place) in made.variables.items()]
-            self._edits.append((at, at, [*declared_here]))
+            section = _DECLARED.search(self._text, span.start, start)
+            at = start if section is None else section.start()
+            variables = made.variables.items()
+            self._edits.append((at, at, [part for n, (spec, place) in variables for part in declared(n, spec, place)]))
 
     def _lines(self, start: int, end: int) -> list[Line]:
         first = self._place(start)

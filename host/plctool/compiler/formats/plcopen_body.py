@@ -20,6 +20,22 @@ class NotTranslatedError(Exception):
         self.at = at
 
 
+class Written(str):
+    """Text of which each part stands for something of its own in the file; `parts` are in order. What is put together
+    of it by other means is text without places."""
+
+    __slots__ = ("parts",)
+    parts: tuple[tuple[str, Place], ...]
+
+    @staticmethod
+    def of(at: Place, *pieces: str) -> Written:
+        """Puts pieces together; those without places of their own stand for what is at `at`."""
+        parts = [part for piece in pieces for part in (piece.parts if isinstance(piece, Written) else [(piece, at)])]
+        made = Written("".join(text for text, _ in parts))
+        made.parts = tuple(parts)
+        return made
+
+
 @dataclass
 class Body:
     """Statements, steps or both, with variables of its own."""
@@ -30,7 +46,7 @@ class Body:
 
     def line(self, text: str, at: Place) -> None:
         """Adds what is translated."""
-        self.parts.append((f"{text}\n", at))
+        self.parts += Written.of(at, text, "\n").parts
 
     def write(self, text: Text) -> None:
         """Adds the statements to a source."""
@@ -39,7 +55,7 @@ class Body:
     def write_variables(self, text: Text) -> None:
         """Adds the variables, also those of the actions."""
         for name, (spec, at) in self.all_variables().items():
-            text.made(f"VAR {name} : {spec}; END_VAR\n", at)
+            text.parts(declared(name, spec, at))
 
     def all_variables(self) -> dict[str, tuple[str, Place]]:
         """With those of the actions."""
@@ -47,6 +63,11 @@ class Body:
         for _, body, _ in self.actions:
             found |= body.all_variables()
         return found
+
+
+def declared(name: str, spec: str, at: Place) -> tuple[Part, ...]:
+    """Returns the declaration of a variable that a body needs."""
+    return Written.of(at, f"VAR {name} : ", spec, "; END_VAR\n").parts
 
 
 @dataclass

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
+from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit, Written
 from plctool.compiler.formats.plcopen_graph import Network
 from plctool.compiler.formats.text import Chunk, Place
 from plctool.compiler.formats.units import tokens_of
@@ -150,14 +150,13 @@ class Chart:
         if text is not None:
             found = expression(text)
         elif body is not None:
-            found = [
-                (self._drawn(body, transition.get("name") if reference is None else reference.get("name")), body.at)
-            ]
+            value = self._drawn(body, transition.get("name") if reference is None else reference.get("name"))
+            found = [*Written.of(body.at, value).parts]
         elif reference is not None:
             found = [(reference.get("name"), reference.at)]
         else:
-            value = self._network.point(condition.child("connectionPointIn"))
-            found = [] if value is None else [(value, transition.at)]
+            power = self._network.point(condition.child("connectionPointIn"))
+            found = [] if power is None else [*Written.of(transition.at, power).parts]
         if not found:
             raise NotTranslatedError(transition.at, "a transition has no condition")
         return [("NOT (", transition.at), *found, ("\n)", transition.at)] if negated else found

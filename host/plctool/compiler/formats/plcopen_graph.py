@@ -15,11 +15,11 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cmp_to_key
 
 from plctool.compiler.formats.library_units import COMPARISONS, is_declared
-from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
+from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit, Written
 from plctool.compiler.formats.xml_tree import Element
 
 _SIMPLE = re.compile(r"[\w.#%\[\]^$:']+")
@@ -102,7 +102,7 @@ class Network:
         if chosen[0].get("storage") in ("set", "reset"):
             raise NotTranslatedError(chosen[0].at, "a condition cannot be set or reset")
         value = self._edge(chosen[0], self._power(chosen[0]))
-        return _negated(value) if _is(chosen[0], "negated") else value
+        return _negated(value, chosen[0]) if _is(chosen[0], "negated") else value
 
     def _needs_statement(self, element: Element, what: str) -> None:
         if self._inline:
@@ -135,7 +135,7 @@ class Network:
         if element.tag == "block":
             self._called(element, wanted=element.get("computed") == "here")
         elif element.tag == "return":
-            self._body.line(f"IF {self._power(element)} THEN RETURN; END_IF;", element.at)
+            self._line(element, "IF ", self._power(element), " THEN RETURN; END_IF;")
         elif element.tag in _WAYS:
             self._lead(element)
         elif element.tag == "coil":
@@ -152,20 +152,26 @@ class Network:
             self._body.line(f"{name}:", element.at)
             return
         value = self.point(element.child("connectionPointIn")) or "TRUE"
-        value = _negated(value) if _is(element, "negated") else value
-        jump = f"JMP {name};"
-        self._body.line(jump if value == "TRUE" else f"IF {value} THEN {jump} END_IF;", element.at)
+        value = _negated(value, element) if _is(element, "negated") else value
+        self._guarded(element, "" if value == "TRUE" else value, f"JMP {name};")
 
     def _assign(self, element: Element, target: str, value: str) -> None:
         if _is(element, "negatedIn" if element.tag == "inOutVariable" else "negated"):
-            value = _negated(value)
+            value = _negated(value, element)
         value = self._edge(element, value)
         storage = element.get("storage")
         if storage in ("set", "reset"):
             stored = "TRUE" if storage == "set" else "FALSE"
-            self._body.line(f"IF {value} THEN {target} := {stored}; END_IF;", element.at)
+            self._guarded(element, value, f"{target} := {stored};")
         else:
-            self._body.line(f"{target} := {value};", element.at)
+            self._line(element, f"{target} := ", value, ";")
+
+    def _line(self, element: Element, *pieces: str) -> None:
+        self._body.line(Written.of(element.at, *pieces), element.at)
+
+    def _guarded(self, element: Element, condition: str, *pieces: str) -> None:
+        """Adds a statement that is executed under a condition, "" for none."""
+        self._line(element, *(("IF ", condition, " THEN ", *pieces, " END_IF;") if condition else pieces))
 
     # ---- values ----
 
@@ -181,11 +187,13 @@ class Network:
             return None
         expression = point.child("expression")
         if expression is not None and expression.text:
-            return _operand(expression.text)
+            return _operand(expression.text, expression)
         values = [self._value(c, c.get("refLocalId"), c.get("formalParameter")) for c in point.all("connection")]
         if not values:
             return None
-        return values[0] if len(values) == 1 else "TRUE" if "TRUE" in values else f"({' OR '.join(values)})"
+        if len(values) == 1 or "TRUE" in values:
+            return values[0] if len(values) == 1 else "TRUE"
+        return Written.of(point.at, "(", *_between(" OR ", values), ")")
 
     def _value(self, connection: Element, ref: str, formal: str) -> str:
         element = self._elements.get(ref)
@@ -194,7 +202,7 @@ class Network:
         if element.tag == "leftPowerRail":
             return "TRUE"
         if element.tag in ("inVariable", "inOutVariable"):
-            value = _operand((element.child("expression") or element).text)
+            value = _operand((element.child("expression") or element).text, element)
             return self._modified(element, value, "negatedOut" if element.tag == "inOutVariable" else "negated")
         if element.tag == "block":
             return self._output(element, formal)
@@ -219,14 +227,14 @@ class Network:
         raise NotTranslatedError(element.at, f"a line comes from a {element.tag}")
 
     def _contact(self, contact: Element) -> str:
-        name = _operand((contact.child("variable") or contact).text)
+        name = _operand((contact.child("variable") or contact).text, contact)
         value = self._modified(contact, name)
         power = self._power(contact)
-        return value if power == "TRUE" else f"({power} AND {value})"
+        return value if power == "TRUE" else Written.of(contact.at, "(", power, " AND ", value, ")")
 
     def _modified(self, element: Element, value: str, negated: str = "negated") -> str:
         value = self._edge(element, value)
-        return _negated(value) if _is(element, negated) else value
+        return _negated(value, element) if _is(element, negated) else value
 
     def _edge(self, element: Element, value: str) -> str:
         """The value, or whether it has an edge now."""
@@ -240,7 +248,7 @@ class Network:
         key = f"{element.at.line}:{element.at.column}"
         if key not in self._done:
             self._body.variables[name] = (trigger, element.at)
-            self._body.line(f"{name}(CLK := {value});", element.at)
+            self._line(element, f"{name}(CLK := ", value, ");")
             self._done[key] = name
         return f"{self._done[key]}.Q"
 
@@ -284,9 +292,7 @@ class Network:
         for output, target in named:
             value = self._output(block, output.get("formalParameter"))
             when = enable if output.get("formalParameter").upper() != "ENO" else ""
-            self._body.line(
-                f"IF {when} THEN {target} := {value}; END_IF;" if when else f"{target} := {value};", output.at
-            )
+            self._guarded(output, when, f"{target} := ", value, ";")
 
     def _is_kept(self, block: Element) -> bool:
         """Whether the result of a function is there in the next cycle."""
@@ -298,34 +304,34 @@ class Network:
 
     def _inputs(self, block: Element, key: str) -> tuple[str, list[tuple[str, str]]]:
         """EN, "" without one, and the other inputs that are connected, with their values."""
-        enable, found = "", []
+        enable, found = "", list[tuple[str, str]]()
         for item in [*_parameters(block, "inputVariables"), *_parameters(block, "inOutVariables")]:
             value = self.point(item.child("connectionPointIn"))
             if value is None:
                 continue
-            value = self._modified(item, value)
+            value = Written.of(item.at, self._modified(item, value))
             if item.get("formalParameter").upper() != "EN":
                 found.append((item.get("formalParameter"), value))
             elif value != "TRUE":
                 self._needs_statement(block, f"{block.get('typeName')} with EN")
                 enable = enable_variable(block)
                 self._body.variables[enable] = ("BOOL", block.at)
-                self._body.line(f"{enable} := {value};", block.at)
+                self._line(block, f"{enable} := ", value, ";")
                 self._done[f"{key}.EN"] = enable
         return enable, found
 
     def _call_instance(self, block: Element, key: str) -> None:
         self._needs_statement(block, f"the function block {_instance(block)}")
         enable, inputs = self._inputs(block, key)
-        call = f"{_instance(block)}({', '.join(f'{n} := {v}' for n, v in inputs)});"
+        named = [Written.of(block.at, f"{n} := ", v) for n, v in inputs]
         self._done[key] = ""
-        self._body.line(f"IF {enable} THEN {call} END_IF;" if enable else call, block.at)
+        self._guarded(block, enable, f"{_instance(block)}(", *_between(", ", named), ");")
 
     def _call_function(self, block: Element, key: str) -> None:
         name = block.get("typeName")
         enable, inputs = self._inputs(block, key)
         if self._inline and name.upper() != _EXECUTE:
-            self._done[key] = f"{name}({', '.join(value for _, value in inputs)})"
+            self._done[key] = Written.of(block.at, f"{name}(", *_between(", ", [value for _, value in inputs]), ")")
             return
         if name.upper() == _EXECUTE and block.child_data("stcode"):
             self._write_statements(block, key, enable)
@@ -338,18 +344,18 @@ class Network:
         if not used.isdisjoint([name for name in outputs if name != "ENO"][1:]):
             raise NotTranslatedError(block.at, f"more than one output of the function {name} is used")
         own = self._unit.results.get(name.casefold())
-        call = f"{name}({', '.join(v if own is None else f'{n} := {v}' for n, v in inputs)})"
+        given = [v if own is None else Written.of(block.at, f"{n} := ", v) for n, v in inputs]
+        call: str = Written.of(block.at, f"{name}(", *_between(", ", given), ")")
         if own is False or not (used or own or is_declared(name)):
-            self._body.line(f"IF {enable} THEN {call}; END_IF;" if enable else f"{call};", block.at)
+            self._guarded(block, enable, call, ";")
             self._done[key] = "FALSE"
             return
         result = result_variable(block)
         self._calls[result] = call
         self._body.variables[result] = ("", block.at)
         if enable and name.upper() in COMPARISONS and not _has_output(block, "ENO"):
-            call, enable = f"{enable} AND {_operand(call)}", ""  # in a rung, as a contact
-        statement = f"{result} := {call};"
-        self._body.line(f"IF {enable} THEN {statement} END_IF;" if enable else statement, block.at)
+            call, enable = Written.of(block.at, f"{enable} AND (", call, ")"), ""  # in a rung, as a contact
+        self._guarded(block, enable, f"{result} := ", call, ";")
         self._done[key] = result
 
     def _write_statements(self, block: Element, key: str, enable: str) -> None:
@@ -403,7 +409,9 @@ def result_variable(block: Element) -> str:
 
 def type_of(call: str) -> str:
     """The type of what a call returns, for a declaration."""
-    return f"@type({call})"
+    if not isinstance(call, Written):
+        return f"@type({call})"
+    return Written.of(call.parts[0][1], "@type(", call, ")")
 
 
 def _in_full(call: str, own: str, later: Mapping[str, str]) -> str:
@@ -417,7 +425,14 @@ def _in_full(call: str, own: str, later: Mapping[str, str]) -> str:
         text = waiting.pop(name[0], "0")
         return f"({_RESULT.sub(written, text)})"
 
-    return _RESULT.sub(written, call)
+    if not isinstance(call, Written):
+        return _RESULT.sub(written, call)
+    return Written.of(call.parts[0][1], *(Written.of(at, _RESULT.sub(written, text)) for text, at in call.parts))
+
+
+def _between(sign: str, values: Sequence[str]) -> list[str]:
+    """The values with a sign between them."""
+    return [piece for value in values for piece in (sign, value)][1:]
 
 
 def enable_variable(block: Element) -> str:
@@ -485,10 +500,12 @@ def _is(element: Element, attribute: str) -> bool:
     return element.get(attribute) == "true"
 
 
-def _operand(text: str) -> str:
+def _operand(text: str, element: Element) -> str:
+    """The text of an element as an operand."""
     end = "\n" * ("//" in text)  # the comment ends there
-    return text if _SIMPLE.fullmatch(text) else f"({text}{end})"
+    return Written.of(element.at, text if _SIMPLE.fullmatch(text) else f"({text}{end})")
 
 
-def _negated(value: str) -> str:
-    return f"NOT {_operand(value)}" if _SIMPLE.fullmatch(value) else f"NOT ({value})"
+def _negated(value: str, element: Element) -> str:
+    opening, closing = ("", "") if _SIMPLE.fullmatch(value) else ("(", ")")
+    return Written.of(element.at, f"NOT {opening}", value, closing)
