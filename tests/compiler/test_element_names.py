@@ -98,6 +98,13 @@ def test_what_cannot_be_compiled_names_the_element(tmp_path: Path) -> None:
     assert found.element == "Main: network 2, coil c (localId 3)"
 
 
+def test_the_condition_of_a_coil_that_sets_stands_at_the_coil(tmp_path: Path) -> None:
+    """There the program stops at a breakpoint."""
+    coil = plcopen.coil(3, "c", "2", more='storage="set"')
+    (found,), _ = found_in(tmp_path, *xml(plcopen.ladder(plcopen.contact(2, "n", "1"), coil)))
+    assert found.element == "Main: network 1, coil c (localId 3)"
+
+
 def test_errors_before_and_after_a_diagram_name_none(tmp_path: Path) -> None:
     drawn = pou("Main", plcopen.ladder(plcopen.contact(2, "a", "1"), plcopen.coil(3, "a", "2")), VARIABLES)
     before = pou("Before", plcopen.st("wrong();"))

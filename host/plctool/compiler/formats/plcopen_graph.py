@@ -135,7 +135,7 @@ class Network:
         if element.tag == "block":
             self._called(element, wanted=element.get("computed") == "here")
         elif element.tag == "return":
-            self._line(element, "IF ", self._power(element), " THEN RETURN; END_IF;")
+            self._guarded(element, self._power(element), "RETURN;")
         elif element.tag in _WAYS:
             self._lead(element)
         elif element.tag == "coil":
@@ -170,8 +170,9 @@ class Network:
         self._body.line(Written.of(element.at, *pieces), element.at)
 
     def _guarded(self, element: Element, condition: str, *pieces: str) -> None:
-        """Adds a statement that is executed under a condition, "" for none."""
-        self._line(element, *(("IF ", condition, " THEN ", *pieces, " END_IF;") if condition else pieces))
+        """Adds a statement that is executed under a condition, "" for none. All of the condition stands for the
+        element: there a breakpoint stops."""
+        self._line(element, *((f"IF {condition} THEN ", *pieces, " END_IF;") if condition else pieces))
 
     # ---- values ----
 
