@@ -187,10 +187,11 @@ END_VAR
 n := n + 1;
 IF take THEN
     ok[0] := SysCallbackRegister(INDEXOF(OnEvent), EVENT_STOP)
-        AND SysCallbackRegister(INDEXOF(OnEvent), RTS_EVENT.EVT_StartDone);
+        AND EventRegisterCallbackFunction(EventOpen(RTS_EVENT.EVT_StartDone, 0, 0), INDEXOF(OnEvent)) = 0;
     ok[1] := SysCallbackRegister(INDEXOF(MayStop), RTS_EVENT.EVT_DenyStop)
         AND SysCallbackRegister(INDEXOF(MayStop), RTS_EVENT.EVT_DenyStop);
-    ok[2] := NOT SysCallbackUnregister(INDEXOF(MayStop), EVENT_START);
+    ok[2] := NOT SysCallbackUnregister(INDEXOF(MayStop), EVENT_START)
+        AND EventUnregisterCallbackFunction(EVENT_START, INDEXOF(MayStop)) = 16#10 AND EventClose(EVENT_START) = 0;
     take := FALSE;
 END_IF
 IF back THEN

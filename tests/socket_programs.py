@@ -128,9 +128,9 @@ PROGRAM Main
 VAR
     server, client, peer, udp, got : DINT := -1; step : INT := -1; a : SOCKADDRESS; asize : DINT := 16; set :
         SOCKET_FD_SET;
-    ok : ARRAY[0..19] OF BOOL; data : ARRAY[0..99] OF BYTE; text : STRING := 'hello'; from : SOCKADDRESS;
+    ok : ARRAY[0..23] OF BOOL; data : ARRAY[0..99] OF BYTE; text : STRING := 'hello'; from : SOCKADDRESS;
         waiting : DINT; port : UINT;
-    name : STRING(20); ip : INADDR; value, size, err : DINT;
+    name, host : STRING(80); ip : INADDR; value, size, err : DINT;
 END_VAR
 CASE step OF
 0:
@@ -160,6 +160,7 @@ CASE step OF
     IF SysSockSelect(SOCKET_FD_SETSIZE, ADR(set), 0, 0, 0) = 1 THEN
         ok[6] := set.fd_array[0] = peer AND set.fd_count = 1
             AND SysSockIoctl(peer, SOCKET_FIONREAD, ADR(waiting)) = 0 AND waiting = 5;
+        ok[20] := SysSockRecv(peer, ADR(data), 3, SOCKET_MSG_PEEK) = 3 AND data[2] = 16#6C;
         ok[7] := SysSockRecv(peer, ADR(data), 100, 0) = 5 AND data[4] = 16#6F;
         ok[8] := SysSockShutdown(client, SOCKET_SD_BOTH) AND SysSockSend(client, ADR(text), 5, 0) = -1
             AND SysSockGetLastError() = SOCKET_ESHUTDOWN;
@@ -176,6 +177,14 @@ CASE step OF
         step := 4;
     END_IF
 4:
+    got := SysSockRecvFrom(udp, ADR(data), 100, SOCKET_MSG_PEEK, 0, 0);
+    IF got = 5 THEN
+        ok[21] := SysSockRecvFrom(udp, ADR(data), 100, 8, 0, 0) = -1 AND SysSockGetLastError() = SOCKET_ENOSYS;
+        ok[22] := FwSysSockGetHostName(ADR(host), 81) AND LEN(host) > 0
+            AND NOT SysSockGetHostName(ADR(host), INT_TO_DINT(LEN(host))) AND SysSockGetLastError() = SOCKET_EFAULT;
+        ok[23] := NOT FwSysSockSetIPAddress('Ethernet1', '10.0.0.1', '255.0.0.0')
+            AND SysSockGetLastError() = SOCKET_ENOSYS;
+    END_IF
     got := SysSockRecvFrom(udp, ADR(data), 100, 0, ADR(from), SIZEOF(from));
     IF got = 5 THEN
         ok[12] := from.sin_addr = a.sin_addr AND from.sin_port <> 0 AND data[0] = 16#68;

@@ -21,11 +21,12 @@ enum {
     IEC_SOCKET_TCP_CONNECT = 3, /* address of the peer; the result is a handle */
     IEC_SOCKET_CLOSE = 4,       /* handle */
     IEC_SOCKET_SEND_TO = 5,     /* handle, address of the peer; all of the data */
-    IEC_SOCKET_RECEIVE = 6,     /* handle, `value` most bytes; IEC_SOCKET_HEAD, then the data; the result is its size */
-    IEC_SOCKET_ACCEPT = 7,      /* handle; IEC_SOCKET_HEAD; the result is a handle, 0: no peer connects */
-    IEC_SOCKET_STATE = 8,       /* handle; the result is 1 when the connection is there */
-    IEC_SOCKET_READ = 9,        /* handle, `value` most bytes; the result is the size of the data */
-    IEC_SOCKET_WRITE = 10,      /* handle; the result is how many bytes were taken */
+    IEC_SOCKET_RECEIVE =
+        6, /* handle, `value` most bytes; IEC_SOCKET_HEAD, then the data; the result is its size; PEEK */
+    IEC_SOCKET_ACCEPT = 7, /* handle; IEC_SOCKET_HEAD; the result is a handle, 0: no peer connects */
+    IEC_SOCKET_STATE = 8,  /* handle; the result is 1 when the connection is there */
+    IEC_SOCKET_READ = 9,   /* handle, `value` most bytes; the result is the size of the data; PEEK */
+    IEC_SOCKET_WRITE = 10, /* handle; the result is how many bytes were taken */
 
     /* In the steps of Berkeley sockets (stdlib/syslib_sockets.st); what is open then takes the operations above. */
     IEC_SOCKET_CREATE = 11,   /* `value` IEC_SOCKET_STREAM or .._DATAGRAM; the result is a handle */
@@ -34,7 +35,12 @@ enum {
     IEC_SOCKET_CONNECT = 14,  /* handle, address of the peer; IEC_SOCKET_STATE tells the end */
     IEC_SOCKET_POLL = 15,     /* handle; the result is SYSNET_READABLE .., IEC_SOCKET_WAITING in front of it */
     IEC_SOCKET_SHUTDOWN = 16, /* handle; it stays until IEC_SOCKET_CLOSE */
+
+    IEC_SOCKET_HOST_NAME = 17, /* the name of the device; the result is its length */
 };
+
+/* In the high half of the operations with PEEK: what is read stays, to be read again. */
+enum { IEC_SOCKET_PEEK = 1 };
 
 enum { IEC_SOCKET_STREAM = 1, IEC_SOCKET_DATAGRAM = 2 };
 

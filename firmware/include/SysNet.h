@@ -37,6 +37,9 @@ RTS_RESULT SysNetSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RTS
 RTS_RESULT SysNetRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received);
 RTS_RESULT SysNetSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to);
 
+/* Reads as SysNetRecv (`from` NULL: a connection) or SysNetRecvFrom, and leaves the data there to be read again. */
+RTS_RESULT SysNetPeek(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received);
+
 enum {
     SYSNET_READABLE = 1, /* data, the end of a connection, or a connection to accept */
     SYSNET_WRITABLE = 2,

@@ -57,3 +57,36 @@ def test_pause_gives_the_whole_burst_back_and_no_more(plc: Simulator) -> None:
     first = burst()
     plc.run_for(seconds=3600)
     assert burst() == first
+
+
+COMPONENTS = """
+PROGRAM Main
+VAR
+    done : BOOL; first, again, nothing : UDINT := 99; handle, full : UDINT; i : UDINT; name : STRING := 'x';
+    removed, twice : UDINT := 99;
+END_VAR
+IF NOT done THEN
+    done := TRUE;
+    handle := CMAddComponent('MyLibrary', 16#12341005, 16#03050500, ADR(first));
+    CMAddComponent('Other', 16#12341005, 0, ADR(again));
+    CMAddComponent('', 1, 0, ADR(nothing));
+    LogAdd2(0, 16#12341005, LogClass.LOG_WARNING, 0, 0, 'pump is slow');
+    LogAdd2(0, 16#12341006, LogClass.LOG_WARNING, 0, 0, 'of no component');
+    FOR i := 1 TO 8 DO full := CMAddComponent(name, i, 0, 0); END_FOR
+    removed := CMRemoveComponent(handle);
+    twice := CMRemoveComponent(handle);
+    LogAdd2(0, 16#12341005, LogClass.LOG_WARNING, 0, 0, 'no name any more');
+END_IF
+END_PROGRAM
+"""
+
+
+def test_components_of_a_program_have_their_names_before_their_messages(tmp_path: Path) -> None:
+    source = tmp_path / "components.st"
+    source.write_text(COMPONENTS)
+    with Simulator.from_sources(source) as plc:
+        plc.run_cycles(1)
+        texts = [entry.text for entry in plc.log()]
+        results = [plc.read(f"Main.{name}") for name in ("first", "again", "nothing", "full", "removed", "twice")]
+    assert texts[-3:] == ["MyLibrary: pump is slow", "of no component", "no name any more"]
+    assert results == [0, 0x12, 2, 0xFFFFFFFF, 0, 0x10]

@@ -190,6 +190,11 @@ RTS_RESULT SysNetSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, c
     return SysSockSendTo(socket, data, size, to);
 }
 
+RTS_RESULT SysNetPeek(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received)
+{
+    return PortSockPeek(socket, data, size, from, received);
+}
+
 RTS_UI32 SysNetPoll(RTS_HANDLE socket, RTS_UI32 *waiting)
 {
     short events = PortSockPoll(socket, waiting);

@@ -650,6 +650,24 @@ RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCK
     return ERR_OK;
 }
 
+/* MSG_TRUNC gives the size of a longer datagram; on a connection it would drop the data. */
+RTS_RESULT PortSockPeek(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received)
+{
+    struct sockaddr_in sender = {.sin_family = AF_INET};
+    socklen_t length = sizeof(sender);
+    int flags = from != NULL ? MSG_PEEK | MSG_TRUNC : MSG_PEEK;
+    ssize_t count = recvfrom(file_of(socket), data, size, flags, (struct sockaddr *)&sender, &length);
+    *received = count > 0 ? (RTS_UI32)count : 0;
+    if (from == NULL) {
+        return count == 0 || (count < 0 && !is_later()) ? (RTS_RESULT)ERR_NET_NOTCONNECTED : (RTS_RESULT)ERR_OK;
+    }
+    if (count < 0) {
+        return ERR_NOTHING_TO_DO;
+    }
+    *from = read_address(&sender);
+    return ERR_OK;
+}
+
 static bool send_to(int file, const RTS_UI8 *data, RTS_UI32 size, struct sockaddr_in receiver)
 {
     return sendto(file, data, size, MSG_NOSIGNAL, (struct sockaddr *)&receiver, sizeof(receiver)) >= 0;

@@ -384,6 +384,21 @@ RTS_RESULT SysNetSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, c
     return send_packet(SIM_NET_DATAGRAM, &found->own, to, data, size);
 }
 
+RTS_RESULT SysNetPeek(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received)
+{
+    SOCKET *found = find(socket);
+    RTS_UI32 first = found != NULL ? found->first : 0;
+    RTS_UI32 count = found != NULL ? found->count : 0;
+    RTS_RESULT result =
+        from != NULL ? SysNetRecvFrom(socket, data, size, from, received) : SysNetRecv(socket, data, size, received);
+
+    if (found != NULL) { /* reading moves these two alone */
+        found->first = first;
+        found->count = count;
+    }
+    return result;
+}
+
 static bool has_waiting(const SOCKET *listener)
 {
     FOR_EACH_SOCKET(found)

@@ -13,11 +13,16 @@ enum { VERSION = 0x00010000 };
 
 #if IEC_SOCKETS > 0
 
+#include <string.h>
+
 #include "AppEventIds.h"
 #include "AppState.h"
+#include "CMUtils.h"
 #include "CmpBytes.h"
 #include "CmpEventMgr.h"
 #include "CmpLog.h"
+#include "CmpSrvNumbers.h"
+#include "NodeName.h"
 #include "SysNet.h"
 #include "SysTime.h"
 
@@ -201,6 +206,31 @@ static RTS_I32 send_to(const APP_CALL *call, const OPEN_SOCKET *found)
     return result == ERR_OK ? 0 : IEC_SOCKET_UDP_SEND_ERROR;
 }
 
+static bool is_peek(const APP_CALL *call)
+{
+    return address_of(call).port == IEC_SOCKET_PEEK;
+}
+
+/* A datagram of a peer that the program may not reach is dropped, also from a call that leaves what it reads. */
+static void drop_datagram(const APP_CALL *call, const OPEN_SOCKET *found)
+{
+    SOCKADDRESS peer;
+    RTS_UI32 size;
+    RTS_UI8 none;
+
+    if (is_peek(call))
+        (void)SysNetRecvFrom(found->socket, &none, 0, &peer, &size);
+}
+
+static RTS_RESULT read_datagram(APP_CALL *call, const OPEN_SOCKET *found, RTS_UI32 room, SOCKADDRESS *peer,
+                                RTS_UI32 *size)
+{
+    RTS_UI8 *data = call->data + IEC_SOCKET_HEAD;
+
+    return is_peek(call) ? SysNetPeek(found->socket, data, room, peer, size)
+                         : SysNetRecvFrom(found->socket, data, room, peer, size);
+}
+
 static RTS_I32 receive(APP_CALL *call, const OPEN_SOCKET *found)
 {
     RTS_UI32 room = sizeof call->data - IEC_SOCKET_HEAD;
@@ -211,10 +241,12 @@ static RTS_I32 receive(APP_CALL *call, const OPEN_SOCKET *found)
         room = call->value;
     call->data[6] = 0;
     for (RTS_UI32 i = 0; i < STRANGERS; i++) {
-        if (SysNetRecvFrom(found->socket, call->data + IEC_SOCKET_HEAD, room, &peer, &size) != ERR_OK)
+        if (read_datagram(call, found, room, &peer, &size) != ERR_OK)
             return 0;
-        if (!may_hear(&peer))
+        if (!may_hear(&peer)) {
+            drop_datagram(call, found);
             continue;
+        }
         if (size > room)
             return IEC_SOCKET_INVALID_DATASIZE;
         put_head(call, &peer, size);
@@ -244,7 +276,8 @@ static RTS_I32 read_data(APP_CALL *call, const OPEN_SOCKET *found)
 
     if (room == 0) /* else it looks as if the peer had closed the connection */
         return IEC_SOCKET_INVALID_DATASIZE;
-    RTS_RESULT result = SysNetRecv(found->socket, call->data, room, &call->result);
+    RTS_RESULT result = is_peek(call) ? SysNetPeek(found->socket, call->data, room, NULL, &call->result)
+                                      : SysNetRecv(found->socket, call->data, room, &call->result);
     return result == ERR_OK ? 0 : IEC_SOCKET_NO_CONNECTION;
 }
 
@@ -404,6 +437,16 @@ static RTS_I32 undo(const APP_CALL *call, RTS_UI32 operation)
     return 0;
 }
 
+static RTS_I32 get_host_name(APP_CALL *call)
+{
+    const char *name = NodeNameOf(SysTargetGet());
+
+    call->result = CMUtlStrNLen(name, NS_MAX_NODE_NAME);
+    call->size = call->result;
+    memcpy(call->data, name, call->result);
+    return 0;
+}
+
 static RTS_I32 carry_out(APP_CALL *call)
 {
     RTS_UI32 operation = call->operation & OPERATION_MASK;
@@ -419,6 +462,8 @@ static RTS_I32 carry_out(APP_CALL *call)
         return open_socket(call, SYSNET_CLIENT, CONNECTION, IEC_SOCKET_TCP_CONNECT_ERROR);
     case IEC_SOCKET_CREATE:
         return create(call);
+    case IEC_SOCKET_HOST_NAME:
+        return get_host_name(call);
     case IEC_SOCKET_CLOSE:
     case IEC_SOCKET_BIND:
     case IEC_SOCKET_LISTEN:
