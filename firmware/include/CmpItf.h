@@ -117,6 +117,7 @@ enum {
     CMPID_CmpTaskLoad = 0x00C8,
     CMPID_CmpCanopenProgram = 0x07E0,
     CMPID_IecTaskHandler = 0x00C9,
+    CMPID_CmpIoKeep = 0x0068,
 };
 
 /* Name of a component, "" when unknown. */

@@ -79,6 +79,9 @@
 #error \
     "HAS_CmpLogKeep: set LOG_KEEP, the entries that survive power-off, in rts_config_port.h, and HAS_CmpLog in cmp_list.c."
 #endif
+#if HAS_CmpIoKeep && (IO_KEEP_SIZE == 0 || !HAS_CmpIoMgrEmbedded || !HAS_CmpEventMgrEmbedded || !SETTINGS)
+#error "HAS_CmpIoKeep: set IO_KEEP_SIZE and SETTINGS in rts_config_port.h, and HAS_CmpIoMgrEmbedded in cmp_list.c."
+#endif
 #if HAS_CmpLogSrv && !HAS_CmpLog
 #error "HAS_CmpLogSrv needs HAS_CmpLog in cmp_list.c."
 #endif

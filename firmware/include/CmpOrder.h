@@ -63,6 +63,9 @@ X(IoDrvCanopenDevice)
 #if HAS_IoDrvCanopen
 X(IoDrvCanopen)
 #endif
+#if HAS_CmpIoKeep
+X(CmpIoKeep)
+#endif
 #if HAS_CmpForce
 X(CmpForce)
 #endif

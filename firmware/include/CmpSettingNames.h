@@ -23,6 +23,8 @@ SETTING_NUMBER(LogFilter, "CmpLog", "Logger.0.Filter", 0x1F, 0, 0x1F,
                "sum of what is logged: 1 info, 2 warnings, 4 errors, 16 debug; exceptions and kept entries always")
 SETTING_NUMBER(RetainSave, "CmpRetain", "SavePeriod", APP_RETAIN_SAVE_US / 1000, 100, 3600000,
                "shortest time between two saves of changed retain variables [ms]")
+SETTING_NUMBER(IoStoreChanged, "CmpIoMgr", "StoreChangedParameters", 0, 0, 1,
+               "1: parameters of I/O devices that a tool writes are kept over power-off; 0: until the program is loaded")
 SETTING_OPTION(TcpAddress, "CmpBlkDrvTcp", "Address", "tcp", "[ADDRESS:]PORT where TCP is served")
 SETTING_OPTION(UdpAddress, "CmpBlkDrvUdp", "Address", "udp", "ADDRESS[:PORT] where UDP is served")
 SETTING_OPTION(ComLine, "CmpBlkDrvSimpleCom", "Line", "serial", "serial device, pty or pty:LINK")

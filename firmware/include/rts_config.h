@@ -118,6 +118,12 @@
 #endif
 
 /* 1: IoDrvSim takes the connectors of drivers that are not there, which are then never missing. For the simulator. */
+/* Bytes for parameters of I/O devices that tools write, kept over power-off (CmpIoKeep.h): 24 and its data for each. 0:
+ * none. Not on boards as they are: lines of GPIO, which the full configuration drives, have no parameters to write. */
+#ifndef IO_KEEP_SIZE
+#define IO_KEEP_SIZE 0
+#endif
+
 #ifndef IO_SIM_TAKES_ALL
 #define IO_SIM_TAKES_ALL 0
 #endif

@@ -61,6 +61,23 @@ def test_devices_of_a_running_program(tool: Tool, plcrt: Plcrt, eventually) -> N
     refused(tool, plcrt)
 
 
+def test_parameters_are_kept_over_power_off_if_a_setting_says_so(tool: Tool, tmp_path: Path) -> None:
+    (tool.folder / "main.io.toml").write_text(DESCRIPTION)
+    image = tool.build("main", PROGRAM)
+    config = tmp_path / "plc.cfg"
+    config.write_text("[CmpIoMgr]\nStoreChangedParameters=1\n")
+    with Plcrt(tmp_path / "plc.flash", "--config", str(config)) as plcrt:
+        tool.ok("flash", "--port", plcrt.port, str(image))
+        tool.ok("io", "param", "set", "Bench", "2=-5", "--type", "INT", "--port", plcrt.port)
+        plcrt.stop()
+        plcrt.start()
+        assert tool.ok("io", "param", "get", "Bench", "2", "--type", "INT", "--port", plcrt.port)["value"] == -5
+        tool.ok("files", "delete", "IoConfig.par", "--port", plcrt.port)
+        plcrt.stop()
+        plcrt.start()
+        assert tool.ok("io", "param", "get", "Bench", "2", "--type", "INT", "--port", plcrt.port)["value"] == 0
+
+
 def test_program_of_another_board_is_refused_by_its_name(tool: Tool, tmp_path: Path) -> None:
     """What a machine is, only its user can say: plcrt --board."""
     (tool.folder / "main.io.toml").write_text(DESCRIPTION)

@@ -10,6 +10,7 @@
 #define HAS_SysTime 1
 #define HAS_CmpLog 1
 #define HAS_CmpLogKeep 1
+#define HAS_CmpIoKeep 1
 #define HAS_CmpEventMgrEmbedded 1
 #define HAS_CmpSettings 1
 #define HAS_SysWatchdog 1

@@ -73,6 +73,7 @@
 #define CAN_SEND_FRAMES 64
 #define LOG_MAX_ENTRIES 256
 #define LOG_KEEP 32
+#define IO_KEEP_SIZE 8192
 #define CHECKSUM_TABLE_ENTRIES 256
 
 /* Less than the patience of plctool with a device that does not answer, and of what ends plcrt [us]. */

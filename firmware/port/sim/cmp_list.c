@@ -7,6 +7,7 @@
 
 #define HAS_CmpLog 1
 #define HAS_CmpLogKeep 1
+#define HAS_CmpIoKeep 1
 #define HAS_CmpEventMgrEmbedded 1
 #define HAS_CmpSettings 1
 #define HAS_CmpRetain 1

@@ -6,6 +6,7 @@
 #include "CmpIoMgrSrv.h"
 
 #include "CmpBytes.h"
+#include "CmpIoKeep.h"
 #include "CmpIoMgrEmbedded.h"
 #include "CmpPackets.h"
 #include "CmpSrv.h"
@@ -109,9 +110,13 @@ static RTS_RESULT write_parameter(SRV_REQUEST *request, BTAG_WRITER *reply)
 
     if (result == ERR_OK)
         result = BTagFind(&request->tags, TAG_IO_DATA, p.size, request->tags.size, &data);
-    if (result == ERR_OK)
-        BTagWrite16(reply, TAG_IO_RESULT, IoMgrWriteParameter(p.connector, p.id, data.data, p.bits, p.bit_offset));
-    return result;
+    if (result != ERR_OK)
+        return result;
+    RTS_RESULT written = IoMgrWriteParameter(p.connector, p.id, data.data, p.bits, p.bit_offset);
+    if (written == ERR_OK)
+        IoKeepNote(p.connector, p.id, data.data, p.bits, p.bit_offset);
+    BTagWrite16(reply, TAG_IO_RESULT, written);
+    return ERR_OK;
 }
 
 /* ---- identify, scan ---- */
