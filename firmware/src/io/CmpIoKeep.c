@@ -28,7 +28,7 @@ enum {
     MAX_BITS = 8 * IO_KEEP_SIZE,
 };
 
-/* The file is MAGIC, and a record for each parameter with its data behind it, in whole words. Little-endian, as all
+/* The file is MAGIC, and a record for each parameter then its data, in whole words. Little-endian, as all
  * targets are. */
 typedef struct {
     RTS_UI32 device; /* CRC of what describes it */
@@ -254,7 +254,7 @@ static void restore_waiting(void)
     }
 }
 
-/* Lets the records of the loaded configuration wait. Drops what a damaged file has at its end. */
+/* Lets the records of the loaded configuration wait. Drops the end of a damaged file. */
 static void check_records(void)
 {
     RTS_UI32 end = sizeof(RTS_UI32);
