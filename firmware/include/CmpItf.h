@@ -124,6 +124,19 @@ enum {
 const char *CMGetComponentName(RTS_UI32 id);
 
 #ifndef RTS_CFFI
+/* Notes the version of a component that has one of its own, a byte each of a.b.c.d, in CH_INIT_SYSTEM or later. All others
+ * have that of the runtime. With CM_VERSIONS; more than so many have it, too. */
+#if CM_VERSIONS > 0
+void CMNoteVersion(RTS_UI32 id, RTS_UI32 version);
+RTS_UI32 CMGetVersion(RTS_UI32 id); /* 0: that of the runtime */
+#else
+static inline void CMNoteVersion(RTS_UI32 id, RTS_UI32 version)
+{
+    RTS_UNUSED(id);
+    RTS_UNUSED(version);
+}
+#endif
+
 typedef struct {
     RTS_UI32 id; /* CMPID_* */
     const char *name;

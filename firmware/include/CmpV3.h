@@ -171,6 +171,7 @@ typedef struct {
 static inline RTS_RESULT V3Start(const V3_COMPONENT *component, INIT_STRUCT *init)
 {
     memset(init, 0, sizeof *init);
+    CMNoteVersion(component->id, component->version);
     if (component->entry == NULL)
         return ERR_OK;
     if (component->entry(init) != ERR_OK)

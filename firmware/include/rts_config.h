@@ -503,6 +503,12 @@
 #define SETTINGS 0
 #endif
 
+/* Components that may have a version of their own; 8 bytes of RAM each. plctool shell complist and plctool info then list all
+ * components with their versions. 0: they do not, 0.2 KiB of flash less. */
+#ifndef CM_VERSIONS
+#define CM_VERSIONS 0
+#endif
+
 /* Which of several configurations of a board this one is: for plctool. */
 #ifndef RTS_CONFIG_NAME
 #define RTS_CONFIG_NAME ""

@@ -18,6 +18,8 @@
 #define CMGetFailure test_get_failure
 #define CMHasLeftOut test_has_left_out
 #define CMNoRoomIn test_no_room_in
+#define CMNoteVersion test_note_version
+#define CMGetVersion test_get_version
 #define cmp_hooks test_hooks
 #define cmp_names test_names
 #define cmp_component_count test_component_count
@@ -127,6 +129,20 @@ static void a_component_of_programs_that_fails_is_undone_and_called_no_more(void
     CHECK(strchr(trace, 'b') == NULL && strstr(trace, "d10 c10 a10 ") != NULL);
 }
 
+static void components_with_a_version_of_their_own_keep_it_until_the_next_start(void)
+{
+    begin("", CH_INIT);
+    CHECK_EQUAL(CMInit(), ERR_OK);
+    CHECK_EQUAL(CMGetVersion(1001), 0);
+    for (RTS_UI32 i = 0; i < CM_VERSIONS + 2; i++)
+        CMNoteVersion(1001 + i, 0x01020300 + i);
+    CHECK_EQUAL(CMGetVersion(1001), 0x01020300);
+    CHECK_EQUAL(CMGetVersion(1000 + CM_VERSIONS), 0x01020300 + CM_VERSIONS - 1);
+    CHECK_EQUAL(CMGetVersion(1001 + CM_VERSIONS), 0);
+    CHECK_EQUAL(CMInit(), ERR_OK);
+    CHECK_EQUAL(CMGetVersion(1001), 0);
+}
+
 static void it_may_fail_in_each_step(void)
 {
     for (int hook = CH_INIT_SYSTEM; hook < INIT_HOOKS; hook++) {
@@ -191,6 +207,7 @@ int main(void)
 {
     RUN(without_failure_none_is_left_out);
     RUN(a_component_of_programs_that_fails_is_undone_and_called_no_more);
+    RUN(components_with_a_version_of_their_own_keep_it_until_the_next_start);
     RUN(it_may_fail_in_each_step);
     RUN(several_are_left_out_and_the_first_is_named);
     RUN(the_runtime_itself_is_not_left_out);

@@ -14,6 +14,8 @@
 #define CMGetComponentName test_component_name
 #define CMRegisterExternal test_register
 #define CMFindExternal test_find
+#define CMNoteVersion test_note_version
+#define CMGetVersion test_get_version
 #define cmp_hooks test_hooks
 #define cmp_names test_names
 #define cmp_component_count test_component_count

@@ -72,6 +72,7 @@ def test_component_of_the_page_starts_and_is_called_by_a_program(tool: Tool) -> 
     with Simulator(image_of("PROGRAM Main END_PROGRAM").read_bytes()) as plc:
         for number in (lib.CH_INIT_SYSTEM, lib.CH_INIT, lib.CH_INIT3, lib.CH_INIT_FINISHED):
             assert hook(number) == lib.ERR_OK
+        assert ctypes.CDLL(_plccore.__file__).CMGetVersion(0x12342001) == 0x03040500
         assert "Foo is there, 4" in [entry.text for entry in plc.log()]
         plc.flash(image_of(Path("CmpFoo.st").read_text() + PROGRAM))
         plc.run_cycles(1)

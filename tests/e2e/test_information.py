@@ -27,6 +27,11 @@ def test_info_of_plcrt_is_that_of_the_image(plcrt: Plcrt, tmp_path: Path, tool) 
     plcrt.start()
     link = ["--tcp", plcrt.tcp]
     before = tool.ok("info", *link)
+    components = {component["name"]: component for component in before["components"]}
+    assert components["CmpDevice"]["id"] == "0x0008" and components["CmpDevice"]["vendor"] == ""
+    version = tool.ok("scan", *link)["devices"][0]["version"]
+    assert components["SysTarget"]["version"] == components["IecSocket"]["version"] == "0.2.0.0", version
+    assert "CmpIoKeep" in tool("info", *link).out
     assert before["state"] == "none" and before["info"] == {} and "crc" not in before
     tool.ok("flash", *link, "app.cdl")
     image, device = tool.ok("info", "app.cdl"), tool.ok("info", *link)

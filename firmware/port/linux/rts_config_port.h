@@ -74,6 +74,7 @@
 #define LOG_MAX_ENTRIES 256
 #define LOG_KEEP 32
 #define IO_KEEP_SIZE 8192
+#define CM_VERSIONS 32
 #define CHECKSUM_TABLE_ENTRIES 256
 
 /* Less than the patience of plctool with a device that does not answer, and of what ends plcrt [us]. */

@@ -70,6 +70,7 @@
 #define LOG_TEXT_SIZE 160
 #define LOG_KEEP 32
 #define IO_KEEP_SIZE 8192
+#define CM_VERSIONS 8
 #define CM_OWN_EXT_TABLES 8
 #ifndef CM_LEAVES_OUT
 #define CM_LEAVES_OUT 0 /* a test that lacks a component shall fail */

@@ -197,6 +197,20 @@ static RTS_RESULT reset_cold(void)
     return AppReset(RESET_OPTION_COLD);
 }
 
+#if CM_VERSIONS > 0
+/* A line for each component: plctool reads it. */
+static void print_components(SHELL_OUTPUT *out)
+{
+    for (RTS_SIZE i = 0; i < cmp_component_count; i++) {
+        RTS_UI32 own = CMGetVersion(cmp_names[i].id);
+        RTS_UI32 version = own != 0 ? own : RTS_VERSION;
+        print(out, "%s: id 0x%X, version %u.%u.%u.%u", cmp_names[i].name, (unsigned)cmp_names[i].id,
+              (unsigned)(version >> 24), (unsigned)(version >> 16 & 0xFF), (unsigned)(version >> 8 & 0xFF),
+              (unsigned)(version & 0xFF));
+    }
+}
+#endif
+
 static void print_help(SHELL_OUTPUT *out);
 
 static const SHELL_COMMAND commands[] = {
@@ -212,6 +226,9 @@ static const SHELL_COMMAND commands[] = {
     {"tasklist", "tasks and their times", RIGHT_VIEW, OPERATION_COUNT, NULL, print_tasks},
     {"channelinfo", "channels and lines, and what went wrong there", RIGHT_VIEW, OPERATION_COUNT, NULL, print_channels},
     {"plcload", "share of the time that tasks took since their start", RIGHT_VIEW, OPERATION_COUNT, NULL, print_load},
+#if CM_VERSIONS > 0
+    {"complist", "components and their versions", RIGHT_VIEW, OPERATION_COUNT, NULL, print_components},
+#endif
 };
 
 static void print_help(SHELL_OUTPUT *out)

@@ -84,6 +84,46 @@ static RTS_RESULT call(RTS_SIZE component, CMP_HOOK hook)
 
 #endif
 
+#if CM_VERSIONS > 0
+
+static struct {
+    RTS_UI32 count;
+    struct {
+        RTS_UI32 id;
+        RTS_UI32 version;
+    } of[CM_VERSIONS];
+} versions;
+
+void CMNoteVersion(RTS_UI32 id, RTS_UI32 version)
+{
+    if (versions.count < CM_VERSIONS) {
+        versions.of[versions.count].id = id;
+        versions.of[versions.count++].version = version;
+    }
+}
+
+RTS_UI32 CMGetVersion(RTS_UI32 id)
+{
+    for (RTS_UI32 i = 0; i < versions.count; i++) {
+        if (versions.of[i].id == id)
+            return versions.of[i].version;
+    }
+    return 0;
+}
+
+static void forget_versions(void)
+{
+    CMP_CLEAR(versions);
+}
+
+#else
+
+static void forget_versions(void)
+{
+}
+
+#endif
+
 /*
  * Start-up is a row of calls: each hook before CH_INIT_FINISHED for each component, the components of a hook in the
  * order of the list. Shutdown is the same row backwards, with the hooks that undo.
@@ -115,6 +155,7 @@ RTS_RESULT CMInit(void)
     if (!RTS_STARTS_ONCE)
         memset(cmp_ext_tables, 0, cmp_ext_table_room * sizeof cmp_ext_tables[0]);
     forget_failures();
+    forget_versions();
     for (done = 0; done < row_length() && result == ERR_OK; done++)
         result = do_call(done);
     if (result != ERR_OK) {

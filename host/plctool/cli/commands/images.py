@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -90,8 +91,8 @@ def info(path: Path) -> Document:
 
 
 def device_info(plc: Plc) -> Document:
-    """What a device has of its program, under the names that `info` has. "info" is empty without program, and from a
-    firmware without application information."""
+    """What a device has of its program, under the names that `info` has, and its components. "info" is empty without
+    program, and from a firmware without application information; "components" from one without such a list."""
     from plctool.image.file import target_name
 
     identity, status = plc.identity(), plc.raw_status()
@@ -102,7 +103,30 @@ def device_info(plc: Plc) -> Document:
     if status.image_crc:
         with suppress(DeviceError):
             document["info"] = plc.info()
-    return document
+    return document | {"components": components_of(plc)}
+
+
+_COMPONENT = re.compile(
+    r"(?P<name>[\w.-]{1,64}): id 0x(?P<id>[0-9A-Fa-f]{1,8}), version (?P<version>\d{1,3}(?:\.\d{1,3}){3})"
+)
+
+
+def components_of(plc: Plc) -> list[Document]:
+    """The components of the firmware of a device; those of a vendor have its number in the upper half of their id."""
+    try:
+        lines = plc.shell("complist").splitlines()
+    except DeviceError:
+        return []
+    found = [match for match in map(_COMPONENT.fullmatch, lines) if match]
+    return [
+        {
+            "name": match["name"],
+            "id": f"0x{int(match['id'], 16):04X}",
+            "version": match["version"],
+            "vendor": f"0x{vendor:04X}" if (vendor := int(match["id"], 16) >> 16) else "",
+        }
+        for match in found
+    ]
 
 
 def info_text(document: dict[str, Any]) -> str:

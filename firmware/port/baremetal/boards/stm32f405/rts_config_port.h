@@ -10,6 +10,7 @@
 /* So programs have none either. */
 #define APP_CALLS 0
 #define IEC_FILES 0
+#define CM_VERSIONS 0
 #define LOG_KEEP 0 /* nor for the log that is kept */
 
 #include "rts_config_size.h"

@@ -78,6 +78,9 @@
 #define EVENT_MAX_CALLBACKS (14 + (APP_CALLS > 0) + (IEC_FILES > 0) + IEC_TASK_HANDLER)
 #define COM_MAX_LINES 2
 #define LOG_MAX_ENTRIES 32
+#ifndef CM_VERSIONS
+#define CM_VERSIONS 4
+#endif
 #ifndef LOG_KEEP
 #define LOG_KEEP 32
 #endif
