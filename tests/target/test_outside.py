@@ -9,13 +9,18 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
 from environment import MACHINE, ROOT
 from programs import compile_text, program
 from qemu import Board
+from vendor_component import blocks, merge, tank
 
 from plctool.cli.main import main as plctool
 from plctool.compiler import compile_sources
@@ -45,36 +50,6 @@ device = "device.toml"
 name = "Analog"
 in = { AI0 = "Main.level" }
 """
-
-
-def blocks(page: str, file: str) -> list[str]:
-    """What a page of docs/ says belongs into a file."""
-    text = (ROOT / "docs" / page).read_text()
-    found: list[str] = re.findall(rf"^```\w+ {re.escape(file)}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    assert found, f"{page} has no block for {file}"
-    return found
-
-
-def merge(file: Path, lines: str) -> None:
-    """Puts lines of a page into a header or cmp_list.c: a macro that is there gets its new value, PORT_COMPONENTS the
-    component that is new; other lines come first."""
-    text = file.read_text()
-    first = text.index("*/\n") + 3
-    if "#ifndef RTS_CONFIG" in text:
-        first = text.index("\n", text.index("#define RTS_CONFIG")) + 1
-    for line in lines.splitlines():
-        macro = re.match(r"#define (\w+)", line)
-        there = macro and re.search(rf"^#define {macro[1]}\b.*\n", text, re.MULTILINE)
-        if there and line.startswith("#define PORT_COMPONENTS"):
-            text = text.replace(there[0], there[0].rstrip() + " " + line.split()[-1] + "\n")
-        elif there:
-            text = text.replace(there[0], line + "\n")
-        elif macro and file.name == "cmp_list.c":
-            text = text.replace('#include "CmpList.h"', f'{line}\n#include "CmpList.h"')
-        else:
-            text = text[:first] + line + "\n" + text[first:]
-            first += len(line) + 1
-    file.write_text(text)
 
 
 @pytest.fixture
@@ -199,13 +174,7 @@ def test_a_driver_from_the_blank_one_has_a_device(product: Callable[[str], Path]
 
 def test_a_component_calls_a_function_of_the_program(product: Callable[[str], Path]) -> None:
     folder = product("full")
-    (source,), (component,) = blocks("c-functions.md", "tank.st"), blocks("c-functions.md", "AcmeTank.c")
-    (folder / "tank.st").write_text(source)
-    assert plctool(["export-itf", str(folder / "tank.st"), "-o", str(folder)]) == 0
-    (folder / "AcmeTank.c").write_text(component)
-    hook = "enum { CMPID_AcmeTank = 0x8006 };\nRTS_RESULT AcmeTank_Hook(CMP_HOOK hook);"
-    (folder / "AcmeTank.h").write_text(f'#include "CmpItf.h"\n{hook}\n')
-    merge(folder / "cmp_list.c", '#include "AcmeTank.h"\n#define PORT_COMPONENTS(X) X(AcmeTank)')
+    source = tank(folder)
     built = compile_text(source + program("VAR n : DINT; END_VAR", "n := n + 1;"), TARGET, folder)
     failing = source.replace("level := INT_TO_REAL(raw)", "level := INT_TO_REAL(raw / (raw - 525))")
     other = compile_text(failing + program("VAR n : DINT; END_VAR", "n := n + 1;"), TARGET, folder)
