@@ -66,9 +66,11 @@ static RTS_UI32 value_of(RTS_UI32 id)
     return value;
 }
 
+/* Main makes a pass at the end of each SimAdvance. */
 static void pass_ms(RTS_UI32 time)
 {
-    CHECK_EQUAL(SimAdvance(ms(time)), ERR_OK);
+    for (; time > 0; time -= time < 20 ? time : 20)
+        CHECK_EQUAL(SimAdvance(ms(time < 20 ? time : 20)), ERR_OK);
 }
 
 static void written_parameters_are_there_after_power_off(void)
@@ -181,6 +183,78 @@ static void a_file_that_is_none_is_not_used(void)
     CHECK_EQUAL(value_of(FIRST), 0);
 }
 
+/* ---- a device on a bus ---- */
+
+static struct {
+    RTS_UI32 tries;
+    RTS_UI32 pending; /* so many tries before the device has answered */
+    RTS_RESULT result;
+    RTS_UI8 value;
+} bus;
+
+static RTS_RESULT write_on_bus(const IoConfigConnector *connector, RTS_UI32 id, const void *data, RTS_UI32 bits,
+                               RTS_UI32 bit_offset)
+{
+    RTS_UNUSED(connector);
+    RTS_UNUSED(id);
+    RTS_UNUSED(bits);
+    RTS_UNUSED(bit_offset);
+    if (bus.tries++ < bus.pending)
+        return ERR_PENDING;
+    if (bus.result == ERR_OK)
+        bus.value = *(const RTS_UI8 *)data;
+    return bus.result;
+}
+
+/* Loads a program with a device of io_driver.h again, which has the value 42 saved. */
+static void load_with_bus(RTS_UI32 pending, RTS_RESULT result)
+{
+    static ICmpIoDrv functions;
+    static IO_DRIVER driver;
+    const RTS_UI8 saved = 42;
+
+    begin_keeping();
+    functions = test_functions;
+    functions.IoDrvWriteParameter = write_on_bus;
+    memset(&driver, 0, sizeof driver);
+    driver.functions = &functions;
+    CHECK_EQUAL(IoMgrRegisterInstance(&driver), ERR_OK);
+    spec_init(&spec);
+    spec.areas[APP_AREA_INPUT] = 32;
+    io_init(&io);
+    io_add_connector(&io, "Valve", "IoDrvTest");
+    add_copying_task("Main", 10000, 0);
+    memset(&bus, 0, sizeof bus);
+    start_io();
+    IoKeepNote(0, 5, &saved, 8, 0);
+    bus.pending = pending;
+    bus.result = result;
+    start_io();
+}
+
+static void a_device_that_answers_later_gets_its_value_then(void)
+{
+    load_with_bus(3, ERR_OK);
+    CHECK_EQUAL(bus.value, 0);
+    pass_ms(500);
+    CHECK_EQUAL(bus.value, 42);
+    CHECK_EQUAL(bus.tries, 4);
+}
+
+static void a_device_that_is_not_there_is_tried_for_half_a_minute(void)
+{
+    load_with_bus(0, ERR_TIMEOUT);
+    pass_ms(29000);
+    CHECK(bus.tries > 200);
+    pass_ms(2000);
+    RTS_UI32 tries = bus.tries;
+    pass_ms(5000);
+    CHECK_EQUAL(bus.tries, tries);
+    load_with_bus(0, ERR_NO_OBJECT);
+    pass_ms(1000);
+    CHECK_EQUAL(bus.tries, 1);
+}
+
 static void save_another(void *unused)
 {
     RTS_UNUSED(unused);
@@ -221,6 +295,8 @@ int main(void)
     RUN(flash_is_written_once_a_second_at_most);
     RUN(more_than_there_is_room_for_is_refused_and_harms_nothing);
     RUN(a_file_that_is_none_is_not_used);
+    RUN(a_device_that_answers_later_gets_its_value_then);
+    RUN(a_device_that_is_not_there_is_tried_for_half_a_minute);
     RUN(a_power_cut_leaves_the_old_value_or_the_new_one);
     return test_result();
 }
