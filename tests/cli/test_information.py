@@ -11,6 +11,7 @@ from plctool import Simulator
 
 INFORMATION = """sources = ["main.st"]
 [information]
+name = "pump"
 title = "Pump station"
 company = "Waterworks"
 version = "1.2"
@@ -41,6 +42,7 @@ def program(folder: Path, variables: str, body: str, before: str = "", informati
         ("GetVersion()", "STRING", "1.2"),
         ("GetAuthor()", "STRING", "A. N. Other"),
         ("GetDescription()", "STRING", "two pumps"),
+        ("F_getProjectName()", "STRING", "pump"),
         ("GetTextProperty('serial')", "STRING", "A-17"),
         ("GetTextProperty('empty')", "STRING", ""),
         ("GetNumberProperty('poles')", "SINT", 4),

@@ -16,7 +16,7 @@ from plctool.iec.types import BOOL, StringType
 
 _TEXTS = {
     "GetTitle": "title", "GetCompany": "company", "GetVersion": "version", "GetAuthor": "author",
-    "GetDescription": "description",
+    "GetDescription": "description", "F_getProjectName": "name",
 }  # fmt: skip
 _PROPERTIES = {
     "GetTextProperty": PropertyKind.TEXT, "GetNumberProperty": PropertyKind.NUMBER,
