@@ -92,7 +92,7 @@ def info(path: Path) -> Document:
 
 def device_info(plc: Plc) -> Document:
     """What a device has of its program, under the names that `info` has, and its components. "info" is empty without
-    program, and from a firmware without application information; "components" from one without such a list."""
+    program, and from a firmware without application information; one without a list of components gives none."""
     from plctool.image.file import target_name
 
     identity, status = plc.identity(), plc.raw_status()
@@ -103,7 +103,9 @@ def device_info(plc: Plc) -> Document:
     if status.image_crc:
         with suppress(DeviceError):
             document["info"] = plc.info()
-    return document | {"components": components_of(plc)}
+    if components := components_of(plc):
+        document["components"] = components
+    return document
 
 
 _COMPONENT = re.compile(
