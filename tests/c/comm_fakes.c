@@ -51,6 +51,17 @@ FAKES fakes;
 SRV_GROUP srv_groups[10];
 const RTS_SIZE srv_group_room = RTS_COUNT(srv_groups);
 
+#if CM_VERSIONS > 0
+const CMP_NAME cmp_names[] = {{CMPID_CmpMgr, "CmpMgr"}};
+const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_names);
+
+RTS_UI32 CMGetVersion(RTS_UI32 id)
+{
+    RTS_UNUSED(id);
+    return 0;
+}
+#endif
+
 /* ---- system ---- */
 
 RTS_I64 SysTimeGetNs(void)

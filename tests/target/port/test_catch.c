@@ -1,5 +1,5 @@
 /*
- * test_catch.c - rts_try of components: in main, in the interrupt of a task, behind a gate, and what it leaves alone.
+ * test_catch.c - rts_try of components: in main, in the interrupt of a task, through a gate, and what it leaves as it is.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
