@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import zlib
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from plctool.cli.kept_reports import report_folder
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owner here")
 
@@ -23,7 +26,7 @@ def test_build_keeps_its_code_and_clear_deletes_it(tool: Any, scratch: Path) -> 
     assert shown["objects"] == 1 and shown["bytes"] > 100 and shown["usable"]
     assert Path(shown["folder"]).is_relative_to(scratch)
     assert tool("build", "main.st", "--json").json["crc"] == first["crc"]
-    assert "1 object and 0 syntax trees deleted" in tool("cache", "clear").out
+    assert "1 object, 0 syntax trees and 1 report deleted" in tool("cache", "clear").out
     assert "0 objects" in tool("cache").out
 
 
@@ -32,13 +35,78 @@ def test_check_keeps_syntax_trees_and_clear_deletes_them(tool: Any, scratch: Pat
     source.write_text(f"{source.read_text()}(* {'long ' * 300}*)\n")
     assert tool("check", "main.st").status == 0
     assert tool("cache", "--json").json["trees"] == 1
-    assert "1 syntax tree deleted" in tool("cache", "clear").out
+    assert "1 syntax tree and 0 reports deleted" in tool("cache", "clear").out
     assert tool("cache", "--json").json["trees"] == 0
+
+
+def _image(scratch: Path) -> tuple[int, bytes]:
+    """Which file the image is, and its content."""
+    image = scratch / "app.cdl"
+    return image.stat().st_ino, image.read_bytes()
+
+
+@pytest.fixture
+def built(tool: Any, scratch: Path) -> tuple[int, bytes]:
+    """The image of a first build; its file is kept open, so that no other gets its number."""
+    assert tool("build", "main.st", "-o", "app.cdl").status == 0
+    (scratch / "same.cdl").hardlink_to(scratch / "app.cdl")
+    return _image(scratch)
+
+
+@pytest.mark.usefixtures("built")
+def test_build_of_what_is_built_already_says_the_same_and_leaves_the_image(tool: Any, scratch: Path) -> None:
+    (scratch / "main.st").write_text("PROGRAM Main\nVAR x, unused : INT; END_VAR\nx := x + 1;\nEND_PROGRAM\n")
+    first, image = tool("build", "main.st", "-o", "app.cdl"), _image(scratch)
+    again = tool("build", "main.st", "-o", "app.cdl")
+    assert (again.out, again.err, again.status) == (first.out, first.err, 0)
+    assert "unused is never used" in again.err
+    assert _image(scratch) == image
+
+
+@pytest.mark.parametrize(
+    "options", [["-O0"], ["--checks", "none"], ["--no-warn", "unused"], ["--no-cache"], ["-o", "other.cdl"]]
+)
+def test_other_options_are_another_build(
+    tool: Any, scratch: Path, built: tuple[int, bytes], options: list[str]
+) -> None:
+    assert tool("build", "main.st", "-o", "app.cdl", *options).status == 0
+    assert (scratch / "other.cdl").exists() or _image(scratch)[0] != built[0]
+
+
+@pytest.mark.parametrize("name", ["app.cdl", "app.sym"])
+@pytest.mark.parametrize("damage", [lambda file: file.unlink(), lambda file: file.write_bytes(b"?")])
+def test_image_or_symbols_that_are_damaged_are_built_again(
+    tool: Any, scratch: Path, built: tuple[int, bytes], name: str, damage: Any
+) -> None:
+    (scratch / "same.cdl").unlink()
+    symbols = (scratch / "app.sym").read_bytes()
+    damage(scratch / name)
+    assert tool("build", "main.st", "-o", "app.cdl").status == 0
+    assert _image(scratch)[1] == built[1]
+    assert (scratch / "app.sym").read_bytes() == symbols
+
+
+def test_undone_edit_is_built_again(tool: Any, scratch: Path, built: tuple[int, bytes]) -> None:
+    text = (scratch / "main.st").read_text()
+    for changed in (text.replace("1;", "2;"), text):
+        (scratch / "main.st").write_text(changed)
+        assert tool("build", "main.st", "-o", "app.cdl").status == 0
+        assert (_image(scratch)[1] == built[1]) == (changed == text)
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b'{"files": [], "document": {"crc": 5}, "warnings": []}'])
+def test_damaged_reports_are_not_used(tool: Any, scratch: Path, built: tuple[int, bytes], content: bytes) -> None:
+    folder = report_folder().folder
+    (kept,) = (file for file in folder.rglob("*") if file.is_file())
+    report_folder().put(kept.name, zlib.compress(content))
+    assert tool("build", "main.st", "-o", "app.cdl").status == 0
+    assert _image(scratch)[0] != built[0]
 
 
 def test_build_without_cache_neither_reads_nor_keeps_code(tool: Any) -> None:
     assert tool("build", "main.st", "--no-cache").status == 0
-    assert tool("cache", "--json").json["objects"] == 0
+    shown = tool("cache", "--json").json
+    assert (shown["objects"], shown["reports"]) == (0, 0)
 
 
 def test_folder_that_others_may_write_is_not_used_and_cache_says_so(tool: Any) -> None:

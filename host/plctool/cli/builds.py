@@ -112,12 +112,14 @@ def simulator(program: Path | Built) -> Simulator:
 
 def build(settings: Settings, trees: Trees | None = None) -> tuple[Document, list[str]]:
     """Compiles to an image and the symbol file beside it. Returns the document and the warnings as users read them.
-    `trees`: keeps the syntax trees for another build in this process.
+    `trees`: keeps the syntax trees for another build in this process. A build whose files are there already only gives
+    its report again.
 
     Raises CompileError when the program has errors, UsageError when the image would overwrite one of its files. Files
     appear complete or not at all.
     """
     from plctool.cli.fresh_image import fingerprint
+    from plctool.cli.kept_reports import kept_report
     from plctool.debug.symbols import symbol_path
     from plctool.files import make_folder
 
@@ -127,6 +129,10 @@ def build(settings: Settings, trees: Trees | None = None) -> tuple[Document, lis
     check_not_read(symbol_path(output), inputs(), f"-o {output.stem}-image.cdl")
     _check_way_of(settings)
     made_of = fingerprint(settings)  # before the sources are read: a change during the build makes the image stale
+    kept = kept_report(settings, made_of)
+    report = None if kept is None else kept.find()
+    if report is not None:
+        return report
     result = _compile(settings, settings.target, trees)
     if result.change is not None:
         check_possible(result.change)
@@ -150,6 +156,8 @@ def build(settings: Settings, trees: Trees | None = None) -> tuple[Document, lis
         document["change"] = change_document(result)
     if channels:
         document["io"] = io_documents.summary(result.symbols.io)
+    if kept is not None and fingerprint(settings) == made_of:
+        kept.keep(document, result.rendered_warnings)
     return document, result.rendered_warnings
 
 

@@ -1,4 +1,4 @@
-"""`plctool cache`: the compiled code and the syntax trees that are kept between builds."""
+"""`plctool cache`: the compiled code, the syntax trees and the reports that are kept between builds."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ def _cache(args: argparse.Namespace) -> int:
 
 def cache(*, clear: bool) -> Document:
     """Describes the cache, or empties it. "usable": false where builds do without one."""
+    from plctool.cli.kept_reports import report_folder
     from plctool.compiler.codegen.object_cache import ObjectCache
     from plctool.compiler.tree_cache import tree_folder
 
-    objects, trees = ObjectCache(), tree_folder()
-    usable = objects.usable() and trees.usable()
+    objects, trees, reports = ObjectCache(), tree_folder(), report_folder()
+    usable = objects.usable() and trees.usable() and reports.usable()
     document: Document = {"folder": str(objects.folder), "usable": usable, "cleared": clear}
-    counts = [kept.clear() if clear else kept.size() for kept in (objects, trees)]
-    document["objects"], document["trees"] = counts[0][0], counts[1][0]
+    counts = [kept.clear() if clear else kept.size() for kept in (objects, trees, reports)]
+    document["objects"], document["trees"], document["reports"] = (count for count, _ in counts)
     document["bytes"] = sum(size for _, size in counts)
     return document
 
@@ -45,7 +46,8 @@ def cache_text(document: dict[str, Any]) -> str:
             f"{folder} is not used: others may write or read it, or it is another user's. Remove it, or name a folder "
             "of your own in XDG_CACHE_HOME."
         )
-    found = f"{counted(document['objects'], 'object')} and {counted(document['trees'], 'syntax tree')}"
+    objects, trees = counted(document["objects"], "object"), counted(document["trees"], "syntax tree")
+    found = f"{objects}, {trees} and {counted(document['reports'], 'report')}"
     if document["cleared"]:
         return f"{folder}: {found} deleted, {document['bytes']} bytes"
     return f"{folder}: {found}, {document['bytes']} bytes"
