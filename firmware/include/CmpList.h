@@ -30,8 +30,8 @@
 #if HAS_CmpEventMgrEmbedded && EVENT_MAX_CALLBACKS == 0
 #error "HAS_CmpEventMgrEmbedded: set EVENT_MAX_CALLBACKS, the callbacks of your components, in rts_config_port.h."
 #endif
-#if HAS_CmpAppBP && (BP_MAX == 0 || FORCE_MAX == 0 || !HAS_COMMUNICATION)
-#error "HAS_CmpAppBP: set BP_MAX and FORCE_MAX in rts_config_port.h, and HAS_COMMUNICATION in cmp_list.c."
+#if HAS_CmpAppBP && (BP_MAX == 0 || !HAS_COMMUNICATION)
+#error "HAS_CmpAppBP: set BP_MAX in rts_config_port.h, and HAS_COMMUNICATION in cmp_list.c."
 #endif
 #if HAS_CmpUserMgr && !COMM_PASSWORD
 #error "HAS_CmpUserMgr: set COMM_PASSWORD to 1 in rts_config_port.h."

@@ -447,7 +447,7 @@
 
 /* Breakpoints that a debugger may set at a time (CmpAppBP.h), and traps that the code may have at a time: those, and where
  * a step may lead. 0: no debugger, and no flash for it. It needs HAS_CmpAppBP in cmp_list.c, SysDebug.h in the port,
- * FORCE_MAX, and one of EVENT_MAX_CALLBACKS. */
+ * and one of EVENT_MAX_CALLBACKS. */
 #ifndef BP_MAX
 #define BP_MAX 0
 #endif

@@ -1,6 +1,7 @@
 """Flash and RAM of each component of the firmware, from the linked programs, held against a budget.
 
     size.py BUDGET.toml CONFIG=FILE.elf ...             prints the table; exit status 1 when a budget is exceeded
+    size.py BUDGET.toml CONFIG=FILE.elf CONFIG-without-WING=FILE.elf ...    also what WING takes of CONFIG
     size.py --update BUDGET.toml CONFIG=FILE.elf ...    makes the present figures the budget of the components
     size.py --without-budget CONFIG=FILE.elf ...        prints the table
 
@@ -41,6 +42,7 @@ BUDGET = Path(__file__).resolve().parents[2] / "firmware/size-budget.toml"
 
 LIBRARIES = "libraries"  # of the C compiler, perhaps without debugging information
 REST = "strings, padding"  # what has no symbol
+WITHOUT = "-without-"  # in the name of a configuration
 ADDRESS_OF = 3  # DW_OP_addr
 
 
@@ -67,14 +69,23 @@ class Part:
 
 
 @dataclass
+class Wing:
+    """A function of the firmware that many components contribute to: the flash it may take; `why` it takes more."""
+
+    flash: int
+    why: str = ""
+
+
+@dataclass
 class Budget:
     """The budget file: the compiler that its figures are of, names of variables that are the application's, goals for
-    the totals and for parts, limits of the components and of their total as [flash, RAM]; all in bytes."""
+    the totals, for parts and for wings, limits of the components and of their total as [flash, RAM]; all in bytes."""
 
     compiler: str
     application: set[str]
     goal: dict[str, dict[str, int]]
     part: dict[str, Part] = field(default_factory=dict)
+    wing: dict[str, Wing] = field(default_factory=dict)
     limit: dict[str, dict[str, list[int]]] = field(default_factory=dict)
 
 
@@ -242,11 +253,27 @@ def print_parts(measured: dict[str, dict[str, Usage]], parts: dict[str, Part]) -
             print(f"  {part.why}")
 
 
+def print_wings(
+    measured: dict[str, dict[str, Usage]], without: dict[str, dict[str, Usage]], wings: dict[str, Wing]
+) -> None:
+    """What each wing takes: the difference between a configuration and the same one without the wing."""
+    if not without:
+        return
+    print(f"\n{'wings, by builds without them':<36}{'configuration':>14}{'flash':>8}{'goal':>8}{'RAM':>8}")
+    for name, usage in without.items():
+        config, wing = name.split(WITHOUT)
+        whole, rest, wanted = total(measured[config]), total(usage), wings[wing]
+        print(f"{wing:<36}{config:>14}{whole.flash - rest.flash:>8}{wanted.flash:>8}{whole.ram - rest.ram:>8}")
+        if wanted.why and whole.flash - rest.flash > wanted.flash:
+            print(f"  {wanted.why}")
+
+
 def read_budget(path: Path) -> Budget:
     """The budget file; see firmware/size-budget.toml."""
     data = tomllib.loads(path.read_text())
     parts = {name: Part(**part) for name, part in data.get("part", {}).items()}
-    return Budget(data["compiler"], set(data["application"]), data["goal"], parts, data.get("limit", {}))
+    wings = {name: Wing(**wing) for name, wing in data.get("wing", {}).items()}
+    return Budget(data["compiler"], set(data["application"]), data["goal"], parts, wings, data.get("limit", {}))
 
 
 def with_slack(size: int) -> int:
@@ -284,7 +311,9 @@ def main() -> int:
     path = BUDGET if args.without_budget else Path(args.files.pop(0))
     budget = read_budget(path)
     programs = {config: Path(file) for config, file in (text.split("=", 1) for text in args.files)}
-    measured = {config: measure(file, budget.application) for config, file in programs.items()}
+    everything = {config: measure(file, budget.application) for config, file in programs.items()}
+    without = {config: usage for config, usage in everything.items() if WITHOUT in config}
+    measured = {config: usage for config, usage in everything.items() if WITHOUT not in config}
     if args.without_budget:
         print_table(measured)
         return 0
@@ -294,6 +323,7 @@ def main() -> int:
         budget = read_budget(path)
     print_table(measured)
     print_parts(measured, budget.part)
+    print_wings(measured, without, budget.wing)
     complaints = [text for config, usage in measured.items() for text in exceeded(config, usage, budget, compiler)]
     goals = [text for config, usage in measured.items() for text in missed_goals(config, usage, budget)]
     if compiler != budget.compiler:

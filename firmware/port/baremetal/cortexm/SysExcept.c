@@ -664,6 +664,7 @@ static void note_fault(RTS_UI32 cfsr)
     debug.fault.address = cfsr & CFSR_MMARVALID ? SCB_MMFAR : cfsr & CFSR_BFARVALID ? SCB_BFAR : 0;
 }
 
+#if EXCEPT_REGISTERS > 0
 /* Keeps the registers of the fault that leave_try is called for next. */
 static void note_registers(const FRAME *frame, RTS_UI32 exc_return, const RTS_UI32 *saved)
 {
@@ -678,6 +679,9 @@ static void note_registers(const FRAME *frame, RTS_UI32 exc_return, const RTS_UI
     values[GENERAL + 2] = debug.fault.address;
     SysExceptNoteRegisters((const uintptr_t *)(uintptr_t)at.r[13], EXCEPT_REGISTERS_ARMV7M, values);
 }
+#else
+#define note_registers(frame, exc_return, saved) ((void)0)
+#endif
 
 static void tell_debugger(const SYS_DEBUG_STOP *stop, RTS_UI32 code)
 {

@@ -11,7 +11,9 @@
 #define APP_ENTRY_MODE_BIT 1
 
 /* EXCEPT_REGISTERS_ARMV7M; what is saved for a debugger. */
+#ifndef EXCEPT_REGISTERS
 #define EXCEPT_REGISTERS (BP_MAX > 0 ? 19 : 0)
+#endif
 
 /* What rts_try saves (SysExceptCatch.h): sp, r4 to r11, lr, s16 to s31. */
 #define RTS_JMP_BUF_WORDS (10 + (CPU_HAS_FPU ? 16 : 0))

@@ -13,7 +13,9 @@
 #define RTS_IEC_UNPRIVILEGED 1
 
 /* EXCEPT_REGISTERS_RISCV32; what is saved for a debugger. */
+#ifndef EXCEPT_REGISTERS
 #define EXCEPT_REGISTERS (BP_MAX > 0 ? 32 : 0)
+#endif
 
 /* What rts_try saves (SysExceptCatch.h): sp, s0 to s11, ra. */
 #define RTS_JMP_BUF_WORDS 14

@@ -14,7 +14,7 @@
 #define HAS_CmpMath 1
 #define HAS_CmpIoMgrEmbedded 1
 #define HAS_IoDrvGpio 1
-#define HAS_CmpForce 1
+#define HAS_CmpForce (FORCE_MAX > 0)
 #define HAS_CmpOperationControl 1
 #define HAS_IecLog 1
 #define HAS_IecEvents IEC_EVENTS

@@ -25,7 +25,9 @@
 #define COMM_PASSWORD 1
 #define SRV_OWN_GROUPS 4
 #define SRV_OTHER_CLIENTS 1
+#ifndef FORCE_MAX
 #define FORCE_MAX 16
+#endif
 #define OPERATION_CONTROL 1
 #ifndef ONLINE_CHANGE
 #define ONLINE_CHANGE 1
