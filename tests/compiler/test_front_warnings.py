@@ -279,6 +279,47 @@ def test_program_that_only_a_test_runs_is_no_warning(of_test: str, unused: int) 
     assert len(warned(text, "unused")) == unused
 
 
+BLOCK_FOR_C = """FUNCTION_BLOCK Valve
+VAR n : INT; END_VAR
+{attribute 'from_c'}
+METHOD Open : BOOL
+n := n + 1;
+Open := TRUE;
+END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Small EXTENDS Valve
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Group
+VAR inner : Valve; END_VAR
+END_FUNCTION_BLOCK
+TYPE Pair : STRUCT left, right : Valve; END_STRUCT END_TYPE
+"""
+
+
+@pytest.mark.parametrize(
+    ("declaration", "unused"),
+    [
+        ("v : Valve;", 0),
+        ("v : Small;", 0),
+        ("v : ARRAY[1..2] OF Valve;", 0),
+        ("v : Pair;", 0),
+        ("v : Group;", 0),
+        ("{attribute 'from_c'} v : INT;", 0),
+        ("v : POINTER TO Valve;", 1),
+        ("v : INT;", 1),
+        ("v : TON;", 1),
+    ],
+)
+def test_what_only_c_uses_is_no_warning(declaration: str, unused: int) -> None:
+    assert len(warned(main(declaration, ";", BLOCK_FOR_C), "unused")) == unused
+
+
+def test_instance_that_c_cannot_reach_is_a_warning() -> None:
+    """It is on the stack of a method."""
+    text = "FUNCTION_BLOCK User METHOD Go VAR v : Valve; END_VAR END_METHOD END_FUNCTION_BLOCK\n"
+    assert len(warned(main("u : User;", "u.Go();", BLOCK_FOR_C + text), "unused")) == 1
+
+
 def test_every_warning_of_the_compiler_has_a_name() -> None:
     """Whatever is reported as a warning can be turned off."""
     used: set[object] = set()

@@ -151,7 +151,7 @@ def _is_named(name: str) -> bool:
 
 def _instances(world: World, path: str, place: Place, t: Type) -> Iterator[tuple[str, Place, StructType]]:
     """The instances of function blocks in a variable, with their names."""
-    if not _has_offered(world, t):
+    if not has_methods_for_c(world, t):
         return
     if isinstance(t, ArrayType):
         for indices in product(*(range(low, high + 1) for low, high in t.bounds)):
@@ -167,12 +167,13 @@ def _instances(world: World, path: str, place: Place, t: Type) -> Iterator[tuple
                 yield from _instances(world, f"{path}.{f.name}", member, f.type)
 
 
-def _has_offered(world: World, t: Type) -> bool:
+def has_methods_for_c(world: World, t: Type) -> bool:
+    """True for a block, or an array or structure with one, that has a method which components in C call."""
     while isinstance(t, ArrayType):
         t = t.element
     if not isinstance(t, StructType):
         return False
-    return bool(_offered(world, t)) or any(_has_offered(world, f.type) for f in t.fields)
+    return bool(_offered(world, t)) or any(has_methods_for_c(world, f.type) for f in t.fields)
 
 
 def _offered(world: World, t: StructType) -> list[Member]:

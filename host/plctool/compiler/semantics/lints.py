@@ -14,13 +14,18 @@ from dataclasses import dataclass
 
 from plctool.compiler.semantics.allocation import report_overlaps
 from plctool.compiler.semantics.call_graph import report_shared_writes
+from plctool.compiler.semantics.exports_to_c import has_methods_for_c
 from plctool.compiler.semantics.guidelines import report_guidelines
 from plctool.compiler.semantics.pitfalls import report_endless
 from plctool.compiler.semantics.rules.control import report_unused
+from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.stages import Checked
+from plctool.compiler.semantics.symbols import VarSymbol
 from plctool.compiler.semantics.uncalled_blocks import report_uncalled_blocks
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax.guidelines import GROUP as GUIDELINES
 from plctool.compiler.syntax.warnings import GROUP_OF
+from plctool.compiler.typed.nodes import Storage
 
 CHECKED, PLACED = "checked", "placed"
 
@@ -43,9 +48,19 @@ class Lint:
 
 
 def _unused_variables(checked: Checked) -> None:
-    elsewhere = checked.program.world.names.members_in_tests()
+    world = checked.program.world
+    elsewhere = world.names.members_in_tests()
     for scope in checked.program.checked:
+        _use_for_c(world, scope)
         report_unused(scope, elsewhere)
+
+
+def _use_for_c(world: World, scope: Scope) -> None:
+    """Counts instances as used if components in C call their methods; those on the stack are not offered to C."""
+    for symbol in scope.names.values():
+        if isinstance(symbol, VarSymbol) and not symbol.used and symbol.variable is not None:
+            lasts = symbol.variable.storage in (Storage.AREA, Storage.SELF)
+            symbol.used = lasts and not symbol.constant and has_methods_for_c(world, symbol.type)
 
 
 def _unused_programs(checked: Checked) -> None:
