@@ -235,7 +235,8 @@ class Simulator(Controller):
         self, data: bytes, start: bool, restart: bool, boot: bool | None, progress: Callable[[int], None]
     ) -> None:
         self._check_allowed(lib.OPERATION_DOWNLOAD, "download")
-        end = self._lib.AppDownloadTry if boot is False else self._lib.AppDownloadEnd
+        is_on_trial = self._lib.AppDownloadTriesAll() if boot is None else not boot
+        end = self._lib.AppDownloadTry if is_on_trial else self._lib.AppDownloadEnd
         self._send(data, end, "download", progress)
 
     def create_boot_project(self) -> None:

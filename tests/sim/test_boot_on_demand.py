@@ -40,3 +40,15 @@ def test_program_on_trial_becomes_the_boot_project(plc: Simulator) -> None:
     plc.create_boot_project()
     plc.restart()
     assert plc.read("Main.number") == 2
+
+
+def test_setting_puts_each_download_on_trial(plc: Simulator, tmp_path: Path) -> None:
+    plc.put_file("Settings.cfg", b"[CmpApp]\nCreateBootprojectOnDownload=no\n")
+    plc.restart()
+    plc.flash(built(tmp_path, 2).image)
+    assert plc.read("Main.number") == 2 and not plc.status().boots
+    plc.restart()
+    assert plc.read("Main.number") == 1
+    plc.flash(built(tmp_path, 2).image, boot=True)
+    plc.restart()
+    assert plc.read("Main.number") == 2
