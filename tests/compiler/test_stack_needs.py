@@ -116,6 +116,18 @@ def test_a_distance_that_looks_like_a_call_leads_to_a_function_or_is_none() -> N
         assert list(branches(b"\xe8\xf0", target.machine, frozenset({0}))) == []
 
 
+def test_the_second_half_of_a_risc_v_instruction_is_no_call() -> None:
+    load, jump, back = bytes.fromhex("370511a0"), bytes.fromhex("11a0"), bytes.fromhex("8280")
+    code = load + back + jump + back + back  # `lui a0, 0xA0110`, which ends in the bytes of `jump`, 4 bytes on
+    assert [(b.place, b.target) for b in branches(code, Machine.RISCV32, frozenset({0, 6, 10}))] == [(6, 10)]
+
+
+def test_data_between_risc_v_functions_hide_no_call() -> None:
+    data, jump, back = bytes.fromhex("0300"), bytes.fromhex("11a0"), bytes.fromhex("8280")
+    code = data + jump + back + back  # `data` looks like the first half of an instruction of 4 bytes
+    assert [(b.place, b.target) for b in branches(code, Machine.RISCV32, frozenset({2, 6}))] == [(2, 6)]
+
+
 def x86_calls(chain: list[list[int]]) -> tuple[bytes, dict[int, tuple[int, int]]]:
     """Machine code of functions that call those of these numbers, and their frames: 16 bytes each."""
     size = 5 * max(map(len, chain)) + 1

@@ -143,11 +143,11 @@ _FUNCTIONS = {
     "CmpLrealCalls": """
         __fixdfdi(LREAL):LINT                               80    48
         __fixunsdfdi(LREAL):ULINT                           64    48
-        sqrt(LREAL):LREAL                                   64   288
+        sqrt(LREAL):LREAL                                   64   224
         __adddf3(LREAL,LREAL):LREAL                         80    48
         __subdf3(LREAL,LREAL):LREAL                         80    48
         __muldf3(LREAL,LREAL):LREAL                         32    80
-        __divdf3(LREAL,LREAL):LREAL                         32   256
+        __divdf3(LREAL,LREAL):LREAL                         32    80
         __eqdf2(LREAL,LREAL):DINT                           16    16
         __nedf2(LREAL,LREAL):DINT                           16    16
         __ltdf2(LREAL,LREAL):DINT                           16    16

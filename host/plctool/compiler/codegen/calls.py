@@ -26,7 +26,7 @@ class Branch:
 
 def branches(code: bytes, machine: Machine, entries: Set[int]) -> Iterator[Branch]:
     """All that lead to one of `entries`, offsets of functions."""
-    return (branch for branch in _READ[machine](code) if branch.target in entries)
+    return (branch for branch in _READ[machine](code, entries) if branch.target in entries)
 
 
 # CALL, JMP and conditional jumps with 4 bytes of distance; jumps with one.
@@ -37,7 +37,7 @@ _THUMB_FAR = re.compile(rb"(?s)(?=.[\xf0-\xf7].[\x90-\x9f\xb0-\xbf\xd0-\xdf\xf0-
 _THUMB_NEAR = re.compile(rb"(?s)(?=.[\xe0-\xe7])")
 
 
-def _x86(code: bytes) -> Iterator[Branch]:
+def _x86(code: bytes, _: Set[int]) -> Iterator[Branch]:
     for match in _X86_FAR.finditer(code):
         distance = int.from_bytes(match[2], "little", signed=True)
         yield Branch(match.start(), match.end(2) + distance, match[1] == b"\xe8")
@@ -45,7 +45,7 @@ def _x86(code: bytes) -> Iterator[Branch]:
         yield Branch(match.start(), match.end(1) + _signed(match[1][0], 8), False)
 
 
-def _thumb(code: bytes) -> Iterator[Branch]:
+def _thumb(code: bytes, _: Set[int]) -> Iterator[Branch]:
     for match in _THUMB_FAR.finditer(code):
         place = match.start()
         if place % 2 == 0:
@@ -57,15 +57,15 @@ def _thumb(code: bytes) -> Iterator[Branch]:
             yield Branch(place, place + 4 + thumb_addend(code, place, Arm.R_ARM_THM_JUMP11), False)
 
 
-def _aarch64(code: bytes) -> Iterator[Branch]:
+def _aarch64(code: bytes, _: Set[int]) -> Iterator[Branch]:
     for place, (word,) in zip(range(0, len(code), 4), struct.iter_unpack("<I", _whole(code)), strict=False):
         if word & 0x7C00_0000 == 0x1400_0000:
             yield Branch(place, place + 4 * _signed(word & 0x03FF_FFFF, 26), bool(word >> 31))
 
 
-def _riscv(code: bytes) -> Iterator[Branch]:
+def _riscv(code: bytes, entries: Set[int]) -> Iterator[Branch]:
     """AUIPC with JALR, JAL, C.JAL and C.J. The link register is x1; a jump has none."""
-    for place in range(0, len(code) - 1, 2):
+    for place in _riscv_instructions(code, entries):
         half = int.from_bytes(code[place : place + 2], "little")
         word = int.from_bytes(code[place : place + 4], "little")
         following = int.from_bytes(code[place + 4 : place + 8], "little")
@@ -82,6 +82,15 @@ def _riscv(code: bytes) -> Iterator[Branch]:
                 | (bits >> 6 & 1) << 10 | (bits >> 7 & 3) << 8 | (bits >> 9 & 1) << 4 | (bits >> 10 & 1) << 11
             )  # fmt: skip
             yield Branch(place, place + _signed(distance, 12), not half & 0x8000)
+
+
+def _riscv_instructions(code: bytes, entries: Set[int]) -> Iterator[int]:
+    """Where instructions begin; anew at each function, whatever stands before it. Within functions is no data."""
+    place = 0
+    while place + 2 <= len(code):
+        yield place
+        is_long = code[place] & 3 == 3
+        place += 4 if is_long and place + 2 not in entries else 2
 
 
 def _signed(value: int, bits: int) -> int:
@@ -115,7 +124,7 @@ def calls_by_pointer(code: bytes, machine: Machine) -> bool:
 _RISCV_OTHERS = (0x8082, 0x8282, 0x9002)  # C.JR ra and t0, which return, and C.EBREAK
 
 
-_READ: dict[Machine, Callable[[bytes], Iterator[Branch]]] = {
+_READ: dict[Machine, Callable[[bytes, Set[int]], Iterator[Branch]]] = {
     Machine.X86_64: _x86,
     Machine.THUMB: _thumb,
     Machine.THUMB_V6M: _thumb,
