@@ -3,12 +3,14 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * With the setting [CmpIoMgr] StoreChangedParameters=1 each parameter that a tool writes is noted in RAM, and the file
- * IO_KEEP_FILE of the store has all of them at most IO_KEEP_SAVE_MS later: a power cut leaves the previous file or the new
- * one. When a program is loaded they are written to its devices again. A parameter belongs to a device with the name,
- * driver and described parameters that it had; for another one it is not used, and dropped when there is no room. Deleting the file gives the described
- * values back from the next load on. Needs HAS_CmpIoKeep in cmp_list.c, IO_KEEP_SIZE, SETTINGS and FILE_STORE_FILES. From
- * main.
+ * With the setting [CmpIoMgr] StoreChangedParameters=1 each parameter that a tool writes is noted in RAM. At most
+ * IO_KEEP_SAVE_MS later all of them are in the file IO_KEEP_FILE; a power cut leaves the previous file or the new one.
+ * When a program is loaded, they are written to its devices again.
+ *
+ * A parameter is used only for a device with the same name, driver and described parameters. Parameters of other devices
+ * are dropped when there is no room. After the file is deleted, the next load uses the described values.
+ *
+ * Needs HAS_CmpIoKeep in cmp_list.c, IO_KEEP_SIZE, SETTINGS and FILE_STORE_FILES. From main.
  */
 #ifndef CMPIOKEEP_H
 #define CMPIOKEEP_H

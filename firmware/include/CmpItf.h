@@ -124,11 +124,11 @@ enum {
 const char *CMGetComponentName(RTS_UI32 id);
 
 #ifndef RTS_CFFI
-/* Notes the version of a component that has one of its own, a byte each of a.b.c.d, in CH_INIT_SYSTEM or later. All others
- * have that of the runtime. With CM_VERSIONS; more than so many have it, too. */
+/* Notes the version of a component that differs from that of the runtime, a byte each of a.b.c.d, in CH_INIT_SYSTEM or
+ * later. There is room for CM_VERSIONS components; those beyond it are listed with the version of the runtime. */
 #if CM_VERSIONS > 0
 void CMNoteVersion(RTS_UI32 id, RTS_UI32 version);
-RTS_UI32 CMGetVersion(RTS_UI32 id); /* 0: that of the runtime */
+RTS_UI32 CMGetVersion(RTS_UI32 id); /* 0 if none was noted */
 #else
 static inline void CMNoteVersion(RTS_UI32 id, RTS_UI32 version)
 {

@@ -65,12 +65,13 @@ RTS_RESULT SysExceptUnregisterJmpBuf(RTS_TRY *own);
 
 /* ---- for ports ---- */
 
-/* Where the list of the running context begins, and in *place where in that it runs: what a fault there has as its place,
- * too. NULL: this code may catch nothing. A port sets the list back when it leaves SysExceptTry. */
+/* Returns the list of rts_try of the running context, or NULL if its code may catch nothing. *place is a number of the
+ * port for the context and the stack in it; the port passes the same number to SysExceptCatch for a fault there. When
+ * SysExceptTry ends, the port restores the list. */
 RTS_TRY **SysExceptTries(RTS_UI32 *place);
 
-/* Takes the newest of the list off, with the exception in it, if it is of that place; else returns NULL. The port goes on
- * at its buffer. */
+/* Removes the newest RTS_TRY from the list if it was registered at `place`, writes the exception into it and returns it;
+ * the port then continues at its buffer. Else returns NULL. */
 RTS_TRY *SysExceptCatch(RTS_TRY **list, RTS_UI32 place, RTS_UI32 code, uintptr_t address, uintptr_t stack);
 
 #else

@@ -73,6 +73,13 @@ static void pass_ms(RTS_UI32 time)
         CHECK_EQUAL(SimAdvance(ms(time < 20 ? time : 20)), ERR_OK);
 }
 
+/* Power goes and comes, and the devices have taken their parameters. */
+static void restart(void)
+{
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    pass_ms(10);
+}
+
 static void written_parameters_are_there_after_power_off(void)
 {
     begin_keeping();
@@ -80,8 +87,7 @@ static void written_parameters_are_there_after_power_off(void)
     set_value(SECOND, 1);
     set_value(SECOND, 4321);
     pass_ms(1100);
-    CHECK_EQUAL(SimStart(), ERR_OK);
-    pass_ms(10);
+    restart();
     CHECK_EQUAL(value_of(FIRST), 1234);
     CHECK_EQUAL(value_of(SECOND), 4321);
     flash_program("Bench", 7);
@@ -94,8 +100,7 @@ static void without_the_setting_they_end_with_the_program(void)
     set_value(FIRST, 1234);
     pass_ms(1100);
     CHECK(FileStoreFind(IO_KEEP_FILE) == NULL);
-    CHECK_EQUAL(SimStart(), ERR_OK);
-    pass_ms(10);
+    restart();
     CHECK_EQUAL(value_of(FIRST), 0);
 }
 
@@ -120,8 +125,7 @@ static void deleting_the_file_gives_the_described_values_back(void)
     CHECK_EQUAL(FileStoreDelete(IO_KEEP_FILE), ERR_OK);
     set_value(SECOND, 5);
     pass_ms(1100);
-    CHECK_EQUAL(SimStart(), ERR_OK);
-    pass_ms(10);
+    restart();
     CHECK_EQUAL(value_of(FIRST), 0);
     CHECK_EQUAL(value_of(SECOND), 5);
 }
@@ -277,8 +281,7 @@ static void a_power_cut_leaves_the_old_value_or_the_new_one(void)
             CHECK_EQUAL(SimStart(), ERR_OK);
             SimFlashCut(operation, mode);
             cut = SimCall(save_another, NULL) == SIM_POWER_CUT;
-            CHECK_EQUAL(SimStart(), ERR_OK);
-            pass_ms(10);
+            restart();
             CHECK(value_of(FIRST) == 2 || (cut && value_of(FIRST) == 1));
             cuts += cut;
         }

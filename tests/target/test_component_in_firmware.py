@@ -6,8 +6,6 @@ import shutil
 import sys
 from pathlib import Path
 
-import pytest
-
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 from environment import FIRMWARE, MACHINE, TARGET, firmware
@@ -18,10 +16,6 @@ from vendor_component import cmp_list_of, relink, tank
 from plctool.device import Plc
 from plctool.link.connection import Connection
 from plctool.testing.waiting import eventually
-
-pytestmark = pytest.mark.skipif(
-    MACHINE not in ("mps2-an386", "virt") or not firmware("full").exists(), reason="test_outside shows it"
-)
 
 
 def test_a_component_calls_a_function_of_the_program(tmp_path: Path) -> None:

@@ -165,7 +165,7 @@ RTS_RESULT PortSockBind(const SOCKADDRESS *own, RTS_HANDLE *socket);
 void PortSockQuiet(RTS_HANDLE socket);
 /* The events that poll() reports of a socket, without waiting; *waiting: bytes that can be read. */
 short PortSockPoll(RTS_HANDLE socket, RTS_UI32 *waiting);
-/* Of SysNetPeek. */
+/* Does what SysNetPeek does (SysNet.h). */
 RTS_RESULT PortSockPeek(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received);
 /* Lets programs reach the addresses of a list "ADDRESS[/BITS][:PORT[-PORT]],..."; without one those of this machine. False
  * if the list is not valid. */

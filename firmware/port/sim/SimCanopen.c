@@ -157,7 +157,7 @@ static void send_state(const NODE *node)
     send(CANOPEN_HEARTBEAT + (RTS_UI32)device_of(node)->node.node, &node->state, 1);
 }
 
-/* What the objects of a node say of its inputs. */
+/* Reads from the objects of a node which PDOs it sends, and how often. */
 static void follow_objects(NODE *node)
 {
     const CANOPEN_DEVICE *device = device_of(node);

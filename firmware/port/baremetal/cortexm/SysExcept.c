@@ -475,7 +475,7 @@ static RTS_UI32 place_in_try(void)
     return PLACE_IN_TRY + (RTS_UI32)(state.top - state.tries);
 }
 
-/* What is called without a gate may not write the list. */
+/* C code that a program calls without a gate has no right to write the list. */
 static bool may_catch_in_try(void)
 {
 #if RTS_IEC_UNPRIVILEGED
@@ -519,7 +519,8 @@ static FRAME *frame_to(const RTS_TRY *found, RTS_UI32 number)
     return frame;
 }
 
-/* Where a fault in a Try returns to; 0: none caught it. An exception in code of the program is the program's. */
+/* Returns the EXC_RETURN that leads to the rts_catch of a fault in a Try, 0 if none catches it. Exceptions in code of the
+ * program are not caught here. */
 static RTS_UI32 catch_in_try(RTS_UI32 code, uintptr_t address, const FRAME *frame, RTS_UI32 exc_return)
 {
     RTS_TRY *found = NULL;
@@ -877,7 +878,7 @@ static void clear_fault(RTS_UI32 cfsr)
 {
     SCB_CFSR = cfsr;
     SCB_HFSR = SCB_HFSR;
-    /* What could not be stacked stays pending: it belongs to the function that is left now. */
+    /* A fault of the stacking is still pending. It belongs to the function that ends here. */
     SCB_SHCSR &= ~(RTS_UI32)SHCSR_PENDING;
     CpuRestore(0); /* the fault may have been in a place where interrupts are masked */
 }

@@ -15,7 +15,7 @@
 #define EXCEPT_REGISTERS (BP_MAX > 0 ? 19 : 0)
 #endif
 
-/* What rts_try saves (SysExceptCatch.h): sp, r4 to r11, lr, s16 to s31. */
+/* Registers that rts_try saves (SysExceptCatch.h): sp, r4 to r11, lr, s16 to s31. */
 #define RTS_JMP_BUF_WORDS (10 + (CPU_HAS_FPU ? 16 : 0))
 
 /* Of RTS_IEC_STACK_SIZE these are not the program's [bytes]: what IecCall saves at most, the frame that the processor

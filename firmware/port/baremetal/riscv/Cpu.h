@@ -110,7 +110,7 @@ void SysExceptTrap(FRAME *frame, RTS_UI32 cause);
 /* With BP_MAX: a fault. `saved`: s0 to s11, which may be changed. */
 void SysExceptFault(FRAME *frame, RTS_UI32 cause, RTS_UI32 *saved);
 
-/* A fault of the runtime: goes on at the rts_try around it, if there is one. */
+/* Handles a fault of the runtime: continues at the rts_catch of the rts_try around it; returns if there is none. */
 void SysExceptCatchFault(RTS_UI32 cause, uintptr_t address, uintptr_t stack);
 
 /* The clock's interrupt, and that of tasks. */

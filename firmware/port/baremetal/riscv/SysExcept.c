@@ -73,7 +73,7 @@ static struct {
 #endif
 } state;
 
-/* Whether the caller is: by the stack pointer, which is as high as the end of a stack that nothing is on. */
+/* True if the caller runs on a stack of SysExceptTry. An empty stack has its pointer at the end, hence the -1. */
 static bool in_try(void)
 {
     return (uintptr_t)__builtin_frame_address(0) - (uintptr_t)stacks - 1 < sizeof(stacks);
@@ -359,7 +359,7 @@ static RTS_UI32 place_in_try(void)
     return PLACE_IN_TRY + (RTS_UI32)(state.top - state.tries);
 }
 
-/* What is called without a gate may not write the list. */
+/* C code that a program calls without a gate has no right to write the list. */
 RTS_TRY **SysExceptTries(RTS_UI32 *place)
 {
     if (!in_try()) {

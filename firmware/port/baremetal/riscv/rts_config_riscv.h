@@ -17,7 +17,7 @@
 #define EXCEPT_REGISTERS (BP_MAX > 0 ? 32 : 0)
 #endif
 
-/* What rts_try saves (SysExceptCatch.h): sp, s0 to s11, ra. */
+/* Registers that rts_try saves (SysExceptCatch.h): sp, s0 to s11, ra. */
 #define RTS_JMP_BUF_WORDS 14
 
 /* Of RTS_IEC_STACK_SIZE this is not the program's [bytes]: what IecCall saves. Traps are on the main stack. */

@@ -91,8 +91,8 @@ def info(path: Path) -> Document:
 
 
 def device_info(plc: Plc) -> Document:
-    """What a device has of its program, under the names that `info` has, and its components. "info" is empty without
-    program, and from a firmware without application information; one without a list of components gives none."""
+    """Returns program and components of a device, under the names that `info` prints. "info" is empty without a program
+    or without application information in the firmware; "components" is left out if the firmware lists none."""
     from plctool.image.file import target_name
 
     identity, status = plc.identity(), plc.raw_status()

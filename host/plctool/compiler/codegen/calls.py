@@ -85,7 +85,7 @@ def _riscv(code: bytes, entries: Set[int]) -> Iterator[Branch]:
 
 
 def _riscv_instructions(code: bytes, entries: Set[int]) -> Iterator[int]:
-    """Where instructions begin; anew at each function, whatever stands before it. Within functions is no data."""
+    """Yields where instructions begin. Each function begins one, whatever stands before it; none has data within."""
     place = 0
     while place + 2 <= len(code):
         yield place
