@@ -12,6 +12,7 @@ It runs in an environment that has pip and meson-python.
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -19,7 +20,10 @@ from pathlib import Path
 
 PYTHON = "/usr/bin/python3"
 PLACE = "/usr/lib/plctool"
-NOT_FOR_USERS = {"dev"}
+# Only PNG files of traces need the extra plot. Its packages are large, and lintian has complaints about them.
+NOT_FOR_USERS = {"dev", "plot"}
+FOR_DEVELOPERS = {"tests", "test", "docs", "examples"}
+FOR_COMPILERS = {".a", ".pyi", ".c", ".h", ".pxd", ".pyx"}
 SHELLS = ("bash", "zsh", "fish")
 
 COMMAND = f"""\
@@ -49,7 +53,7 @@ def make_venv(venv: Path, version: tuple[int, int]) -> Path:
 
 
 def extras(project: Path) -> str:
-    """All extras for users, as pip wants them."""
+    """Returns the extras in the package, as pip wants them."""
     names = tomllib.loads((project / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     return ",".join(sorted(set(names) - NOT_FOR_USERS))
 
@@ -66,16 +70,25 @@ def install(project: Path, packages: Path, wheels: Path, version: tuple[int, int
 
 
 def strip(packages: Path) -> None:
-    """Leaves out commands of packages, the runtime, which is a Debian package of its own, and what only compilers and
-    type checkers read; modules are no commands."""
-    for path in sorted(packages.glob("bin")):
-        subprocess.run(["rm", "-r", str(path)], check=True)
+    """Removes what plctool never reads: commands, tests, documents and examples of other packages, and files for
+    compilers and type checkers. Removes the #! lines and executable bits of modules."""
+    others = [path for path in packages.iterdir() if path.name != "plctool"]
+    folders = [packages / "bin", packages / "share"]
+    folders += [path for other in others for path in other.rglob("*") if path.name in FOR_DEVELOPERS and path.is_dir()]
+    for folder in folders:
+        shutil.rmtree(folder, ignore_errors=True)
     for path in packages.rglob("*"):
-        if path.suffix in {".a", ".pyi", ".c", ".h"} and path.is_file():
-            path.unlink()
-        elif path.suffix == ".py" and (text := path.read_bytes()).startswith(b"#!"):
-            path.write_bytes(text[text.index(b"\n") + 1 :])
-            path.chmod(0o644)
+        if path.is_file():
+            strip_file(path)
+
+
+def strip_file(path: Path) -> None:
+    if path.suffix in FOR_COMPILERS:
+        path.unlink()
+        return
+    path.chmod(0o644)
+    if path.suffix == ".py" and (text := path.read_bytes()).startswith(b"#!"):
+        path.write_bytes(text[text.index(b"\n") + 1 :])
 
 
 def run_plctool(packages: Path, *arguments: str) -> str:

@@ -80,7 +80,9 @@ def check_format(path: Path) -> None:
             import matplotlib  # noqa: F401
         except ImportError:
             raise UsageError(
-                "PNG files need matplotlib: pip install 'plctool[plot]'. A .html file needs nothing.", "no-matplotlib"
+                "PNG files need matplotlib. Name the file .html, which needs nothing, or install plctool with pip:"
+                " pip install 'plctool[plot]'. The Debian package does not contain matplotlib.",
+                "no-matplotlib",
             ) from None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -93,3 +94,9 @@ def test_a_picture_has_the_format_of_its_name() -> None:
 def test_a_name_that_is_no_format_is_refused() -> None:
     with pytest.raises(UsageError, match=r"\.csv, \.json, \.html or \.png"):
         check_format(Path("trace.txt"))
+
+
+def test_a_picture_without_matplotlib_is_refused_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(UsageError, match=r"\.html.*'plctool\[plot\]'.*Debian package"):
+        check_format(Path("trace.png"))
