@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import zlib
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 
 from plctool.cli.kept_reports import report_folder
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owner here")
 
 
@@ -92,6 +94,16 @@ def test_undone_edit_is_built_again(tool: Any, scratch: Path, built: tuple[int, 
         (scratch / "main.st").write_text(changed)
         assert tool("build", "main.st", "-o", "app.cdl").status == 0
         assert (_image(scratch)[1] == built[1]) == (changed == text)
+
+
+def test_project_whose_eds_has_changed_is_built_again(tool: Any, scratch: Path) -> None:
+    project = scratch / "line"
+    shutil.copytree(EXAMPLES / "canopen", project)
+    assert tool("build", str(project)).status == 0
+    eds = project / "drive.eds"
+    eds.write_text(eds.read_text().replace("[1000]", "[100", 1))
+    shown = tool("build", str(project))
+    assert shown.status != 0 and "drive.eds has errors" in shown.err
 
 
 @pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b'{"files": [], "document": {"crc": 5}, "warnings": []}'])

@@ -75,6 +75,8 @@ def read_description(path: str, text: str, device: Path | None = None, project: 
         for table in root.tables(name):
             made.connectors += read(table, context)
             table.close()
+    for connector in made.connectors:
+        made.contents.update(connector.contents)
     root.close()
     _check_names(made.connectors, _check_taken(made.connectors, mistakes), mistakes)
     return made

@@ -126,6 +126,11 @@ class Connector:
     takes: str = ""  # what one device alone can have, such as "the line /dev/ttyS1"
     load: float | None = None  # of a line: the share of the time that its cyclic requests take; set by complete()
 
+    @property
+    def contents(self) -> dict[str, str]:
+        """The files that its table names, with what is in them; a kind's own class overrides it if there are any."""
+        return {}
+
     def complete(self, mistakes: Mistakes) -> None:
         """The types of all channels are known: a kind's own class overrides it to make what depends on them."""
 

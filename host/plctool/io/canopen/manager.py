@@ -86,6 +86,11 @@ class CanopenDevice(Connector):
     eds: Eds | None = None
     writes: list[tuple[int, int, bytes]] = field(default_factory=list)
 
+    @property
+    def contents(self) -> dict[str, str]:
+        """The EDS or DCF."""
+        return {} if self.eds is None else {self.eds.file: self.eds.text}
+
     def add(self, number: int, value: int, name: str = "") -> None:
         """A parameter of 32 bits."""
         self.parameters.append(Parameter(number, UDINT, value, name))
