@@ -99,10 +99,15 @@ _RESULTS = {0: (None, BOOL, ERROR), 3: (None, DWORD, ERROR)}
 _INDEXOF = re.compile(r"\bINDEXOF\s*\(\s*(\w+)\s*\)", re.IGNORECASE)
 
 
+def indexed_names(world: World) -> set[str]:
+    """What INDEXOF may name, in lower case; a comment may do so too."""
+    sources = {s.path: s for s in (world.scope_of(symbol).source for symbol in world.names.pou_symbols())}
+    return {name.casefold() for source in sources.values() for name in _INDEXOF.findall(source.text)}
+
+
 def _registered(world: World) -> Iterator[EventFunction]:
     """The functions that INDEXOF names, so that the program can register them."""
-    sources = {s.path: s for s in (world.scope_of(symbol).source for symbol in world.names.pou_symbols())}
-    wanted = {name.casefold() for source in sources.values() for name in _INDEXOF.findall(source.text)}
+    wanted = indexed_names(world)
     numbers = dict[int, str]()
     for symbol in world.names.functions() if wanted else ():
         name = symbol.decl.name

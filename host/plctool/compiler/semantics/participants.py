@@ -12,6 +12,7 @@ from plctool.compiler.semantics.configuration import Application, configure
 from plctool.compiler.semantics.event_functions import declare_event_functions
 from plctool.compiler.semantics.exports_to_c import declare_called_programs, declare_exports
 from plctool.compiler.semantics.program import Program
+from plctool.compiler.semantics.task_links import link_programs
 from plctool.compiler.syntax import ast
 
 Files = list[tuple[Source, list[ast.Declaration]]]
@@ -57,6 +58,7 @@ class _DeviceTasks(Participant):
         world = self._program.world
         self._application = configure(world, self._program.config)
         self._application.events = declare_event_functions(world)
+        link_programs(world, self._application.tasks)
         declare_called_programs(world)
         return self._application
 

@@ -195,6 +195,7 @@ class World:
         self.pools: dict[Type, Pool] = {}
         self.closers: dict[Type, Pou] = {}  # what ends the elements that a POINTER TO the type leads to
         self.clock: dict[str, Variable] = {}  # what TIME and LTIME read in unit tests
+        self.programs_run: set[str] | None = None  # by tasks of the device, in lower case; None in unit tests
         self.pous: list[Pou] = []
         self.loops: list[tuple[Pou, Loop]] = []  # of the program, each with the unit it stands in
         self.declared = declared_by(self)

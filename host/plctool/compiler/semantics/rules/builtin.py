@@ -20,6 +20,7 @@ from plctool.compiler.semantics.rules.intrinsics import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.members import space_of
 from plctool.compiler.semantics.rules.places import changeable_place, named_place
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, GlobalSymbol, PouSymbol, TypeSymbol, VarSymbol
+from plctool.compiler.semantics.task_links import number_of_program
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed.nodes import (
     AddressOf,
@@ -338,13 +339,16 @@ def _place(c: Checker, name: str, node: ast.Call) -> Expr:
 
 
 def _function_number(c: Checker, node: ast.Call) -> Expr:
-    """`INDEXOF(Name)`: the number of a function that events may call (event_functions.py)."""
+    """`INDEXOF(Name)`: the number of a function that events may call (event_functions.py), or of a program
+    (task_links.py)."""
     given = node.args[0].value if len(node.args) == 1 else None
-    symbol = c.world.names.own_unit(given.name.casefold()) if isinstance(given, ast.Name) else None
+    name = given.name if isinstance(given, ast.Name) else ""
+    if c.world.names.instance(name.casefold()) is not None:
+        return _program_number(c, node, name)
+    symbol = c.world.names.own_unit(name.casefold())
     if not isinstance(symbol, PouSymbol) or symbol.keyword is not ast.Unit.FUNCTION:
-        return c.error(
-            node.pos, "arguments", "INDEXOF takes the name of a FUNCTION of the program that events may call"
-        )
+        message = "INDEXOF takes the name of a FUNCTION of the program that events may call, or of a PROGRAM"
+        return c.error(node.pos, "arguments", message)
     info = c.world.declared.function(symbol, {})
     if info is not None and not may_be_registered(info):
         message = (
@@ -353,6 +357,12 @@ def _function_number(c: Checker, node: ast.Call) -> Expr:
         )
         return c.error(node.pos, "arguments", message)
     return Const(number_of(symbol.decl.name), INT, c.pos(node.pos))
+
+
+def _program_number(c: Checker, node: ast.Call, name: str) -> Expr:
+    if c.world.programs_run is not None and name.casefold() not in c.world.programs_run:
+        return c.error(node.pos, "arguments", f"INDEXOF takes a PROGRAM that a task runs, which none does with {name}")
+    return Const(number_of_program(name), INT, c.pos(node.pos))
 
 
 def function_hint(c: Checker, name: str) -> str:
