@@ -58,20 +58,49 @@ def tank(folder: Path) -> str:
     return source
 
 
-def cmp_list_of(build: Path, program: str) -> Path:
-    """The list of the components of a program in a build folder."""
-    return build / _compilation(_commands(build, program))[-1]
+_SWITCH = """
+#include "AcmeDoor.h"
+
+#include <stdlib.h>
+#include <unistd.h>
+
+bool DoorIsOpen(void)
+{
+    const char *path = getenv("ACME_DOOR");
+
+    return path != NULL && access(path, F_OK) == 0;
+}
+"""
 
 
-def relink(build: Path, program: str, folder: Path) -> Path:
-    """Links a program of a build folder again, with the cmp_list.c and the other sources of `folder`."""
+def door(folder: Path) -> None:
+    """Puts AcmeDoor of events.md into a folder with a cmp_list.c. Its door is open while the file is there that the
+    environment's ACME_DOOR names."""
+    (component,) = blocks("events.md", "AcmeDoor.c")
+    (folder / "AcmeDoor.c").write_text(component)
+    (folder / "AcmeSwitch.c").write_text(_SWITCH)
+    hook = "enum { CMPID_AcmeDoor = 0x8008 };\nRTS_RESULT AcmeDoor_Hook(CMP_HOOK hook);\nbool DoorIsOpen(void);"
+    (folder / "AcmeDoor.h").write_text(f'#include "CmpItf.h"\n{hook}\n')
+    merge(folder / "cmp_list.c", '#include "AcmeDoor.h"\n#define PORT_COMPONENTS(X) X(AcmeDoor)')
+
+
+def cmp_list_of(build: Path, program: str, library: str = "") -> Path:
+    """The list of the components of a program in a build folder. `library`: the one that has the list, if several
+    have one."""
+    return build / _compilation(_commands(build, program), library)[-1]
+
+
+def relink(build: Path, program: str, folder: Path, library: str = "") -> Path:
+    """Links a program of a build folder again, with the cmp_list.c and the other sources of `folder`. A `library` keeps
+    its own list; the new one comes first and counts."""
     commands = _commands(build, program)
-    objects = [_compile(build, _compilation(commands), source) for source in sorted(folder.glob("*.c"))]
+    objects = [_compile(build, _compilation(commands, library), source) for source in sorted(folder.glob("*.c"))]
     link = [word for word in shlex.split(commands[-1]) if not word.endswith("cmp_list.c.o")]
     output = folder / Path(program).name
     link[link.index("-o") + 1] = str(output)
     first = next(i for i, word in enumerate(link) if word.endswith(".o"))
-    subprocess.run([*link[:first], *objects, *link[first:]], cwd=build, check=True, timeout=300)
+    twice = ["-Wl,--allow-multiple-definition"] if library else []
+    subprocess.run([*link[:first], *objects, *link[first:], *twice], cwd=build, check=True, timeout=300)
     return output
 
 
@@ -81,9 +110,10 @@ def _commands(build: Path, program: str) -> list[str]:
     return subprocess.run(ninja, capture_output=True, text=True, check=True, timeout=60).stdout.splitlines()
 
 
-def _compilation(commands: list[str]) -> list[str]:
+def _compilation(commands: list[str], library: str) -> list[str]:
     """The one that compiles the list of components."""
-    (command,) = (shlex.split(command) for command in commands if command.endswith("cmp_list.c"))
+    lists = [command for command in commands if command.endswith("cmp_list.c") and library in command]
+    (command,) = map(shlex.split, lists)
     return command
 
 
