@@ -6,10 +6,9 @@ another program, which runs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from itertools import product
 
 from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower_unit import Options
@@ -39,18 +38,24 @@ _FUNCTION = """
 FUNCTION On{event} : BOOL
 On{event} := denied.{bit};
 EventSetReason('{event}');
+IF failing.{bit} THEN zero := 1 / zero; END_IF
+WHILE hanging.{bit} DO zero := 0; END_WHILE
 END_FUNCTION
 """
 LOCK = (
-    "VAR_GLOBAL PERSISTENT denied, forbidden : WORD; END_VAR\n"
+    "VAR_GLOBAL PERSISTENT denied, forbidden, failing, hanging : WORD; END_VAR\n"
+    + "VAR_GLOBAL trip : BOOL; zero : DINT; END_VAR\n"
     + "".join(_FUNCTION.format(event=event, bit=bit) for bit, event in enumerate(EVENTS))
     + "PROGRAM Main\n"
     + "".join(
         f"PlcOperationControlInstance.xDisableApplication{member} := forbidden.{bit};\n"
         for bit, member in enumerate(MEMBERS)
     )
+    + f"PlcOperationControlInstance.xDisableAll := forbidden.{len(MEMBERS)};\n"
+    + "IF trip THEN zero := 1 / zero; END_IF\n"
     + "END_PROGRAM\n"
 )
+"""Its functions also fail, or never end, where `failing` and `hanging` have a bit; `trip` makes its task fail."""
 NEXT = "PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\n"
 
 
@@ -74,11 +79,6 @@ class Lock:
         if self.policy == "on demand":
             return "none"  # it was on trial
         return "stop" if self.policy == "never" or self.denies("DenyStartBootproject") else "run"
-
-
-def all_locks(policy: str) -> Iterator[Lock]:
-    for denied, forbidden in product(range(1 << len(EVENTS)), range(1 << len(OPERATIONS))):
-        yield Lock(policy, denied, forbidden)
 
 
 @cache

@@ -17,10 +17,13 @@ from pathlib import Path
 from bad_programs import BadPrograms
 from campaign import OUTCOMES, Campaign, Case, Fallen
 from changes import Changes
+from combinations import Combinations
+from components import Components
 from cuts import Calls, Cuts
 from debuggers import Debuggers
 from images import Images
 from kills import Kills
+from locks import Locks
 from pages import Pages
 from records import Records
 from sectors import Sectors
@@ -29,7 +32,8 @@ from watchers import Watchers
 from workshop import Workshop, open_workshop
 
 CAMPAIGNS: tuple[type[Campaign], ...] = (
-    Kills, Cuts, Calls, BadPrograms, Images, Changes, Records, Sectors, Debuggers, Watchers, Pages,
+    Kills, Cuts, Calls, BadPrograms, Images, Changes, Records, Sectors, Combinations, Locks, Components, Debuggers,
+    Watchers, Pages,
 )  # fmt: skip
 SHOWN = 10  # failures of a campaign that are printed
 

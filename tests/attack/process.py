@@ -7,7 +7,7 @@ import select
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
@@ -37,11 +37,16 @@ def eventually(question: Callable[[], T | None], what: str) -> T:
 
 
 class Runtime:
-    """Context manager around plcrt and a flash file."""
+    """Context manager around plcrt and a flash file. `plcrt`: another one than that of the workshop; `more` is added to
+    its environment."""
 
-    def __init__(self, shop: Workshop, flash: Path) -> None:
+    def __init__(
+        self, shop: Workshop, flash: Path, plcrt: Path | None = None, more: Mapping[str, str] | None = None
+    ) -> None:
         self.shop = shop
         self.flash = flash
+        self.plcrt = plcrt or shop.plcrt
+        self.environment = {**os.environ, **(more or {})}
         self.process: subprocess.Popen[str] | None = None
         self.port = ""
 
@@ -53,9 +58,14 @@ class Runtime:
 
     def power_on(self) -> None:
         """Raises Fallen when it does not come up."""
-        command = [str(self.shop.plcrt), "--flash", str(self.flash), "--serial", "pty"]
+        command = [str(self.plcrt), "--flash", str(self.flash), "--serial", "pty"]
         self.process = subprocess.Popen(
-            ends_with_us(command), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0
+            ends_with_us(command),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            process_group=0,
+            env=self.environment,
         )
         assert self.process.stdout
         ready, _, _ = select.select([self.process.stdout], [], [], PATIENCE)

@@ -1,7 +1,7 @@
 """What a program denies and forbids leaves the device reachable, under each start policy, in virtual time.
 
 Each combination of denied events occurs under each policy, with another set of forbidden operations.
-All combinations of the three are in the campaign `lock` of tests/attack.
+All combinations of the three are in the campaign `combination` of tests/attack; `lock` adds what happens between.
 """
 
 from __future__ import annotations
