@@ -20,6 +20,8 @@
 # make edits  10 000 random edits in the language server, each compared with a fresh check (ARGS="500 7": edits, seed)
 # make habits what the habits of other systems' programs are, and what plctool check says of a program with each
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each (ARGS="--only tcp,lines --seed 7")
+# make mutants  changes one decision of the firmware's checks at a time, and lists the changes that no C test notices
+#               (ARGS="--only ModbusClient --sample 50"; how: tests/mutants/run.py --help)
 # make vsix   the extension for VS Code, dist/plctool-*.vsix     make test-editors  all tests of editors/
 # make tree-sitter generates the parser of editors/tree-sitter-iecst from its grammar.js
 # make properties what holds for all values, tried with other ones than `make test` does (ARGS="-k call")
@@ -41,7 +43,7 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test test-whole test-windows wheel-windows wheel-macos wheels-linux run-wheels-elsewhere quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak changes edits fuzz properties habits tree-sitter vsix test-editors all clean
+.PHONY: demo test test-whole test-windows wheel-windows wheel-macos wheels-linux run-wheels-elsewhere quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak changes edits fuzz mutants properties habits tree-sitter vsix test-editors all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm run-test-arm-system
 VSCODE := editors/vscode
 NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
@@ -197,6 +199,9 @@ edits: build/build.ninja
 	ninja --quiet -C build under_attack
 	PYTHONPATH=.:host:build/host:tests $(BIN)/python tests/lsp/random_edits.py $(ARGS)
 	PYTHONPATH=.:host:build/host:tests $(BIN)/python tests/lsp/many_edits.py $(ARGS)
+
+mutants: build/build.ninja
+	@$(BIN)/python tests/mutants/run.py $(ARGS)
 
 habits: build/build.ninja
 	@ninja --quiet -C build under_attack

@@ -5,6 +5,7 @@
  *
  * A refusal names table and entry, so that each case shows which check has found it.
  */
+#include "Sim.h"
 #include "io_driver.h"
 
 enum { CONNECTORS, PARAMETERS, TASK_MAPS, CONNECTOR_MAPS, CHANNEL_MAPS, WHOLE };
@@ -137,6 +138,73 @@ static void a_configuration_is_whole_words_within_the_code(void)
     check_result(try_place(spec.io.offset, spec.io.size), WHOLE, 0);
 }
 
+/* A configuration of no bytes would be one without devices. */
+static void a_configuration_smaller_than_its_head(void)
+{
+    static const RTS_UI32 sizes[] = {0, sizeof(IO_CONFIG) - 1};
+    RTS_UI32 i;
+
+    begin();
+    CHECK_EQUAL(try_load(), ERR_OK);
+    for (i = 0; i < RTS_COUNT(sizes); i++) {
+        CHECK_EQUAL(try_place(spec.io.offset, sizes[i]), ERR_INVALID_REFERENCE);
+        check_result(try_image(), WHOLE, 0);
+    }
+}
+
+static void code_that_ends_within_a_word_of_the_configuration(void)
+{
+    CDL_HEADER header;
+
+    begin();
+    CHECK_EQUAL(try_load(), ERR_OK);
+    header = image_header(&image);
+    header.code.size = header.code_area_size = spec.code_size - 1;
+    image_set_header(&image, header);
+    check_result(try_image(), WHOLE, 0);
+    header.code.size = header.code_area_size = spec.io.offset - 1;
+    image_set_header(&image, header);
+    check_result(try_image(), WHOLE, 0);
+}
+
+static void two_configurations(void)
+{
+    RTS_UI32 id = CDL_BLOB_IO;
+    CDL_SEGMENT blob;
+
+    begin();
+    emit_io(&spec, &io);
+    spec.exports = &spec.io;
+    spec.exports_size = sizeof spec.io;
+    build_image(&image, &spec);
+    CHECK_EQUAL(try_image(), ERR_OK);
+    blob = image_header(&image).blob;
+    memcpy(image.bytes + blob.offset + blob.size - sizeof spec.io - 8, &id, sizeof id);
+    image_fix_crc(&image);
+    check_result(try_image(), WHOLE, 0);
+}
+
+static void another_version(void)
+{
+    static const RTS_UI16 versions[] = {IO_CONFIG_VERSION - 1, IO_CONFIG_VERSION + 1};
+    RTS_UI32 i;
+
+    begin();
+    for (i = 0; i < RTS_COUNT(versions); i++) {
+        io.head.version = versions[i];
+        CHECK_EQUAL(try_load(), ERR_VERSION_MISMATCH);
+        CHECK(strstr(refusal.text, "this device knows 2.") != NULL);
+    }
+}
+
+static void a_configuration_for_any_board_fits_one_with_a_name(void)
+{
+    begin();
+    SimSetBoard("IO-8");
+    CHECK_EQUAL(try_load(), ERR_OK);
+    SimSetBoard(NULL);
+}
+
 static void a_configuration_begins_with_a_word(void)
 {
     begin();
@@ -161,6 +229,7 @@ static void a_place_of_another_size(void)
     blob = image_header(&image).blob;
     memcpy(image.bytes + blob.offset + blob.size - sizeof(CDL_CHANGE) - 8, &id, sizeof id);
     image_fix_crc(&image);
+    CHECK_EQUAL(try_image(), ERR_SIZE_MISMATCH);
     check_result(try_image(), WHOLE, 0);
 }
 
@@ -170,6 +239,7 @@ static void a_configuration_of_a_head_alone(void)
     io_init(&io);
     io.channel_count = 0;
     CHECK_EQUAL(try_load(), ERR_OK);
+    CHECK_EQUAL(refusal.text[0], '\0');
     CHECK_EQUAL(spec.io.size, sizeof(IO_CONFIG));
 }
 
@@ -238,6 +308,17 @@ static void a_name_that_ends_after_the_data(void)
     CHECK_EQUAL(try_followed_by("s\0", 2), ERR_OK);
 }
 
+/* Of 31 bytes of the data, with the NUL of a name of 32 right after them. */
+static void a_name_that_ends_one_byte_after_the_data(void)
+{
+    begin();
+    io.connectors[1].name = io_add_data(&io, "1234567890123456789012345678901", 32) + 1;
+    io.data[io.connectors[1].name + 30] = '2';
+    check_result(try_followed_by("\0", 1), CONNECTORS, 1);
+    io.data[io.connectors[1].name + 30] = '\0';
+    CHECK_EQUAL(try_followed_by("\0", 1), ERR_OK);
+}
+
 static void a_name_of_the_greatest_length(void)
 {
     char name[IO_CONFIG_MAX_NAME + 1];
@@ -258,6 +339,28 @@ static void a_state_fills_the_variables(void)
     io.connectors[0].state = 0;
     CHECK_EQUAL(try_load(), ERR_OK);
     spec.areas[APP_AREA_DATA] = sizeof(IO_DEVICE_STATE) - 4;
+    check_refused(CONNECTORS, 0);
+}
+
+static void a_state_begins_with_a_word_and_ends_in_the_variables(void)
+{
+    begin();
+    io.connectors[0].state = 2;
+    check_refused(CONNECTORS, 0);
+    io.connectors[0].state = 0;
+    spec.areas[APP_AREA_DATA] = sizeof(IO_DEVICE_STATE) - 1;
+    check_refused(CONNECTORS, 0);
+    io.connectors[0].state = 4;
+    spec.areas[APP_AREA_DATA] = sizeof(IO_DEVICE_STATE) + 3;
+    check_refused(CONNECTORS, 0);
+    spec.areas[APP_AREA_DATA]++;
+    CHECK_EQUAL(try_load(), ERR_OK);
+}
+
+static void a_connector_with_an_unknown_flag(void)
+{
+    begin();
+    io.connectors[0].flags |= 4;
     check_refused(CONNECTORS, 0);
 }
 
@@ -285,17 +388,55 @@ static void a_value_in_the_data_begins_with_a_word_of_it(void)
     check_refused(PARAMETERS, 1);
 }
 
+static void a_parameter_with_an_unknown_flag(void)
+{
+    begin();
+    io.parameters[1].flags = PVF_POINTER + 1;
+    check_refused(PARAMETERS, 1);
+}
+
+static void the_greatest_number_of_a_parameter(void)
+{
+    begin();
+    io.parameters[1].id = 0xFFFFFFFFu; /* no greater one could follow */
+    check_refused(PARAMETERS, 1);
+    io.parameters[1].id--;
+    CHECK_EQUAL(try_load(), ERR_OK);
+}
+
 /* ---- maps ---- */
+
+/* Of the configuration of begin(). */
+enum { TASK_MAPS_AT = sizeof(IO_CONFIG) + 2 * sizeof(IoConfigConnector) + 3 * sizeof(IoConfigParameter) };
 
 static void a_map_of_the_task_after_the_last_one(void)
 {
     RTS_UI16 task = 1;
-    RTS_UI32 at = sizeof(IO_CONFIG) + 2 * (RTS_UI32)sizeof(IoConfigConnector) + 3 * (RTS_UI32)sizeof(IoConfigParameter);
 
     begin();
     CHECK_EQUAL(try_load(), ERR_OK);
-    patch(at, &task, sizeof task);
+    patch(TASK_MAPS_AT, &task, sizeof task);
     check_result(try_image(), TASK_MAPS, 0);
+}
+
+static void a_map_of_neither_inputs_nor_outputs(void)
+{
+    RTS_UI16 type = IO_MAP_OUTPUTS + 1;
+
+    begin();
+    CHECK_EQUAL(try_load(), ERR_OK);
+    patch(TASK_MAPS_AT + offsetof(IoConfigTaskMap, type), &type, sizeof type);
+    check_result(try_image(), TASK_MAPS, 0);
+}
+
+static void two_maps_of_the_same_inputs(void)
+{
+    RTS_UI16 type = IO_MAP_INPUTS;
+
+    begin();
+    CHECK_EQUAL(try_load(), ERR_OK);
+    patch(TASK_MAPS_AT + sizeof(IoConfigTaskMap) + offsetof(IoConfigTaskMap, type), &type, sizeof type);
+    check_result(try_image(), TASK_MAPS, 1);
 }
 
 static void a_map_of_the_connector_after_the_last_one(void)
@@ -305,6 +446,13 @@ static void a_map_of_the_connector_after_the_last_one(void)
     check_refused(CONNECTOR_MAPS, 0);
     io.channels[0].connector = 1;
     CHECK_EQUAL(try_load(), ERR_OK);
+}
+
+static void every_connector_of_a_map_is_checked(void)
+{
+    begin();
+    io_add_channel(&io, 0, IO_MAP_OUTPUTS, 1, DRIVER_OUTPUTS, 0, 16, 0);
+    check_refused(CHANNEL_MAPS, 2);
 }
 
 typedef struct {
@@ -326,9 +474,13 @@ static RTS_RESULT try_bits(const BITS *bits)
 
 static void bits_of_a_channel_are_within_a_byte_unless_all_are_whole_bytes(void)
 {
-    static const BITS good[] = {{4, 0, 4, IO_ZERO}, {0, 4, 4, IO_ZERO}, {8, 16, 24, IO_ZERO}, {0, 0, 1, IO_VALUE}};
-    static const BITS bad[] = {{4, 0, 5, IO_ZERO},  {0, 4, 5, IO_ZERO},      {4, 0, 8, IO_ZERO},  {0, 4, 8, IO_ZERO},
-                               {8, 16, 0, IO_ZERO}, {0, 0, 1, IO_VALUE + 1}, {8, 16, 12, IO_ZERO}};
+    static const BITS good[] = {{4, 0, 4, IO_ZERO},  {0, 4, 4, IO_ZERO},      {8, 16, 24, IO_ZERO},
+                                {0, 0, 1, IO_VALUE}, {8 * 31, 0, 8, IO_ZERO}, {0, 0x7FFFFFFF, 1, IO_ZERO}};
+    static const BITS bad[] = {{4, 0, 5, IO_ZERO},          {0, 4, 5, IO_ZERO},
+                               {4, 0, 8, IO_ZERO},          {0, 4, 8, IO_ZERO},
+                               {8, 16, 0, IO_ZERO},         {0, 0, 1, IO_VALUE + 1},
+                               {8, 16, 12, IO_ZERO},        {0, 0, 1, IO_CHANNEL_BIG_ENDIAN << 1},
+                               {0, 0x80000000u, 1, IO_ZERO}};
     RTS_UI32 i;
 
     for (i = 0; i < RTS_COUNT(good); i++)
@@ -344,6 +496,11 @@ int main(void)
     RUN(tables_that_end_after_the_configuration);
     RUN(the_data_is_whole_words);
     RUN(a_configuration_is_whole_words_within_the_code);
+    RUN(a_configuration_smaller_than_its_head);
+    RUN(code_that_ends_within_a_word_of_the_configuration);
+    RUN(two_configurations);
+    RUN(another_version);
+    RUN(a_configuration_for_any_board_fits_one_with_a_name);
     RUN(a_configuration_begins_with_a_word);
     RUN(a_place_of_another_size);
     RUN(a_configuration_of_a_head_alone);
@@ -351,12 +508,20 @@ int main(void)
     RUN(the_parameters_of_the_last_connector_end_with_the_table);
     RUN(a_name_after_the_data);
     RUN(a_name_that_ends_after_the_data);
+    RUN(a_name_that_ends_one_byte_after_the_data);
     RUN(a_name_of_the_greatest_length);
     RUN(a_state_fills_the_variables);
+    RUN(a_state_begins_with_a_word_and_ends_in_the_variables);
+    RUN(a_connector_with_an_unknown_flag);
     RUN(a_value_in_the_table_has_32_bits_at_most);
     RUN(a_value_in_the_data_begins_with_a_word_of_it);
+    RUN(a_parameter_with_an_unknown_flag);
+    RUN(the_greatest_number_of_a_parameter);
     RUN(a_map_of_the_task_after_the_last_one);
+    RUN(a_map_of_neither_inputs_nor_outputs);
+    RUN(two_maps_of_the_same_inputs);
     RUN(a_map_of_the_connector_after_the_last_one);
+    RUN(every_connector_of_a_map_is_checked);
     RUN(bits_of_a_channel_are_within_a_byte_unless_all_are_whole_bytes);
     return test_result();
 }

@@ -269,15 +269,20 @@ RTS_RESULT LoaderCheckIo(LOADER *l)
 RTS_RESULT LoaderFindIo(LOADER *l, RTS_UI32 size)
 {
     const CDL_SEGMENT *code = &l->image->code;
-    IO_CONFIG_PLACE place = {0, 0};
-    RTS_RESULT result = size == sizeof place ? LoaderReadNext(l, &place, size) : (RTS_RESULT)ERR_SIZE_MISMATCH;
+    IO_CONFIG_PLACE place;
+    RTS_RESULT result;
 
-    if (result == ERR_OK && (place.offset % 4 != 0 || place.size < sizeof(IO_CONFIG) || place.offset > code->size ||
-                             place.size > code->size - place.offset || l->image->io.size != 0))
-        result = ERR_INVALID_REFERENCE;
+    if (size != sizeof place)
+        return refuse_damaged(l, ERR_SIZE_MISMATCH, TABLES, 0);
+    result = LoaderReadNext(l, &place, size);
+    if (result != ERR_OK)
+        return result;
+    if (place.offset % 4 != 0 || place.size < sizeof(IO_CONFIG) || place.offset > code->size ||
+        place.size > code->size - place.offset || l->image->io.size != 0)
+        return refuse_damaged(l, ERR_INVALID_REFERENCE, TABLES, 0);
     l->image->io.offset = place.offset;
     l->image->io.size = place.size;
-    return result == ERR_OK ? ERR_OK : refuse_damaged(l, result, TABLES, 0);
+    return ERR_OK;
 }
 
 #endif

@@ -1,0 +1,81 @@
+/*
+ * test_app_unreadable.c - a flash that cannot be read any more, from any moment of the check of an image on.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The check ends with the read that fails: what was not read decides nothing.
+ */
+#include "../../firmware/src/load/AppLoader.h"
+#include "Sim.h"
+#include "SysFileFlash.h"
+#include "io_driver.h"
+
+static APP_REFUSAL refusal;
+
+/* Checks the image in slot A; from the read with this number on, none succeeds. */
+static RTS_RESULT check_until(RTS_UI32 read)
+{
+    APP_IMAGE checked;
+    RTS_RESULT result;
+
+    SimFlashFailFrom(SIM_READ, read);
+    result = AppLoaderCheck(FILE_SLOT_A, image.size, image_crc(&image), &checked, &refusal);
+    SimFlashFailFrom(SIM_READ, 0);
+    return result;
+}
+
+enum { TRIES = 3 }; /* of a read */
+
+/* The sentence names the place where a name or a text was expected, elsewhere the flash. */
+static bool is_about_a_name(void)
+{
+    return strstr(refusal.text, "Application info") != NULL || strstr(refusal.text, "Name ") != NULL ||
+           strstr(refusal.text, "damaged (table 0, ") != NULL;
+}
+
+/* Checks that `names` reads are of names and texts, and returns how many others a check takes. */
+static RTS_UI32 check_after_each_read(RTS_UI32 names)
+{
+    RTS_UI32 found = 0;
+    RTS_UI32 read = 1;
+
+    CHECK_EQUAL(load_io(), ERR_OK);
+    for (;; read++) {
+        RTS_UI32 before = SimFlashCalls(SIM_READ);
+        if (check_until(read) == ERR_OK)
+            break;
+        if (is_about_a_name())
+            found++;
+        else
+            CHECK(strcmp(refusal.text, "The flash cannot be read.") == 0);
+        CHECK_EQUAL(SimFlashCalls(SIM_READ) - before, read - 1 + TRIES);
+    }
+    CHECK_EQUAL(refusal.text[0], '\0');
+    CHECK_EQUAL(found, names);
+    return read - 1 - found;
+}
+
+enum { INFO_BYTES = 41 }; /* of spec_init(), with the NULs */
+
+static void an_image_with_inputs_and_outputs(void)
+{
+    SimFlashSetMapped(0);
+    begin_io();
+    io_add_parameter(&io, 1, 32, 0);
+    io_add_text_parameter(&io, 2, "COM2");
+    io_add_connector(&io, "Device", "IoDrvTest");
+    add_copying_task("Main", 10000, 0);
+    add_copying_task("Other", 20000, 8);
+    add_bytes(0, IO_MAP_INPUTS, 0, 4);
+    add_bytes(0, IO_MAP_OUTPUTS, 0, 4);
+    add_bytes(1, IO_MAP_INPUTS, 8, 4);
+    CHECK(check_after_each_read(INFO_BYTES + 2 * 2) > 20);
+    SimFlashSetMapped(1);
+}
+
+int main(void)
+{
+    NEEDS_X86_64;
+    RUN(an_image_with_inputs_and_outputs);
+    return test_result();
+}
