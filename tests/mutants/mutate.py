@@ -206,6 +206,9 @@ class Mutator:
             return self.own(node)
         if self.result == "bool" and bare(value).type == "binary_expression":
             return b"return %s;" % self.decision(value, {"true": b"1", "false": b"0"})
+        condition = bare(value).child_by_field_name("condition")
+        if condition is not None and self.is_constant(condition):
+            return self.inner(node)
         if self.result == "RTS_RESULT" and self.own(value) != b"ERR_OK" and not is_guarded(node):
             inner = self.rewrite(value)
             return b"return (RTS_RESULT)%s;" % self.picks(inner, [(self.mutant(node, "return ERR_OK;"), b"ERR_OK")])

@@ -208,14 +208,12 @@ void AppLoaderReadInfo(const APP_IMAGE *image, RTS_UI32 index, char *text, RTS_S
     RTS_UI32 offset = image->info.offset;
     RTS_SIZE length = 0;
 
-    while (index > 0 && skip_string(image->file, &offset, end))
-        index--;
-    if (index == 0) {
-        while (length + 1 < size && offset < end && SysFileRead(image->file, offset, &text[length], 1) == ERR_OK &&
-               text[length] != '\0') {
-            length++;
-            offset++;
-        }
+    for (; index > 0; index--)
+        (void)skip_string(image->file, &offset, end); /* ends where no further string can be read, either */
+    while (length + 1 < size && offset < end && SysFileRead(image->file, offset, &text[length], 1) == ERR_OK &&
+           text[length] != '\0') {
+        length++;
+        offset++;
     }
     text[length] = '\0';
 }

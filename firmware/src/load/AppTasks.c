@@ -22,7 +22,7 @@ RTS_RESULT AppTasksCheckEvent(const CDL_TASK *task, APP_REFUSAL *refusal)
 #if IO_MAX_CONNECTORS > 0
 RTS_RESULT LoaderCheckEvents(LOADER *l)
 {
-    RTS_UI32 count = l->image->io.size == 0 && AppIoGet() != NULL ? l->image->task_count : 0;
+    RTS_UI32 count = l->image->io.size == 0 ? l->image->task_count : 0;
     RTS_RESULT result = ERR_OK;
     RTS_UI32 i;
 
@@ -53,8 +53,8 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
     if (SCHED_WAITS_FOR_VARIABLE(task->kind) &&
         (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
         return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s is outside its area.", name);
-    /* A driver may post the event: it is known when the driver has its configuration. */
-    return AppIoGet() != NULL ? (RTS_RESULT)ERR_OK : AppTasksCheckEvent(task, l->refusal);
+    /* A driver may post the event, which is known after all blobs have been read (LoaderCheckEvents). */
+    return IO_MAX_CONNECTORS > 0 ? (RTS_RESULT)ERR_OK : AppTasksCheckEvent(task, l->refusal);
 }
 
 static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 size)
