@@ -37,7 +37,7 @@ def test_check_keeps_syntax_trees_and_clear_deletes_them(tool: Any, scratch: Pat
     source.write_text(f"{source.read_text()}(* {'long ' * 300}*)\n")
     assert tool("check", "main.st").status == 0
     assert tool("cache", "--json").json["trees"] == 1
-    assert "1 syntax tree and 0 reports deleted" in tool("cache", "clear").out
+    assert "1 syntax tree and 1 report deleted" in tool("cache", "clear").out
     assert tool("cache", "--json").json["trees"] == 0
 
 
@@ -104,6 +104,50 @@ def test_project_whose_eds_has_changed_is_built_again(tool: Any, scratch: Path) 
     eds.write_text(eds.read_text().replace("[1000]", "[100", 1))
     shown = tool("build", str(project))
     assert shown.status != 0 and "drive.eds has errors" in shown.err
+
+
+_FAULTS = "PROGRAM Main\nVAR x, unused : INT; END_VAR\nx := {value};\nEND_PROGRAM\n"
+
+
+@pytest.mark.parametrize("value", ["1", "'text'", "absent", "(1"])
+@pytest.mark.parametrize("options", [[], ["--json"]])
+def test_check_of_what_is_checked_already_says_the_same(
+    tool: Any, scratch: Path, monkeypatch: pytest.MonkeyPatch, value: str, options: list[str]
+) -> None:
+    (scratch / "main.st").write_text(_FAULTS.format(value=value))
+    first = tool("check", "main.st", *options)
+    monkeypatch.setattr("plctool.compiler.check_with_tests", None)  # nothing is checked again
+    again = tool("check", "main.st", *options)
+    assert (again.out, again.err, again.status) == (first.out, first.err, first.status)
+    assert "main.st" in first.out
+
+
+@pytest.mark.parametrize("options", [["--guidelines"], ["--no-warn", "unused"], ["--werror"], ["--dialect", "codesys"]])
+def test_check_with_other_options_is_another_check(
+    tool: Any, scratch: Path, monkeypatch: pytest.MonkeyPatch, options: list[str]
+) -> None:
+    (scratch / "main.st").write_text(_FAULTS.format(value="1"))
+    tool("check", "main.st")
+    shown = tool("check", "main.st", *options)
+    assert shown.out == tool("check", "main.st", *options).out
+    monkeypatch.setenv("XDG_CACHE_HOME", str(scratch / "empty"))
+    fresh = tool("check", "main.st", *options)
+    assert (shown.out, shown.status) == (fresh.out, fresh.status)
+
+
+def test_check_after_a_change_or_of_another_file_is_made_again(tool: Any, scratch: Path) -> None:
+    for value, expected in (("1", 0), ("absent", 2), ("1", 0)):
+        (scratch / "main.st").write_text(_FAULTS.format(value=value))
+        assert tool("check", "main.st").status == expected
+    (scratch / "other.st").write_text(_FAULTS.format(value="absent"))
+    assert "main.st" in tool("check", "main.st").out
+    assert "other.st" in tool("check", "other.st").out
+
+
+def test_check_writes_its_reports_each_time(tool: Any, scratch: Path) -> None:
+    for _ in range(2):
+        assert tool("check", "main.st", "--sarif", "found.sarif").status == 0
+        (scratch / "found.sarif").unlink()
 
 
 @pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b'{"files": [], "document": {"crc": 5}, "warnings": []}'])

@@ -1,7 +1,8 @@
-"""Reports of builds in the user's cache folder: a build whose image is there already compiles nothing.
+"""Reports of builds and checks in the user's cache folder: what was built or checked already is not compiled again.
 
-A report is found by a hash of all that the build depends on, and used only while image and symbol file are the ones
-that this build has written. So no image comes from the cache, only what the build has said about it.
+A report is found by a hash of all that the build or check depends on. That of a build is used only while image and
+symbol file are the ones that this build has written. So no image comes from the cache, only what the build has said
+about it.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -30,7 +31,7 @@ _LARGEST = 64 << 20  # bytes of one that is unpacked
 _FASTEST = 1  # of zlib
 
 Report = tuple[Document, list[str]]
-"""The document of a build, and its warnings as users read them."""
+"""The document of a build or check, and its diagnostics as users read them."""
 
 
 def report_folder() -> ObjectCache:
@@ -42,14 +43,14 @@ def report_folder() -> ObjectCache:
 
 @dataclass(frozen=True)
 class KeptReport:
-    """The place of the report of one build."""
+    """The place of the report of one build or check. `files`: what it has written."""
 
     folder: ObjectCache
     key: str
     files: tuple[Path, ...]
 
     def find(self) -> Report | None:
-        """Returns the report; None if there is none, or if a file of the build is not as it was written."""
+        """Returns the report; None if there is none, or if a file that was written has changed."""
         from plctool.debug.symbols import cache_path
 
         packed = self.folder.get(self.key)
@@ -58,7 +59,8 @@ class KeptReport:
         try:
             found = json.loads(zlib.decompressobj().decompress(packed, _LARGEST))
             hashes, document, warnings = found["files"], found["document"], found["warnings"]
-            has_copy = cache_path(int(document["crc"], 16)).exists()  # for commands that know the CRC only
+            # Commands that know the CRC only need the copy of the symbols.
+            has_copy = not self.files or cache_path(int(document["crc"], 16)).exists()
         except (ValueError, TypeError, KeyError, zlib.error, RecursionError):
             return None
         texts = isinstance(warnings, list) and all(isinstance(text, str) for text in warnings)
@@ -67,7 +69,7 @@ class KeptReport:
         return document, warnings
 
     def keep(self, document: Document, warnings: list[str]) -> None:
-        """Keeps the report of a build that has just written its files."""
+        """Keeps the report of a build or check that has just ended."""
         text = json.dumps({"files": self._hashes(), "document": document, "warnings": warnings})
         self.folder.put(self.key, zlib.compress(text.encode(), _FASTEST))
 
@@ -81,17 +83,38 @@ def kept_report(settings: Settings, made_of: str) -> KeptReport | None:
     from plctool.compiler import source_date
     from plctool.debug.symbols import symbol_path
 
+    if settings.base is not None or settings.dump_after is not None:
+        return None
+    facts = ("build", source_date(), settings.firmware, settings.device_id, str(settings.output))
+    return _place(settings, made_of, facts, (settings.output, symbol_path(settings.output)))
+
+
+def kept_check(settings: Settings) -> KeptReport | None:
+    """Returns the place of the report of a check; None if there are files that cannot be read, and if nothing is
+    kept."""
+    from plctool.cli.fresh_image import fingerprint
+
+    if not settings.cache:
+        return None
+    try:
+        return _place(settings, fingerprint(settings), ("check",), ())
+    except UsageError:
+        return None
+
+
+def _place(settings: Settings, made_of: str, others: tuple[object, ...], files: tuple[Path, ...]) -> KeptReport | None:
+    """`others`: what the report depends on besides sources, options and plctool."""
     folder = report_folder()
-    if not settings.cache or settings.base is not None or settings.dump_after is not None or not folder.usable():
+    if not settings.cache or not folder.usable():
         return None
     project = settings.files.project
     facts = (
-        *(made_of, _code(), sys.version, source_date(), settings.warnings, settings.firmware, settings.device_id),
-        *(str(settings.output), None if project is None else _hash(project.file)),
-        *(str(file) for file in settings.every_file()),  # as warnings name them
+        *(made_of, _code(), sys.version, settings.warnings, None if project is None else _hash(project.file)),
+        *others,
+        *(str(file) for file in settings.every_file()),  # as diagnostics name them
     )
     key = sha256(repr(facts).encode(errors="surrogatepass")).hexdigest()
-    return KeptReport(folder, key, (settings.output, symbol_path(settings.output)))
+    return KeptReport(folder, key, files)
 
 
 def _hash(file: Path) -> str | None:

@@ -101,6 +101,11 @@ class CheckReports:
     sarif: Path | None = None
     junit: Path | None = None
 
+    @property
+    def wanted(self) -> bool:
+        """True if there is a file to write."""
+        return self.sarif is not None or self.junit is not None
+
     def check_names(self, inputs: Iterator[Path]) -> None:
         """Raises UsageError if a report would replace a file that is read, or one of another kind."""
         read = list(inputs)
@@ -122,11 +127,25 @@ class CheckReports:
 
 def check(settings: Settings, reports: CheckReports | None = None) -> tuple[Document, list[str]]:
     """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
-    from plctool.compiler.base.missing_names import missing_names
-    from plctool.compiler.syntax.diagnostics import render_all
+    from plctool.cli.kept_reports import kept_check
 
     reports = reports or CheckReports()
     reports.check_names(settings.every_file())
+    kept = None if reports.wanted else kept_check(settings)  # reports are made of what the check has found itself
+    found = None if kept is None else kept.find()
+    if found is not None:
+        return found
+    document, texts = _check_now(settings, reports)
+    now = None if kept is None else kept_check(settings)
+    if kept is not None and now is not None and now.key == kept.key:  # else a file has changed during the check
+        kept.keep(document, texts)
+    return document, texts
+
+
+def _check_now(settings: Settings, reports: CheckReports) -> tuple[Document, list[str]]:
+    from plctool.compiler.base.missing_names import missing_names
+    from plctool.compiler.syntax.diagnostics import render_all
+
     diagnostics, sources, shown = _checked(settings)
     reports.write(diagnostics, [source.path for source in sources])
     document: Document = {"diagnostics": [diagnostic_document(d) for d in diagnostics]}
