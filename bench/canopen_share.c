@@ -39,6 +39,16 @@ static bool blocks_write(void)
     return write_blocks(data, LARGE);
 }
 
+static bool manager_write(void)
+{
+    return write_object(TEXT, data, LARGE);
+}
+
+static bool manager_read(void)
+{
+    return read_object(TEXT);
+}
+
 static bool measure(const char *name, bool (*transfer)(void), RTS_UI32 bytes)
 {
     RTS_I64 begun = SimCanNow();
@@ -60,9 +70,10 @@ int main(void)
     begin();
     for (RTS_UI32 i = 0; i < LARGE; i++)
         data[i] = (RTS_UI8)('!' + i * 7 % 90);
-    bool done = measure("expedited writes", expedited_write, 4) && measure("expedited reads", expedited_read, 4) &&
-                measure("writes in segments", segments_write, LARGE) &&
-                measure("reads in segments", segments_read, LARGE) &&
-                measure("writes in blocks", blocks_write, LARGE) && measure("reads in blocks", read_blocks, LARGE);
+    bool done =
+        measure("expedited writes", expedited_write, 4) && measure("expedited reads", expedited_read, 4) &&
+        measure("writes in segments", segments_write, LARGE) && measure("reads in segments", segments_read, LARGE) &&
+        measure("writes in blocks", blocks_write, LARGE) && measure("reads in blocks", read_blocks, LARGE) &&
+        measure("writes of the manager", manager_write, LARGE) && measure("reads of the manager", manager_read, LARGE);
     return done ? 0 : 1;
 }

@@ -99,7 +99,6 @@ typedef struct {
     CANOPEN_COUNTERS counters;
 } CANOPEN_NODE;
 
-typedef bool (*PF_CANOPEN_SEND)(void *owner, const CAN_FRAME *frame);
 
 /* A node whose first fields are set begins with its reset. */
 void CanopenNodeBegin(CANOPEN_NODE *node, RTS_UI32 timeout_ms, RTS_UI32 now_ms);

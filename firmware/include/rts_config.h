@@ -614,6 +614,12 @@
 #define CANOPEN_CALL_SIZE 256
 #endif
 
+/* 1: the manager transfers objects of 128 bytes and more in blocks (CanopenSdoClient.h): 1 KiB of flash, 16 bytes of RAM
+ * for each node and transfer. */
+#ifndef CANOPEN_SDO_BLOCK
+#define CANOPEN_SDO_BLOCK (CANOPEN_CALL_SIZE >= 128)
+#endif
+
 /* This controller as a CANopen device (IoDrvCanopenDevice.h): bytes of all values of its dictionary, 0: it is none, and no
  * flash for it; bytes of its largest value; and PDOs in each direction (about 100 bytes each). */
 #ifndef CANOPEN_DEVICE_DATA

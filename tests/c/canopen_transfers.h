@@ -1,6 +1,6 @@
 /*
- * canopen_transfers.h - SDO transfers between a client and a CANopen device on a simulated bus, in virtual time: in segments
- * by CanopenSdoClient.h, in blocks by a client of the tests. Client and device take no time.
+ * canopen_transfers.h - SDO transfers between a client and a CANopen device on a simulated bus, in virtual time: by
+ * CanopenSdoClient.h, and in blocks also by a client of the tests. Client and device take no time.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -32,12 +32,27 @@ static const CANOPEN_OBJECT objects[] = {
 
 /* ---- the bus ---- */
 
-/* Numbers of frames, of both directions, since the last begin(): one that gets lost, one that arrives twice. */
-static RTS_UI32 frames, lost_frame, doubled_frame;
+/* Numbers of frames, of both directions, since the last begin(): one that gets lost, one that arrives twice, one that
+ * arrives `delay_ms` later. */
+static RTS_UI32 frames, lost_frame, doubled_frame, delayed_frame, delay_ms;
+static bool is_without_blocks; /* the device */
+static bool has_twice;         /* the client gets `twice` next */
+static CAN_FRAME twice;
+
+static struct {
+    bool is_held, is_for_client;
+    RTS_I64 until_ns;
+    CAN_FRAME frame;
+} held;
 
 static RTS_UI32 now_ms(void)
 {
     return 1 + (RTS_UI32)(SimCanNow() / 1000000);
+}
+
+static RTS_I64 ns_of(RTS_UI32 ms)
+{
+    return ((RTS_I64)ms - 1) * 1000000;
 }
 
 static bool send_of_device(const CAN_FRAME *frame)
@@ -45,51 +60,111 @@ static bool send_of_device(const CAN_FRAME *frame)
     return SimCanSend(SIM_CAN_DEVICE, frame) == ERR_OK;
 }
 
-static RTS_UI32 copies_of_frame(void)
+static bool send_of_client(void *owner, const CAN_FRAME *frame)
+{
+    RTS_UNUSED(owner);
+    return SimCanSend(CLIENT, frame) == ERR_OK;
+}
+
+static RTS_UI32 copies_of_frame(const CAN_FRAME *frame, bool is_for_client)
 {
     RTS_UI32 number = frames++;
 
+    if (number == delayed_frame) {
+        held.is_held = true;
+        held.is_for_client = is_for_client;
+        held.until_ns = SimCanNow() + (RTS_I64)delay_ms * 1000000;
+        held.frame = *frame;
+        return 0;
+    }
     return number == lost_frame ? 0 : number == doubled_frame ? 2 : 1;
 }
 
-/* The next thing that happens; false: nothing will. */
-static bool step(void)
+/* As a device that knows no blocks. */
+static bool refuses(const CAN_FRAME *frame)
+{
+    CAN_FRAME reply = {.id = CANOPEN_SDO_REPLY + NODE, .size = 8, .data = {SDO_ABORT}};
+
+    if (!is_without_blocks || (frame->data[0] != 0xC6 && frame->data[0] != 0xA4))
+        return false;
+    memcpy(reply.data + 1, frame->data + 1, 3);
+    BytesPut32(reply.data + 4, SDO_ABORT_COMMAND);
+    return send_of_device(&reply);
+}
+
+static void give_to_device(const CAN_FRAME *frame)
+{
+    if (!refuses(frame))
+        CanopenDeviceTake(&slave, frame, BIT_RATE / 1000, now_ms());
+}
+
+static void release_held(void)
+{
+    if (!held.is_held || held.until_ns > SimCanNow())
+        return;
+    held.is_held = false;
+    if (held.is_for_client) {
+        twice = held.frame;
+        has_twice = true;
+    } else {
+        give_to_device(&held.frame);
+    }
+}
+
+/* The next thing that happens until a time [ns]; false: nothing will. */
+static bool step_until(RTS_I64 end_ns)
 {
     RTS_I64 next = SimCanNext();
     CAN_FRAME frame;
 
-    if (next == INT64_MAX)
+    if (held.is_held && held.until_ns < next)
+        next = held.until_ns;
+    if (next > end_ns || next == INT64_MAX) {
+        if (end_ns != INT64_MAX && end_ns > SimCanNow())
+            SimCanAdvance(end_ns);
+        CanopenDevicePoll(&slave, now_ms());
         return false;
+    }
     SimCanAdvance(next);
     while (SimCanReceive(SIM_CAN_DEVICE, &frame) == ERR_OK)
-        for (RTS_UI32 count = copies_of_frame(); count > 0; count--)
-            CanopenDeviceTake(&slave, &frame, BIT_RATE / 1000, now_ms());
+        for (RTS_UI32 count = copies_of_frame(&frame, false); count > 0; count--)
+            give_to_device(&frame);
+    release_held();
     CanopenDevicePoll(&slave, now_ms());
     return true;
 }
 
-static CAN_FRAME twice;
-static bool has_twice;
-
-/* The next reply of the device; false: there is none. */
-static bool receive(CAN_FRAME *frame)
+static bool step(void)
 {
-    if (has_twice) {
-        *frame = twice;
-        has_twice = false;
-        return true;
-    }
+    return step_until(INT64_MAX);
+}
+
+/* The next reply of the device until a time [ns]; false: there is none. */
+static bool receive_until(CAN_FRAME *frame, RTS_I64 end_ns)
+{
     for (;;) {
+        if (has_twice) {
+            *frame = twice;
+            has_twice = false;
+            return true;
+        }
         while (SimCanReceive(CLIENT, frame) == ERR_OK) {
-            RTS_UI32 count = frame->id == CANOPEN_SDO_REPLY + NODE ? copies_of_frame() : 0;
-            has_twice = count == 2;
-            twice = *frame;
+            RTS_UI32 count = frame->id == CANOPEN_SDO_REPLY + NODE ? copies_of_frame(frame, true) : 0;
+            if (count == 2) {
+                has_twice = true;
+                twice = *frame;
+            }
             if (count != 0)
                 return true;
         }
-        if (!step())
+        if (!step_until(end_ns))
             return false;
     }
+}
+
+static bool receive(CAN_FRAME *frame)
+{
+    return receive_until(frame, INT64_MAX);
 }
 
 /* Replies that no transfer has waited for, such as those to a request that has come twice. */
@@ -117,8 +192,8 @@ static void begin(void)
     client.timeout_ms = TIMEOUT_MS;
     client.in = received;
     client.room = sizeof received;
-    has_twice = false;
-    lost_frame = doubled_frame = NO_FAULT;
+    has_twice = is_without_blocks = held.is_held = false;
+    lost_frame = doubled_frame = delayed_frame = NO_FAULT;
     (void)CanopenDeviceBegin(&slave, now_ms());
     CanopenDevicePoll(&slave, now_ms());
     while (step())
@@ -126,41 +201,54 @@ static void begin(void)
     frames = 0;
 }
 
-/* ---- in segments, or expedited ---- */
+/* ---- by CanopenSdoClient.h ---- */
 
 static bool end_transfer(void)
 {
     CAN_FRAME frame;
 
     while (client.state == SDO_BUSY) {
-        if (client.has_request && SimCanSend(CLIENT, &client.request) == ERR_OK)
-            client.has_request = false;
-        if (receive(&frame))
+        bool is_sent = SdoClientSend(&client, send_of_client, NULL, now_ms());
+        if (receive_until(&frame, ns_of(is_sent ? client.since_ms + TIMEOUT_MS : now_ms() + 1)))
             SdoClientTake(&client, &frame, now_ms());
-        else if (!client.has_request)
-            SdoClientPoll(&client, now_ms() + TIMEOUT_MS);
+        SdoClientPoll(&client, now_ms());
     }
-    if (client.has_request) /* the abort of a transfer that was given up */
-        (void)SimCanSend(CLIENT, &client.request);
-    while (client.has_request && step())
-        ;
+    while (!SdoClientSend(&client, send_of_client, NULL, now_ms())) /* an abort, or the end of a read in blocks */
+        (void)step_until(ns_of(now_ms() + 1));
     received_size = client.done;
     return client.state == SDO_DONE;
 }
 
-static bool write_segments(RTS_UI16 index, const RTS_UI8 *data, RTS_UI32 size)
+static bool write_object(RTS_UI16 index, const RTS_UI8 *data, RTS_UI32 size)
 {
     SdoClientWrite(&client, NODE, index, 0, data, size, now_ms());
     return end_transfer();
 }
 
-static bool read_segments(RTS_UI16 index)
+static bool read_object(RTS_UI16 index)
 {
     SdoClientRead(&client, NODE, index, 0, now_ms());
     return end_transfer();
 }
 
-/* ---- in blocks ---- */
+/* In segments, or expedited: longer values after the device has refused blocks. */
+static bool write_segments(RTS_UI16 index, const RTS_UI8 *data, RTS_UI32 size)
+{
+    is_without_blocks = true;
+    bool is_done = write_object(index, data, size);
+    is_without_blocks = false;
+    return is_done;
+}
+
+static bool read_segments(RTS_UI16 index)
+{
+    is_without_blocks = true;
+    bool is_done = read_object(index);
+    is_without_blocks = false;
+    return is_done;
+}
+
+/* ---- in blocks, by a client of the tests ---- */
 
 static void say(const RTS_UI8 *data)
 {

@@ -17,6 +17,7 @@ from canopen_programs import BLOCKS, SOURCE, write_guarded_program, write_progra
 
 from plctool import connect
 from plctool.device import Plc
+from plctool.iec.types import BYTE, ArrayType
 from plctool.link.canbus import open_bus
 from plctool.testing.can_hub import CanHub
 from plctool.testing.plcrt import Plcrt
@@ -160,6 +161,16 @@ def test_program_reads_writes_and_commands_a_foreign_node(hub: CanHub, plc: Plc)
         foreign.node.emcy.send(0x8130, 0x11, b"\1\2\3\4\5")
         assert do(plc, "emcy") == (True, 0)
         assert (plc.read("Main.emcy.DEVICE"), plc.read("Main.emcy.ERRORINFO.EMCY_ERROR_CODE")) == (NODE, 0x8130)
+
+
+def test_node_without_block_transfer_gets_long_values_in_segments(hub: CanHub, plc: Plc) -> None:
+    text = b"longer than what a block begins with: " * 5
+    kind = ArrayType(BYTE, ((1, len(text)),))
+    with ForeignNode(f"slcan:{hub.paths[2]}") as foreign:
+        eventually(lambda: plc.read("Valves.ok"))
+        plc.io_write_parameter("Valves", 0x2000 << 8, kind, list(text))
+        assert bytes(foreign.node.data_store[0x2000][0]) == text
+        assert bytes(plc.io_read_parameter("Valves", 0x2000 << 8, kind)) == text
 
 
 def test_tool_reads_and_writes_objects_of_a_node_through_the_controller(hub: CanHub, plc: Plc, tool: Any) -> None:

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import can
 import durand
 
 sys.path.append(str(Path(__file__).parents[1]))
@@ -18,7 +19,7 @@ from canopen_programs import write_program
 from durand import object_dictionary, scheduler
 
 from plctool import connect
-from plctool.iec.types import UINT
+from plctool.iec.types import BYTE, UINT, ArrayType
 from plctool.link.canbus import open_bus
 from plctool.testing.can_hub import CanHub
 from plctool.testing.plcrt import Plcrt
@@ -65,17 +66,30 @@ def node(link: str) -> Iterator[Any]:
         bus.shutdown()
 
 
+@contextmanager
+def heard(link: str) -> Iterator[list[can.Message]]:
+    """All frames on a bus."""
+    frames: list[can.Message] = []
+    bus = open_bus(link, 500000, 0)
+    notifier = can.Notifier(bus, [frames.append])
+    try:
+        yield frames
+    finally:
+        notifier.stop()
+        bus.shutdown()
+
+
 def test_node_of_another_stack_is_brought_into_operation(tmp_path: Path, tool: Any) -> None:
     image, source = tmp_path / "app.cdl", write_program(tmp_path / "program")
     eds = source.with_name("valves.eds")
     eds.write_text(EVENT_TIMER.sub("", eds.read_text()))
     built = tool("build", str(source), "-o", str(image))
     assert built.status == 0, built.err
-    with CanHub(4) as hub:
+    with CanHub(5) as hub:
         options = ("--can", f"slcan:{hub.paths[0]}", "--node", "5")
         with Plcrt(tmp_path / "flash", *options), connect(f"can:slcan:{hub.paths[1]}?node=5") as plc:
             plc.flash(image)
-            with node(f"slcan:{hub.paths[2]}") as foreign:
+            with node(f"slcan:{hub.paths[2]}") as foreign, heard(f"slcan:{hub.paths[4]}") as frames:
                 read, write = foreign.object_dictionary.read, foreign.object_dictionary.write
                 eventually(lambda: plc.read("Valves.ok"))
                 assert (read(0x2001, 0), bytes(read(0x2000, 0))) == (700, b"press twenty-five")
@@ -86,10 +100,22 @@ def test_node_of_another_stack_is_brought_into_operation(tmp_path: Path, tool: A
                 eventually(lambda: (plc.read("Main.inputs"), plc.read("Main.pressure")) == (0x5A, -1234))
                 eventually(lambda: read(0x6200, 1) == 0x5A)
                 assert plc.io_read_parameter("Valves", 0x2001 << 8, UINT) == 700
+                text = "as long as two blocks of the manager and more: " * 10
+                recipe = ArrayType(BYTE, ((1, len(text)),))
+                plc.io_write_parameter("Valves", 0x2000 << 8, recipe, list(text.encode()))
+                assert bytes(read(0x2000, 0)).decode() == text
+                assert bytes(plc.io_read_parameter("Valves", 0x2000 << 8, recipe)).decode() == text
+                eventually(
+                    lambda: {0xC6, 0xA4} <= {f.data[0] for f in list(frames) if f.arbitration_id == 0x600 + NODE}
+                )
                 text = "a text of some blocks " * 6
                 assert tool_of(tool, hub, "write", "2000", text, "--type", "STRING").status == 0
                 assert bytes(read(0x2000, 0)).decode() == text
                 assert text in tool_of(tool, hub, "read", "2000", "--type", "STRING").out
+
+
+def is_request(frame: can.Message) -> bool:
+    return frame.arbitration_id == 0x600 + NODE
 
 
 def tool_of(tool: Any, hub: CanHub, what: str, *words: str) -> Any:

@@ -14,7 +14,7 @@
 #include "fuzz.h"
 
 enum { NODE = 5, TIMEOUT_MS = 100, HEARTBEAT_MS = 200, STEP_MS = 5, TYPE = 0x20192, RECOVERY_MS = 60000 };
-enum { HEARTBEAT, REPLY, EMCY, PAUSE, WHOLE = 8 };
+enum { HEARTBEAT, REPLY, EMCY, PAUSE, WHOLE = 8, WRITE_BLOCK = 0xC6 };
 
 static CANOPEN_NODE node;
 static CAN_FRAME sent;
@@ -80,6 +80,9 @@ static void serve_sdo(RTS_UI8 *data)
         BytesPut32(data + 4, BytesGet16(data + 1) == OBJECT_TYPE ? TYPE : 0);
     } else if ((data[0] & SDO_KIND) == SDO_WRITE_SEGMENT) {
         data[0] = (RTS_UI8)(SDO_SEGMENT_DONE | (data[0] & SDO_TOGGLE));
+    } else if (data[0] == WRITE_BLOCK) { /* it has no block transfer */
+        data[0] = SDO_ABORT;
+        BytesPut32(data + 4, SDO_ABORT_COMMAND);
     } else {
         data[0] = SDO_WRITE_DONE;
     }

@@ -402,13 +402,6 @@ void CanopenNodeTake(CANOPEN_NODE *node, const CAN_FRAME *frame, RTS_UI32 now_ms
 
 /* ---- time ---- */
 
-static bool flush(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner)
-{
-    if (node->sdo.has_request)
-        node->sdo.has_request = !send(owner, &node->sdo.request);
-    return !node->sdo.has_request;
-}
-
 static bool is_silent(const CANOPEN_NODE *node, RTS_UI32 limit_ms, RTS_UI32 now_ms)
 {
     return CanopenNodeIsWatched(node) && now_ms - node->since_ms >= limit_ms;
@@ -500,13 +493,13 @@ void CanopenNodePoll(CANOPEN_NODE *node, PF_CANOPEN_SEND send, void *owner, RTS_
     do {
         before = node->state;
         SdoClientPoll(&node->sdo, now_ms);
-        if (!flush(node, send, owner))
+        if (!SdoClientSend(&node->sdo, send, owner, now_ms))
             return;
         if (node->state == MASTER_IDENTIFY || node->state == MASTER_CONFIGURE)
             follow_transfer(node, now_ms);
         else
             poll_state(node, send, owner, now_ms);
-        (void)flush(node, send, owner);
+        (void)SdoClientSend(&node->sdo, send, owner, now_ms);
     } while (node->state != before);
     ask_state(node, send, owner, now_ms);
 }
@@ -517,7 +510,7 @@ static RTS_UI32 get_wait_ms(const CANOPEN_NODE *node, RTS_UI32 now_ms)
     RTS_UI32 since_ms = now_ms - node->since_ms;
 
     if (node->sdo.has_request)
-        return AGAIN_MS;
+        return SdoClientGetAgainMs(&node->sdo);
     switch (node->state) {
     case MASTER_BOOTS:
         return left_ms(since_ms, BOOT_MS);

@@ -11,6 +11,7 @@
 
 #include "CanopenAccess.h"
 #include "CmpBytes.h"
+#include "CmpChecksum.h"
 
 #if CANOPEN_DEVICE_DATA > 0
 
@@ -20,7 +21,6 @@ enum {
     FRAME = 8,
     AGAIN_MS = 1,
     MOST_SEGMENTS = 127,
-    CRC_POLYNOMIAL = 0x1021,
     /* requests: the three highest bits */
     WRITE_SEGMENT = 0,
     WRITE_BEGIN = 1,
@@ -48,16 +48,6 @@ enum {
     READ_BLOCK_BEGUN = 0xC6,
     READ_BLOCK_ENDS = 0xC1,
 };
-
-static RTS_UI16 get_crc(RTS_UI32 crc, const RTS_UI8 *data, RTS_UI32 size)
-{
-    for (; size > 0; size--) {
-        crc ^= (RTS_UI32)*data++ << 8;
-        for (RTS_UI32 bit = 0; bit < 8; bit++)
-            crc = (crc & 0x8000) != 0 ? crc << 1 ^ CRC_POLYNOMIAL : crc << 1;
-    }
-    return (RTS_UI16)crc;
-}
 
 /* ---- replies ---- */
 
@@ -113,7 +103,7 @@ static RTS_UI32 pass_on(CANOPEN_SLAVE *slave)
     SDO_SERVER *server = &slave->server;
     RTS_UI32 size = server->done;
 
-    server->crc = get_crc(server->crc, server->data, size);
+    server->crc = CRC16Update(server->crc, server->data, size);
     server->passed_on += size;
     server->done = 0;
     return slave->program->write(server->data, size);
@@ -392,7 +382,7 @@ static void end_block_write(CANOPEN_SLAVE *slave, const RTS_UI8 *data, RTS_UI32 
         return;
     }
     server->done -= unused;
-    if (server->has_crc && BytesGet16(data + 1) != get_crc(crc_before(server), server->data, server->done))
+    if (server->has_crc && BytesGet16(data + 1) != CRC16Update(crc_before(server), server->data, server->done))
         abort = SDO_ABORT_CRC;
     if (abort == 0)
         abort = write_value(slave, now_ms);
@@ -476,7 +466,7 @@ static void take_block_reply(CANOPEN_SLAVE *slave, const RTS_UI8 *data)
         RTS_UI32 unused = (segments == 0 ? 1 : segments) * SEGMENT - server->size;
         server->state = SERVER_BLOCK_READ_END;
         BytesPut16(reply(slave, (RTS_UI8)(READ_BLOCK_ENDS | unused << 2)) + 1,
-                   server->has_crc ? get_crc(0, server->data, server->size) : 0);
+                   server->has_crc ? CRC16Update(0, server->data, server->size) : 0);
         return;
     }
     if (data[2] == 0 || data[2] > MOST_SEGMENTS) {

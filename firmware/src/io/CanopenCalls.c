@@ -531,6 +531,9 @@ static void begin(CALL *call, RTS_UI32 now_ms)
     call->sdo.timeout_ms = call->timeout_ms != 0 ? call->timeout_ms : timeout_ms;
     call->sdo.in = call->data;
     call->sdo.room = sizeof(call->data);
+#if CANOPEN_SDO_BLOCK
+    call->sdo.burst = all.setup->lines[call->network].burst;
+#endif
     if (call->kind == KIND_READ)
         SdoClientRead(&call->sdo, call->node, call->index, call->sub, now_ms);
     else
@@ -570,9 +573,7 @@ static void follow(CALL *call, RTS_UI32 now_ms)
         SdoClientPoll(&call->sdo, now_ms);
     else if (SdoClientCancel(&call->sdo))
         be_quiet(call, now_ms);
-    if (call->sdo.has_request)
-        call->sdo.has_request = !all.send(line, &call->sdo.request);
-    if (call->sdo.has_request || call->sdo.state == SDO_BUSY)
+    if (!SdoClientSend(&call->sdo, all.send, line, now_ms) || call->sdo.state == SDO_BUSY)
         return;
     if (call->sdo.state == SDO_SILENT)
         be_quiet(call, now_ms);
@@ -759,7 +760,7 @@ static RTS_UI32 wait_of(const CALL *call, RTS_UI32 now_ms)
         return 0;
     case SLOT_ASKS:
         if (call->kind == KIND_NMT || call->sdo.has_request)
-            return AGAIN_MS;
+            return call->kind == KIND_NMT ? AGAIN_MS : SdoClientGetAgainMs(&call->sdo);
         return since_ms < call->sdo.timeout_ms ? call->sdo.timeout_ms - since_ms : 0;
     default:
         return UINT32_MAX;

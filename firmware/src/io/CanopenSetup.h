@@ -95,6 +95,9 @@ struct CANOPEN_LINE {
     bool attached;
     bool was_off;
     bool is_passive;
+#if CANOPEN_SDO_BLOCK
+    RTS_UI8 burst; /* segments of a block that are sent in a millisecond */
+#endif
     CANOPEN_DEVICE *devices;
     RTS_UI32 device_count;
     CAN_USER user;

@@ -26,6 +26,7 @@
 #if CANOPEN_MAX_DEVICES > 0
 
 enum { READ_TRIES = 4, NS_PER_MS = 1000000, EMCY_LOG_MS = 1000, OTHER_LOG_MS = 60000 };
+enum { BITS_PER_SEGMENT_MS = 140000, DEFAULT_BURST = 2 }; /* bit/s at which a segment takes a millisecond */
 
 static CANOPEN_SETUP setup;
 static bool is_running; /* between IoDrvUpdateMapping and the next configuration */
@@ -508,6 +509,16 @@ static void send_time(CANOPEN_LINE *line, RTS_UI32 now_ms)
     (void)send(line, &frame);
 }
 
+#if CANOPEN_SDO_BLOCK
+/* Segments of a block leave at about the pace of the bus, so that PDOs need not wait after a queue of them. */
+static RTS_UI8 get_burst(RTS_UI32 bit_rate)
+{
+    RTS_UI32 burst = bit_rate != 0 ? bit_rate / BITS_PER_SEGMENT_MS : DEFAULT_BURST;
+
+    return (RTS_UI8)(burst > 0 ? burst : 1);
+}
+#endif
+
 static void note_bus(CANOPEN_LINE *line, RTS_UI32 now_ms)
 {
     CAN_STATE state;
@@ -522,6 +533,11 @@ static void note_bus(CANOPEN_LINE *line, RTS_UI32 now_ms)
         if (off)
             CanopenNodeLose(&device->node, MASTER_WHY_BUS, now_ms);
     line->was_off = off;
+#if CANOPEN_SDO_BLOCK
+    line->burst = get_burst(state.bit_rate);
+    FOR_EACH_DEVICE (line, device)
+        device->node.sdo.burst = line->burst;
+#endif
     line->is_passive = state.bus == CAN_BUS_PASSIVE;
 }
 
