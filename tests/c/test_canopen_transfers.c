@@ -85,6 +85,19 @@ static void the_client_of_the_manager_takes_blocks_where_they_pay(void)
     }
 }
 
+/* Frames 6 to 15 are segments of the first block, of a write and of a read. */
+static void a_lost_segment_of_a_block_is_sent_again(void)
+{
+    for (RTS_UI32 frame = 6; frame <= 15; frame++) {
+        begin();
+        make_text(frame);
+        lost_frame = frame;
+        CHECK(write_by_client(text, 890));
+        frames = 0;
+        CHECK(read_by_client() && has_read(890));
+    }
+}
+
 static void segments_of_a_block_are_sent_at_the_pace_of_the_owner(void)
 {
     begin();
@@ -274,6 +287,7 @@ int main(void)
     RUN(every_size_is_transferred_in_blocks);
     RUN(every_size_is_transferred_by_the_client_of_the_manager);
     RUN(the_client_of_the_manager_takes_blocks_where_they_pay);
+    RUN(a_lost_segment_of_a_block_is_sent_again);
     RUN(segments_of_a_block_are_sent_at_the_pace_of_the_owner);
     RUN(one_byte_more_is_refused);
     RUN(a_request_right_after_a_block_upload_is_served);
