@@ -151,10 +151,9 @@ static void call_below(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 
 #endif
 
-RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
+void IecStackCall(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
     __atomic_store_n(&stack->running, IEC_STACK_WAITS, __ATOMIC_SEQ_CST);
     call_below(stack, fn, arg);
     __atomic_store_n(&stack->running, IEC_STACK_RUNS, __ATOMIC_SEQ_CST);
-    return IecStackBreakCode();
 }

@@ -44,9 +44,8 @@ bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
 /* Ends the running IecStackRun of this thread, from the IEC stack or from a signal handler. */
 void IecStackLeave(IEC_STACK *stack) __attribute__((noreturn));
 
-/* Calls fn(arg) on the stack of the thread, from the IEC stack. It is not IEC code: it must return, and a break that comes
- * meanwhile is for the caller to raise. Returns its code, RTSEXCPT_NOEXCEPTION without one. */
-RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
+/* Calls fn(arg) on the stack of the thread, from the IEC stack. */
+void IecStackCall(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
 
 /* The record of the calling thread, NULL without: found whatever its registers hold. Reading it in a handler never
  * allocates. */
@@ -66,8 +65,9 @@ static inline void IecStackResetFlags(void)
 #endif
 }
 
-/* In SysExcept.c: the code of a break of the running SysExceptTry of this thread that came while no IEC code ran. */
-RTS_UI32 IecStackBreakCode(void);
+/* In SysExcept.c: IecStackCall of what is not IEC code. It must return. Returns the code of an abort of the running
+ * SysExceptTry that came during the call, for the caller to raise; RTSEXCPT_NOEXCEPTION without one. */
+RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
 
 /* In SysExcept.c, for the handler of a signal that ends the process: the last address of the application's code that the
  * calling thread was at, 0 when it is not in IEC code. *arg: what its latest SysExceptTry was called with, NULL when it

@@ -344,9 +344,12 @@ static bool is_broken(const CONTEXT *context)
     return __atomic_load_n(&context->break_round, __ATOMIC_SEQ_CST) == context->round;
 }
 
-RTS_UI32 IecStackBreakCode(void)
+RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
-    const CONTEXT *context = self();
+    const CONTEXT *context;
+
+    IecStackCall(stack, fn, arg);
+    context = self();
     return is_broken(context) ? context->break_code : (RTS_UI32)RTSEXCPT_NOEXCEPTION;
 }
 

@@ -380,11 +380,6 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
     __builtin_unreachable();
 }
 
-RTS_UI32 IecStackBreakCode(void)
-{
-    return __atomic_load_n(&self()->break_code, __ATOMIC_SEQ_CST);
-}
-
 RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
     CONTEXT_OF_THREAD *context = (CONTEXT_OF_THREAD *)stack;
@@ -392,7 +387,7 @@ RTS_UI32 IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
     set_running(context, IEC_STACK_WAITS);
     SwitchToFiber(context->own);
     set_running(context, IEC_STACK_RUNS);
-    return IecStackBreakCode();
+    return __atomic_load_n(&self()->break_code, __ATOMIC_SEQ_CST);
 }
 
 static bool runs(const CONTEXT_OF_THREAD *context, const void *arg)
