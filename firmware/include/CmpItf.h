@@ -91,7 +91,7 @@ enum {
     CMPID_RunLamp = 0x0028,
     CMPID_IoDrvSysfs = 0x0029,
     CMPID_CmpFileTransfer = 0x002A,
-    CMPID_SimModbus = 0x002B,
+    CMPID_SimBuses = 0x002B,
     CMPID_CmpForce = 0x002C,
     CMPID_CmpTraceMgr = 0x0030,
     CMPID_CmpTraceSrv = 0x0031,

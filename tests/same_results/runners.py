@@ -26,14 +26,18 @@ _PORTABLE = [
     for source in sorted((FIRMWARE / "src" / folder).glob("*.c"))
     if source.name not in _ALTERNATIVES
 ]
+_OF_SIMULATOR = (
+    *("SimBench.c", "SimClock.c", "SimEvent.c", "SimMain.c", "SimNet.c", "SimPower.c", "SimRun.c", "SimSram.c"),
+    *("SimStart.c", "SimTarget.c", "SimTimers.c"),
+)
 _BARE_SOURCES = [
     *_PORTABLE,
-    *(FIRMWARE / "port/sim" / name for name in ("Sim.c", "SimEvent.c", "SimNet.c", "SimSram.c", "SimTarget.c")),
+    *(FIRMWARE / "port/sim" / name for name in _OF_SIMULATOR),
     FIRMWARE / "port/baremetal/common/CmpCompilerCalls.c",
     FIRMWARE / "port/baremetal/blank/SysAtomic.c",  # nothing here can come in between
     *(HERE / "bare").glob("*.c"),
 ]
-_OF_PLCTOOL = ("SimBoards.c", "SimCanBus.c", "SimCanopen.c", "SimModbus.c", "SimWire.c")
+_OF_PLCTOOL = ("SimBoards.c", "SimBuses.c", "SimCanBus.c", "SimCanopen.c", "SimModbus.c", "SimWire.c")
 _HOSTED_SOURCES = [
     *_PORTABLE,
     *(FIRMWARE / "src").glob("comm/*.c"),

@@ -8,8 +8,8 @@
 #include <string.h>
 
 #include "CmpSrvNumbers.h"
+#include "SimTimes.h"
 
-#define NEVER INT64_MAX
 #define NS_PER_S 1000000000
 
 enum {

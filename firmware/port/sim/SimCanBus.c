@@ -1,5 +1,5 @@
 /*
- * SimCanBus.c - the CAN bus of the simulator (SimCan.h), on the clock of Sim.c.
+ * SimCanBus.c - the CAN bus of the simulator (SimCan.h), on the virtual clock.
  *
  * SPDX-License-Identifier: Apache-2.0
  *

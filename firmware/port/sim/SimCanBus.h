@@ -1,5 +1,5 @@
 /*
- * SimCanBus.h - the CAN bus of the simulator, on the clock of Sim.c.
+ * SimCanBus.h - the CAN bus of the simulator, on the virtual clock.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -14,9 +14,8 @@
 #include "CmpBytes.h"
 #include "IoDrvSim.h"
 #include "SimCan.h"
+#include "SimTimes.h"
 
-#define NEVER INT64_MAX
-#define NS_PER_MS ((RTS_I64)1000000)
 #define BOOT_NS (50 * NS_PER_MS)
 #define REPLY_NS ((RTS_I64)200000)
 

@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "Sim.h"
+#include "SimPower.h"
 #include "SysFlash.h"
 #include "rts_config.h"
 #include "sim_port.h"

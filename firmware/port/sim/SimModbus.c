@@ -7,20 +7,16 @@
  * that were written to it, by the program or by SimModbusSet; it refuses to read others (MODBUS_ILLEGAL_ADDRESS). Of a
  * server, which this device is, a test is the client: its memory is written and read at once.
  */
+#include "SimModbus.h"
+
 #include <string.h>
 
 #include "../../src/io/ModbusCalls.h"
-#include "../../src/io/CanopenDeviceDriver.h"
 #include "../../src/io/ModbusDriver.h"
-#include "AppState.h"
-#include "CmpEventMgr.h"
 #include "CmpIoMgrEmbedded.h"
 #include "IoDrvModbus.h"
 #include "IoDrvSim.h"
-#include "Sim.h"
-#include "SimCanBus.h"
-#include "SimCanopen.h"
-#include "SimWire.h"
+#include "SimTimes.h"
 #include "SysTime.h"
 #include "sim_port.h"
 
@@ -28,7 +24,6 @@ enum { VALUES = 0x20000 }; /* twice as many as the areas of a program have bits 
 RTS_STATIC_ASSERT(2 * 8 * (APP_INPUT_SIZE + APP_OUTPUT_SIZE) <= VALUES, a_description_does_not_fill_the_table);
 
 #define REPLY_NS ((RTS_I64)2000000) /* before a device replies, besides silence */
-#define NS_PER_MS ((RTS_I64)1000000)
 
 typedef struct {
     RTS_UI8 device; /* its number + 1; 0: the entry is free */
@@ -401,27 +396,19 @@ static RTS_RESULT set_region(const IoConfigConnector *connector, const REGION *r
     return result;
 }
 
-static RTS_RESULT set_place(const IoConfigConnector *connector, const SIM_IO_PLACE *place, const RTS_UI8 *data)
+RTS_RESULT SimModbusSetPlace(const IoConfigConnector *connector, const SIM_IO_PLACE *place, const RTS_UI8 *data)
 {
     REGION region;
     RTS_RESULT result = find_region(connector, place, &region);
 
-    if (result == ERR_OK)
-        return set_region(connector, &region, place, data);
-    if (result == ERR_NOT_SUPPORTED)
-        result = IoDrvCanopenDeviceSet(connector, place->parameter, place->bit, place->bits, data);
-    return result == ERR_NOT_SUPPORTED ? SimCanopenSet(connector, place, data) : result;
+    return result == ERR_OK ? set_region(connector, &region, place, data) : result;
 }
 
-static RTS_RESULT get_place(const IoConfigConnector *connector, const SIM_IO_PLACE *place, RTS_UI8 *data)
+RTS_RESULT SimModbusGetPlace(const IoConfigConnector *connector, const SIM_IO_PLACE *place, RTS_UI8 *data)
 {
     REGION region;
     RTS_RESULT result = find_region(connector, place, &region);
 
-    if (result == ERR_NOT_SUPPORTED) {
-        result = IoDrvCanopenDeviceGet(connector, place->parameter, place->bit, place->bits, data);
-        return result == ERR_NOT_SUPPORTED ? SimCanopenGet(connector, place, data) : result;
-    }
     if (result == ERR_OK)
         memset(data, 0, (place->bits + 7) / 8);
     for (RTS_UI32 i = 0; result == ERR_OK && i < place->bits; i++)
@@ -439,31 +426,30 @@ static bool is_line(const IoConfigConnector *connector)
 }
 
 /* A line can only be pulled, which is that it is absent. A server here has no client that could fail. */
-static RTS_RESULT set_fault(const IoConfigConnector *connector, RTS_UI32 fault, RTS_UI32 value)
+RTS_RESULT SimModbusFail(const IoConfigConnector *connector, RTS_UI32 fault, RTS_UI32 value)
 {
     const MODBUS_PLACE place = ModbusFindPlace(setup(), connector);
 
     if (place.server != NULL)
         return ERR_NO_OBJECT;
     if (place.device == NULL && !is_line(connector))
-        return SimCanopenFail(connector, fault, value);
+        return ERR_NOT_SUPPORTED;
     if (fault - IO_SIM_ABSENT >= IO_SIM_FAULTS || (place.device == NULL && fault != IO_SIM_ABSENT))
         return ERR_NO_OBJECT;
     *fault_of(connector, fault) = value;
     return ERR_OK;
 }
 
-static RTS_I64 due_ns(RTS_I64 now_ns)
+RTS_I64 SimModbusGetDueNs(RTS_I64 now_ns)
 {
-    RTS_I64 due = SimWireGetDueNs(now_ns);
+    RTS_I64 due_ns = NEVER;
 
     for (RTS_UI32 i = 0; i < setup()->client_count; i++) {
         RTS_I64 of_client = ModbusClientGetDueNs(&setup()->clients[i].client, now_ns);
-        if (of_client < due)
-            due = of_client;
+        if (of_client < due_ns)
+            due_ns = of_client;
     }
-    RTS_I64 of_can = SimCanBusGetDueNs(now_ns);
-    return of_can < due ? of_can : due;
+    return due_ns;
 }
 
 /* ---- configurations ---- */
@@ -474,20 +460,16 @@ static void add_zeros(RTS_UI32 device, RTS_UI8 table, RTS_UI32 address, RTS_UI32
         (void)set_value(device, table, address + i, 0);
 }
 
-static void forget(EVENT_PARAM *event)
+void SimModbusForget(void)
 {
-    RTS_UNUSED(event);
     if (has_values)
         memset(values, 0, sizeof(values));
     has_values = false;
-    SimCanopenForget();
     memset(faults, 0, sizeof(faults));
 }
 
-static void make_devices(EVENT_PARAM *event)
+void SimModbusMake(void)
 {
-    RTS_UNUSED(event);
-    SimCanopenMake(SysTimeGetNs());
     for (RTS_UI32 i = 0; i < setup()->device_count; i++) {
         const MODBUS_DEVICE *device = &setup()->devices[i];
         for (RTS_UI32 k = 0; k < device->job_count; k++) {
@@ -500,25 +482,8 @@ static void make_devices(EVENT_PARAM *event)
 }
 
 /* Elsewhere a pass comes before the next request of a tool; here virtual time may stand still. */
-static void cancel(EVENT_PARAM *event)
+void SimModbusCancel(void)
 {
-    RTS_UNUSED(event);
     if (setup()->client_count != 0)
         ModbusCallsPoll(false, SysTimeGetNs());
-}
-
-RTS_RESULT SimModbus_Hook(CMP_HOOK hook)
-{
-    static const SIM_BUS bus = {SimWireOpen,    SimWireClose,     SimWireRead,        SimWireWrite,
-                                SimWireDiscard, SimWireGetByteNs, set_place,          get_place,
-                                set_fault,      due_ns,           SimCanBusGetNextNs, SimCanBusRun};
-
-    if (hook == CH_INIT)
-        SimBus = &bus;
-    if (hook == CH_INIT2) {
-        (void)EventRegisterCallback(CMPID_CmpIoMgrEmbedded, EVT_PrepareUpdateConfiguration, forget, NULL);
-        (void)EventRegisterCallback(CMPID_CmpIoMgrEmbedded, EVT_DoneUpdateConfiguration, make_devices, NULL);
-        (void)EventRegisterCallback(CMPID_CmpAppEmbedded, EVT_StopDone, cancel, NULL);
-    }
-    return ERR_OK;
 }

@@ -36,7 +36,8 @@ static struct {
     pid_t process;     /* whose thread it is: a fork does not have it */
     RTS_UI32 runtimes; /* started in this process */
     RTS_UI32 limit_ms;
-} supervisor = {0, 0, SIM_CYCLE_LIMIT_MS};
+    RTS_UI32 is_held; /* main serves a task that waits for it */
+} supervisor = {0, 0, SIM_CYCLE_LIMIT_MS, false};
 
 static RTS_I64 processor_ms(void)
 {
@@ -54,7 +55,8 @@ static void look(RTS_UI32 index, SEEN *seen)
     if (!IecTaskReadGuard(index, &guard) || AppBpIsHalted() || runtime != seen->runtime ||
         guard.serial != seen->serial || guard.start_ns != seen->start_ns) {
         *seen = (SEEN){runtime, guard.serial, guard.start_ns, processor_ms()};
-    } else if (processor_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms) && !SimIsServing()) {
+    } else if (processor_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms) &&
+               !SysAtomicLoad(&supervisor.is_held)) {
         SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
     }
 }
@@ -102,7 +104,7 @@ void SimSuperviseStart(void)
     }
 }
 
-void SimSignalsHold(bool hold)
+static void hold_signals(bool hold)
 {
 #ifdef _WIN32
     RTS_UNUSED(hold); /* there, SysExceptBreak() stops the thread instead */
@@ -113,6 +115,15 @@ void SimSignalsHold(bool hold)
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, hold ? &all : &before, hold ? &before : NULL);
 #endif
+}
+
+void SimSuperviseHold(bool hold)
+{
+    if (hold)
+        hold_signals(true);
+    SysAtomicStore(&supervisor.is_held, hold);
+    if (!hold)
+        hold_signals(false);
 }
 
 void SimSetCycleLimit(RTS_UI32 ms)

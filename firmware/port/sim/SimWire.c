@@ -10,6 +10,8 @@
 #include "ModbusLink.h"
 #include "ModbusPdu.h"
 #include "ModbusRtu.h"
+#include "SimModbus.h"
+#include "SimTimes.h"
 #include "SysSocket.h"
 #include "SysTime.h"
 #include "rts_config.h"
@@ -22,7 +24,6 @@ enum {
     LEAST_FRAME = MODBUS_AT_PDU + 1,
 };
 
-#define NEVER INT64_MAX
 #define LONG_AGO_NS (-(RTS_I64)1000000000)
 #define NS_PER_S ((RTS_I64)1000000000)
 #define LEAST_SILENCE_NS ((RTS_I64)1750000)

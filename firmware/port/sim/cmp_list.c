@@ -43,7 +43,7 @@
 #define HAS_CmpCanopenProgram CANOPEN_PROGRAM_DOWNLOAD
 #define HAS_CmpCan 1
 #define HAS_IecCan 1
-#define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim) X(SimModbus)
+#define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim) X(SimBuses)
 #define PORT_SYSTEM(X) X(SimCanBus)
 #else
 #define PORT_COMPONENTS(X) COMPILER_CALLS(X) X(SysSim)

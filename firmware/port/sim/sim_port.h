@@ -12,13 +12,11 @@
 #include "Sim.h"
 #include "SysCom.h"
 
-/* Power goes off now: back to the Sim* function that runs the runtime. Returns when there is none. */
-void SimPowerCut(void);
-
 /* Power on: forget what RAM and pins held. */
 RTS_RESULT SimFlashPowerOn(void);
 void SimComPowerOn(void);
 void SimNetPowerOn(void);
+void SimRunStart(void);
 
 /* Maps new memory at two addresses, NULL where that fails; munmap takes each of them back. Shared with child processes. */
 bool SimMapTwice(RTS_UI32 size, RTS_UI8 **first, RTS_UI8 **second);
@@ -26,8 +24,8 @@ bool SimMapTwice(RTS_UI32 size, RTS_UI8 **first, RTS_UI8 **second);
 /* Starts the thread that aborts endless loops, once per process. */
 void SimSuperviseStart(void);
 
-/* Keeps all signals from this thread, and lets those through again that it had before. */
-void SimSignalsHold(bool hold);
+/* Holds back what aborts a cycle, and all signals of this thread; then lets through again what it had before. */
+void SimSuperviseHold(bool hold);
 
 /* A mutex as on Linux, for what it costs. */
 void SimMutexLock(void);
@@ -65,10 +63,7 @@ typedef struct {
 } SIM_BUS;
 
 extern const SIM_BUS *SimBus;
-RTS_RESULT SimModbus_Hook(CMP_HOOK hook);
+RTS_RESULT SimBuses_Hook(CMP_HOOK hook);
 RTS_RESULT SimCanBus_Hook(CMP_HOOK hook);
-
-/* True while a task that waits for main does its work. From any thread. */
-bool SimIsServing(void);
 
 #endif

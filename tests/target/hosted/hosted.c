@@ -57,7 +57,7 @@ void SysExceptShutdown(void)
 {
 }
 
-void SimSignalsHold(bool hold)
+void SimSuperviseHold(bool hold)
 {
     RTS_UNUSED(hold);
 }

@@ -100,7 +100,7 @@ void SimLinkReset(void)
 {
 }
 
-void SimSignalsHold(bool hold)
+void SimSuperviseHold(bool hold)
 {
     RTS_UNUSED(hold);
 }
