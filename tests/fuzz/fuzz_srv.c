@@ -54,105 +54,105 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
     (void)capacity;
     switch (index) {
     case 0:
-        return SEED(1, 1, "\x01\x0C\0\x10\0\0\x02\0\x01\0\0\0\0\0");
+        return SEED(SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, "\x01\x0C\0\x10\0\0\x02\0\x01\0\0\0\0\0");
     case 1:
-        return SEED(1, 2, "\x22\x02\x01\x00\x81\x01\x04\x10\x02\x00\x00");
+        return SEED(SG_DEVICE, SRV_DEV_LOGIN, "\x22\x02\x01\x00\x81\x01\x04\x10\x02\x00\x00");
     case 2:
-        return SEED(1, 3, "\x01\x04" "SSSS");
+        return SEED(SG_DEVICE, SRV_DEV_LOGOUT, "\x01\x04" "SSSS");
     case 3:
-        return SEED(1, 5, "\x52\x04\x10\0\0\0\x53\x03" "abc");
+        return SEED(SG_DEVICE, SRV_DEV_ECHO, "\x52\x04\x10\0\0\0\x53\x03" "abc");
     case 4:
-        return SEED(1, 10, "\x46\x84\x80\x00\x03\0\0\0");
+        return SEED(SG_DEVICE, SRV_DEV_SESSION_CREATE, "\x46\x84\x80\x00\x03\0\0\0");
     case 5:
-        return SEED(2, 1, "\x01\x0B" "Application");
+        return SEED(SG_APPLICATION, SRV_APP_LOGIN, "\x01\x0B" "Application");
     case 6:
-        return SEED(2, 3, "\x81\x01\x90\x00\x10\x0E" "Application\0\0");
+        return SEED(SG_APPLICATION, SRV_APP_CREATE, "\x81\x01\x90\x00\x10\x0E" "Application\0\0");
     case 7:
-        return SEED(2, 0x10, "\x81\x01\x06\x11\x04" "SSSS");
+        return SEED(SG_APPLICATION, SRV_APP_START, "\x81\x01\x06\x11\x04" "SSSS");
     case 8:
-        return SEED(2, 0x12, "\x81\x01\x0C\x11\x04" "SSSS" "\x10\x04\x01\0\0\0");
+        return SEED(SG_APPLICATION, SRV_APP_RESET, "\x81\x01\x0C\x11\x04" "SSSS" "\x10\x04\x01\0\0\0");
     case 9:
-        return SEED(2, 0x14, "\x81\x01\x06\x11\x04" "SSSS");
+        return SEED(SG_APPLICATION, SRV_APP_READ_STATUS, "\x81\x01\x06\x11\x04" "SSSS");
     case 10:
-        return SEED(2, 0x18, "\x01\x08\0\0\0\0\xFF\xFF\xFF\x7F");
+        return SEED(SG_APPLICATION, SRV_APP_READ_APPLICATION_LIST, "\x01\x08\0\0\0\0\xFF\xFF\xFF\x7F");
     case 11:
-        return SEED(2, 0x29, "");
+        return SEED(SG_APPLICATION, SRV_APP_READ_APPLICATION_INFO, "");
     case 12:
-        return SEED(2, 0x30, POSITION "\x03\x10" "0123456789abcdef");
+        return SEED(SG_APPLICATION, SRV_APP_DOWNLOAD_COMPACT, POSITION "\x03\x10" "0123456789abcdef");
     case 13:
-        return SEED(2, 0x70, "");
+        return SEED(SG_APPLICATION, SRV_APP_READ_TASK_INFO, "");
     case 14:
-        return SEED(0x1B, 1, APP "\x81\x01\x1E" "\x82\x01\x0A\x02\x01\x04\x05\x05\x02\x10\x00\x06\x00"
+        return SEED(SG_MONITORING2, SRV_MON2_READ, APP "\x81\x01\x1E" "\x82\x01\x0A\x02\x01\x04\x05\x05\x02\x10\x00\x06\x00"
                                  "\x82\x01\x0E\x01\x01\x07\x02\x01\x08\x05\x07\x03\x10\x00\x00\x00\x06\x01");
     case 15:
-        return SEED(0x1B, 2, APP "\x03\x0E" "\0\0\x01\0\0\0\x55\x05\x00\x02\x10\x00\x06\x00");
+        return SEED(SG_MONITORING2, SRV_MON2_WRITE, APP "\x03\x0E" "\0\0\x01\0\0\0\x55\x05\x00\x02\x10\x00\x06\x00");
     case 16:
-        return SEED(0x1B, 2, APP "\x03\x25" "\0\0\x02\0\0\0\x55\xAA\x1B\x00"
+        return SEED(SG_MONITORING2, SRV_MON2_WRITE, APP "\x03\x25" "\0\0\x02\0\0\0\x55\xAA\x1B\x00"
                                  "\x15\x0C\x00\x02\x10\x00\x06\x00\x17\x0C\x09\x04\x1B\x06\x00\x01\x00\x00"
                                  "\x17\x04\x09\x04\x17\x08\x09\x04\x04");
     case 17:
-        return SEED(5, 1, "\x02\x04\x01\0\0\0\x04\x04\x10\0\0\0");
+        return SEED(SG_LOG, SRV_LOG_GET_ENTRIES, "\x02\x04\x01\0\0\0\x04\x04\x10\0\0\0");
     case 18:
-        return SEED(0x1B, 1, APP "\x81\x01\x1B" "\x82\x01\x18\x02\x01\x04\x05\x13\x02\x10\x00\x06\x00"
+        return SEED(SG_MONITORING2, SRV_MON2_READ, APP "\x81\x01\x1B" "\x82\x01\x18\x02\x01\x04\x05\x13\x02\x10\x00\x06\x00"
                                  "\x09\x08\x02\x20\x00\x0E\x09\x08\x03\x04\x00\x00\x00\x0E");
     case 21:
-        return SEED(0x0C, 0x0C, "\x60\x34" "0123456789abcdef0123456789abcdef" "0123456789abcdef" "\x88\x13\0\0");
+        return SEED(SG_USERMGR, SRV_USER_SET_CREDENTIALS, "\x60\x34" "0123456789abcdef0123456789abcdef" "0123456789abcdef" "\x88\x13\0\0");
     case 22:
     case 23: {
-        size_t size = SEED(1, 2, "\x22\x02\0\x01" "\x62\x30" "0123456789abcdef" "0123456789abcdef0123456789abcdef");
+        size_t size = SEED(SG_DEVICE, SRV_DEV_LOGIN, "\x22\x02\0\x01" "\x62\x30" "0123456789abcdef" "0123456789abcdef0123456789abcdef");
         data[1] |= HAS_PASSWORD;
         return index == 22 ? size : HEAD + 4;
     }
     case 20:
-        return SEED(0x11, 1, "\x13\x04\x01\0\0\0\x10\x02" "?\0");
+        return SEED(SG_PLCSHELL, SRV_SHELL_EXECUTE, "\x13\x04\x01\0\0\0\x10\x02" "?\0");
     case 19:
-        return SEED(0x1B, 2, APP "\x03\x14" "\0\0\x01\0\0\0\x55\x0B\x00\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E");
+        return SEED(SG_MONITORING2, SRV_MON2_WRITE, APP "\x03\x14" "\0\0\x01\0\0\0\x55\x0B\x00\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E");
     case 24:
-        return SEED(1, 9, "\x58\x08" "M\0i\0x\0\0\0");
+        return SEED(SG_DEVICE, SRV_DEV_SET_NODE_NAME, "\x58\x08" "M\0i\0x\0\0\0");
     case 25:
-        return SEED(2, 0x22, "\x81\x01\x06\x11\x04" "SSSS");
+        return SEED(SG_APPLICATION, SRV_APP_SINGLE_CYCLE, "\x81\x01\x06\x11\x04" "SSSS");
     case 26:
-        return SEED(2, 0x38, "\x11\x04" "SSSS" "\x13\x04\x01\0\0\0");
+        return SEED(SG_APPLICATION, SRV_APP_GET_AREA_ADDRESS, "\x11\x04" "SSSS" "\x13\x04\x01\0\0\0");
     case 27:
-        return SEED(0x1B, 2, APP "\x03\x23" "\0\0\x02\0\0\0\x55\xAA\x1B\x00"
+        return SEED(SG_MONITORING2, SRV_MON2_WRITE, APP "\x03\x23" "\0\0\x02\0\0\0\x55\xAA\x1B\x00"
                                  "\x15\x10\x00\x02\x10\x00\x06\x00\x17\x10\x09\x04\x1B\x06\x00\x01\x00\x00"
                                  "\x17\x08\x09\x08\x17\x0C\x09\x04\x04");
     case 28:
-        return SEED(6, 2, "\x81\x01\x08\x10\x02" "A\0" "\x11\x02" "B\0");
+        return SEED(SG_SETTINGS, SRV_SETTG_SET_INT, "\x81\x01\x08\x10\x02" "A\0" "\x11\x02" "B\0");
     case 29:
-        return SEED(0x1B, 3, APP "\x03\x2E" "\xFF\xFF\x01\0\0\0\x55\x05\x00\x02\x10\x00\x06\x00"
+        return SEED(SG_MONITORING2, SRV_MON2_FORCE, APP "\x03\x2E" "\xFF\xFF\x01\0\0\0\x55\x05\x00\x02\x10\x00\x06\x00"
                                  "\xFF\xFF\x01\0\0\0\x04\x07\x00\x02\x20\x00\x06\x00\x40\x04"
                                  "\0\0\x01\0\0\0\x55\x05\x00\x02\x10\x00\x06\x00");
     case 30:
-        return SEED(0x1B, 3, APP "\x03\x14" "\xFF\xFF\x01\0\0\0\x55\x0B\x00\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E");
+        return SEED(SG_MONITORING2, SRV_MON2_FORCE, APP "\x03\x14" "\xFF\xFF\x01\0\0\0\x55\x0B\x00\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E");
     case 31:
-        return SEED(0x1B, 0x60, APP "\x46\x04\0\0\0\0");
+        return SEED(SG_MONITORING2, SRV_MON2_FORCE_LIST, APP "\x46\x04\0\0\0\0");
     case 32:
-        return SEED(2, 0x20, "\x81\x01\x06\x11\x04" "SSSS");
+        return SEED(SG_APPLICATION, SRV_APP_RELEASE_FORCE_LIST, "\x81\x01\x06\x11\x04" "SSSS");
     case 33:
-        return SEED(0x60, 1, "\x01\x68" "\x4F\x3E\x2D\x1C" "pump\0\0\0\0\0\0\0\0\0\0\0\0" "\x02\x04\0\x02" "\x01\0\0\0" "\x20\0\0\0" "\x04\0\0\0" "\5\0\0\0\0\0\0\0"
+        return SEED(SG_TRACE, SRV_TRACE_CREATE, "\x01\x68" "\x4F\x3E\x2D\x1C" "pump\0\0\0\0\0\0\0\0\0\0\0\0" "\x02\x04\0\x02" "\x01\0\0\0" "\x20\0\0\0" "\x04\0\0\0" "\5\0\0\0\0\0\0\0"
                          "\000\0\x04\xFF" "\x10\0\0\0" "\0\0\0\0\0\0\0\0\0\0\0\0"
                          "\001\0\x04\xFF" "\x10\0\0\0" "\0\0\0\0\0\0\0\0\0\0\0\0"
                          "\376\0\x04\xFF" "\4\0\0\0" "\0\0\0\0\0\0\0\0\0\0\0\0");
     case 34:
-        return SEED(0x60, 2, "\x02\x04\x01\0\0\0");
+        return SEED(SG_TRACE, SRV_TRACE_DELETE, "\x02\x04\x01\0\0\0");
     case 35:
-        return SEED(0x60, 3, "\x02\x04\0\0\0\0");
+        return SEED(SG_TRACE, SRV_TRACE_LIST, "\x02\x04\0\0\0\0");
     case 36:
-        return SEED(0x60, 4, "\x02\x04\x01\0\0\0" "\x03\x04\0\0\0\0");
+        return SEED(SG_TRACE, SRV_TRACE_READ, "\x02\x04\x01\0\0\0" "\x03\x04\0\0\0\0");
     case 37:
-        return SEED(0x12, 0x63, "\x04\x2C" "\x10\0\0\0\x02\0\0\0\0\0\0\0\x03\x01\0\0\0\x01\x04\xFF"
+        return SEED(SG_APPLICATION_BP, SRV_BP_SET, "\x04\x2C" "\x10\0\0\0\x02\0\0\0\0\0\0\0\x03\x01\0\0\0\x01\x04\xFF"
                                 "\x10\0\0\0\x04\0\0\0\0\0\0\0\0\0\0\0\x05\0\0\0\0\0\0\0");
     case 38:
-        return SEED(0x12, 0x66, "\x07\x08\x10\0\0\0\x20\0\0\0" "\x08\x04\x01\0\0\0");
+        return SEED(SG_APPLICATION_BP, SRV_BP_TEMPORARY, "\x07\x08\x10\0\0\0\x20\0\0\0" "\x08\x04\x01\0\0\0");
     case 39:
-        return SEED(0x12, 0x67, "\x09\x04\x01\0\0\0" "\x0A\x04\0\0\0\0");
+        return SEED(SG_APPLICATION_BP, SRV_BP_GO, "\x09\x04\x01\0\0\0" "\x0A\x04\0\0\0\0");
     case 40:
-        return SEED(0x12, 0x69, "\x0B\x04\x08\0\0\0" "\x0C\x04\x10\0\0\0");
+        return SEED(SG_APPLICATION_BP, SRV_BP_READ_STACK, "\x0B\x04\x08\0\0\0" "\x0C\x04\x10\0\0\0");
     case 41:
-        return SEED(0x12, 0x6A, "\x0B\x04\x08\0\0\0" "\x0D\x04" "abcd");
+        return SEED(SG_APPLICATION_BP, SRV_BP_WRITE_STACK, "\x0B\x04\x08\0\0\0" "\x0D\x04" "abcd");
     case 42:
-        return SEED(0x12, 0x65, "\x06\x04\0\0\0\0");
+        return SEED(SG_APPLICATION_BP, SRV_BP_LIST, "\x06\x04\0\0\0\0");
     default:
         return seed_of_service(index - CONTENTS, data);
     }
