@@ -1,10 +1,12 @@
 """For all groups: names are asked for on loopback only; controllers, which are processes of a machine that may be busy,
-get three times as long to reply; and how hypothesis works. What it measures by the clock is no failure, so that load
-cannot decide. A property is tried with the same inputs at each run, so that a failure comes from the change that is
-tested, and fewer than in `make test-whole`; `make properties` tries new ones (--hypothesis-profile=new)."""
+get three times as long to reply; reports say what each test took of processors; and how hypothesis works. What it
+measures by the clock is no failure, so that load cannot decide. A property is tried with the same inputs at each run,
+so that a failure comes from the change that is tested, and fewer than in `make test-whole`; `make properties` tries new
+ones (--hypothesis-profile=new)."""
 
 import os
 
+import pytest
 from hypothesis import HealthCheck, settings
 from shares import WHOLE
 
@@ -17,3 +19,24 @@ settings.register_profile(
 )
 settings.register_profile("same", settings.get_profile("new"), derandomize=True, max_examples=100 if WHOLE else 20)
 settings.load_profile("same")
+
+BEGIN = pytest.StashKey[float]()
+
+
+def processor_time() -> float:
+    """Returns the processor time of this process and of those it has waited for [s]."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> object:
+    item.stash[BEGIN] = processor_time()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> object:
+    """Puts it into the report, which tests/run_all.py reads; a fixture belongs to the first test that asks for it."""
+    if call.when == "teardown":
+        item.user_properties.append(("processors", f"{processor_time() - item.stash[BEGIN]:.2f}"))
+    return (yield)

@@ -9,6 +9,8 @@ the same environment are one, too: most of their time is the start of Python.
 C tests count as one test each; pytest suites are counted by their own tests, from the JUnit files they leave. What a
 process printed is in meson-logs/, and here if it failed.
 
+The Python tests that took most of the processors are listed: where `make test` is to be made faster.
+
 At the end the tests that failed run once more, one after the other, with nothing beside them. A test that passes then
 is listed as FLAKY and does not fail the run: a race is mended, but it does not cost the work that it came with.
 """
@@ -32,21 +34,24 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 C_TESTS_SECONDS = 60  # of one folder, about
-SHORT_SECONDS = 20  # shorter tests of a board share a process
+SHORT_SECONDS = 40  # shorter tests of a board share a process
 SKIPPED = 77  # exit status, as for meson: there was nothing that could be tested
 LOOK_EVERY = 0.02  # for processes that ended [s]
+LISTED = 20  # tests that took most
 MOST_REPEATED = 8  # tests that failed; if there are more, the change has broken something
 
 
 @dataclass
 class Outcome:
     """Of some tests: their number by outcome, and the first line of each failure, and of the reason of each skip, after
-    the name of the test. `failed`: the arguments with which the runner of the tests repeats those that failed."""
+    the name of the test. `failed`: the arguments with which the runner of the tests repeats those that failed. `used`:
+    seconds of processors and name of each test whose report has them."""
 
     counts: Counter[str]
     failures: list[str]
     skips: list[str]
     failed: list[str] = field(default_factory=list)
+    used: list[tuple[float, str]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -142,7 +147,12 @@ def pytest_outcome(report: Path) -> Outcome:
         case for case in suite.iter("testcase") if case.find("failure") is not None or case.find("error") is not None
     ]
     names = dict.fromkeys(_node_id(case.get("classname", ""), case.get("name", "")) for case in wrong)
-    return Outcome(counts, messages("failure", "error"), messages("skipped"), list(names))
+    used = [
+        (float(found.get("value", "0")), f"{case.get('classname')}::{case.get('name')}")
+        for case in suite.iter("testcase")
+        for found in case.iterfind("properties/property[@name='processors']")
+    ]
+    return Outcome(counts, messages("failure", "error"), messages("skipped"), list(names), used)
 
 
 def _node_id(classname: str, name: str) -> str:
@@ -260,6 +270,11 @@ def run(jobs: Iterable[Job], at_once: int) -> Iterator[Done]:
             left.kill()
 
 
+def most_used(tests: list[tuple[float, str]]) -> list[tuple[float, str]]:
+    """Returns the tests that took most of the processors, the greatest first."""
+    return sorted(tests, reverse=True)[:LISTED]
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--meson", required=True)
@@ -278,6 +293,7 @@ def main() -> int:
     jobs.sort(key=lambda job: -job.seconds)
     begin, used, counts, lines, failed = time.monotonic(), 0.0, Counter[str](), list[str](), list[Done]()
     broken: dict[str, list[str]] = {}
+    tests: list[tuple[float, str]] = []
     for number, done in enumerate(run(jobs, args.jobs), 1):
         outcome = done.outcome
         result = "ok" if done.is_good else "failed"
@@ -289,6 +305,7 @@ def main() -> int:
             print(done.job.output.read_text(errors="replace"), flush=True)
             failed.append(done)
         used += done.used
+        tests += [(seconds, f"{done.job.name}: {test}") for seconds, test in outcome.used]
         counts += outcome.counts
         lines += [f"SKIPPED {done.job.name}: {skip}" for skip in outcome.skips]
         if done.is_good:
@@ -301,6 +318,7 @@ def main() -> int:
                 lines += [f"FLAKY {failure}" for failure in flaky]
                 counts += Counter(passed=len(flaky), flaky=len(flaky), failed=-len(flaky))
     lines += [f"FAILED {failure}" for failures in broken.values() for failure in failures]
+    print(*(f"MOST {seconds:.1f} s of processors: {test}" for seconds, test in most_used(tests)), sep="\n")
     print(*sorted(lines, reverse=True), sep="\n")
     print(f"{time.monotonic() - begin:.0f} s, {used:.0f} s of processors")
     print(f"{counts['passed']} passed, {counts['failed']} failed, {counts['skipped']} skipped, {counts['flaky']} flaky")

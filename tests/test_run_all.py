@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from run_all import ROOT, Done, Job, command_of, processes, repeat, repetition, run
+from run_all import ROOT, Done, Job, command_of, most_used, processes, repeat, repetition, run
 
 FOLDER = ROOT / "tests" / "c"  # below tests, but in none of the suites that run beside this one
 
@@ -86,3 +86,14 @@ def test_short_tests_of_a_board_with_the_same_environment_are_one_process(tmp_pa
         ["test_c.py"],
     ]
     assert commands[0][-1] == f"--junit-xml={tmp_path / 'report.xml'}"
+
+
+def test_the_tests_that_take_most_of_the_processors_are_known(test_file: Path, tmp_path: Path) -> None:
+    busy = "import subprocess, sys, time\nWORK = 'import time\\nwhile time.process_time() < 0.3: pass'\n"
+    own = "def test_own():\n    end = time.process_time() + 0.15\n    while time.process_time() < end: pass\n"
+    child = "def test_child():\n    subprocess.run([sys.executable, '-c', WORK], check=True)\n"
+    test_file.write_text(f"{busy}def test_waits():\n    time.sleep(0.3)\n{own}{child}")
+    (done,) = run([job_of(test_file, tmp_path)], 1)
+    most = most_used(done.outcome.used)
+    assert [name.rpartition("::")[2] for _, name in most] == ["test_child", "test_own", "test_waits"]
+    assert most[0][0] >= 0.25 > most[1][0] >= 0.1 > most[2][0]
