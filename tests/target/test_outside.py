@@ -52,32 +52,47 @@ in = { AI0 = "Main.level" }
 """
 
 
-@pytest.fixture
-def product(tmp_path: Path) -> Callable[[str], Path]:
-    """Makes a folder with the board of QEMU and a configuration; the repository is a link in it, as a submodule."""
-
-    def make(config: str) -> Path:
-        folder = tmp_path / "product"
-        (folder / "subprojects").mkdir(parents=True)
-        (folder / "subprojects/plctool").symlink_to(ROOT)
-        for pattern in ("outside/*", "boards/mps2/*", "boards/mps2_an385/*.h", f"configs/{config}/*"):
-            for file in PORT.glob(pattern):
-                shutil.copy(file, folder)
-        (folder / "mps2.ld").rename(folder / "board.ld")
-        return folder
-
-    return make
+def copy_product(folder: Path, config: str) -> Path:
+    """Copies the board of QEMU and a configuration to a folder; the repository is a link in it, as a submodule."""
+    (folder / "subprojects").mkdir(parents=True)
+    (folder / "subprojects/plctool").symlink_to(ROOT)
+    for pattern in ("outside/*", "boards/mps2/*", "boards/mps2_an385/*.h", f"configs/{config}/*"):
+        for file in PORT.glob(pattern):
+            shutil.copy(file, folder)
+    (folder / "mps2.ld").rename(folder / "board.ld")
+    return folder
 
 
 def make(folder: Path) -> Path:
-    """The firmware, as `make` builds it."""
+    """Builds the firmware with `make`."""
     done = subprocess.run(["make"], cwd=folder, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
     assert "warning" not in done.stderr
     return folder / "firmware.elf"
 
 
-@pytest.mark.parametrize("config", ["modbus", "can"])
+@pytest.fixture(scope="module")
+def full_product(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the full configuration, which most tests add to: built, so that only their files are compiled."""
+    folder = copy_product(tmp_path_factory.mktemp("full") / "product", "full")
+    make(folder)
+    return folder
+
+
+@pytest.fixture
+def product(tmp_path: Path, request: pytest.FixtureRequest) -> Callable[[str], Path]:
+    """Makes a folder with the board of QEMU and a configuration."""
+
+    def copy(config: str) -> Path:
+        folder = tmp_path / "product"
+        if config == "full":
+            return Path(shutil.copytree(request.getfixturevalue("full_product"), folder, symlinks=True))
+        return copy_product(folder, config)
+
+    return copy
+
+
+@pytest.mark.parametrize("config", ["modbus", "can", "full"])
 def test_configuration_is_built_as_it_is(product: Callable[[str], Path], config: str) -> None:
     folder = product(config)
     with Board(MACHINE, make(folder), folder) as board, Plc(Connection(board.line())) as plc:
