@@ -234,6 +234,11 @@ def test_a_refused_start_names_the_reason() -> None:
         services.start(bench.session)
 
 
+def test_a_flash_that_fails_is_said_in_words() -> None:
+    with pytest.raises(DeviceError, match=r"refused the download: its flash or disk cannot be .* \(ERR_DEVICE\)"):
+        l7.check_result(lib.ERR_DEVICE, "download")
+
+
 def test_a_component_that_denies_is_quoted() -> None:
     bench = Bench()
     bench.plc.denial = "the door is open"

@@ -23,6 +23,7 @@ _ADVICE = {
     lib.ERR_APP_NOT_LOADED: "there is no application, flash one first",
     lib.ERR_NOMEMORY: "it is too large for the device",
     lib.ERR_OPERATION_DENIED: "the running program forbids it (PlcOperationControlInstance), as status shows",
+    lib.ERR_DEVICE: "its flash or disk cannot be read or written, as 'plctool log' shows",
     lib.ERR_BUFFERSIZE: "it is too large for the device",
 }
 
