@@ -228,3 +228,40 @@ def check_steps(plc: Controller, port: int, wait: Callable[[Callable[[], Any]], 
     plc.start()
     plc.write({"Main.step": 4})  # a stop has closed all sockets
     wait(lambda: plc.read("Main.got") == -1)
+
+
+FLOOD = """
+PROGRAM Main
+VAR
+    go : BOOL; made, refused, bound, i, socket : DINT; a : SOCKADDRESS;
+END_VAR
+IF go THEN
+    a.sin_family := SOCKET_AF_INET;
+    FOR i := 1 TO 10000 DO
+        socket := SysSockCreate(SOCKET_AF_INET, SOCKET_DGRAM, SOCKET_IPPROTO_UDP);
+        IF socket = SOCKET_INVALID THEN
+            refused := refused + BOOL_TO_DINT(SysSockGetLastError() = SOCKET_ENFILE);
+        ELSE
+            made := made + 1;
+            bound := bound + BOOL_TO_DINT(SysSockBind(socket, ADR(a), SIZEOF(a)));
+        END_IF
+    END_FOR
+    go := FALSE;
+END_IF
+END_PROGRAM
+"""
+"""Opens 10 000 sockets and closes none."""
+SOCKETS = 64
+
+
+def check_flood(plc: Controller, wait: Callable[[Callable[[], Any]], None], stopped: Callable[[], None]) -> None:
+    """The program is refused past the limit, and again after a start. `stopped` lets main close the sockets."""
+    for _ in range(2):
+        plc.write({"Main.made": 0, "Main.refused": 0, "Main.bound": 0})
+        plc.write({"Main.go": True})
+        wait(lambda: not plc.read("Main.go"))
+        values = plc.read("Main.made", "Main.refused", "Main.bound")
+        assert list(values.values()) == [SOCKETS, 10_000 - SOCKETS, SOCKETS]
+        plc.stop()
+        stopped()
+        plc.start()

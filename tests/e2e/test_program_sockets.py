@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from socket_programs import INVALID_ADDR, PROGRAM, STEPS, ProgramSockets, check_steps
+from socket_programs import FLOOD, INVALID_ADDR, PROGRAM, STEPS, ProgramSockets, check_flood, check_steps
 
 from plctool import connect
 from plctool.cli.main import main
@@ -118,3 +119,18 @@ def test_functions_of_syslibsockets_reach_each_other(plcrt: Plcrt, port: int, tm
     with connect(f"tcp:{plcrt.tcp}") as plc:
         plc.flash(source.with_suffix(".cdl"))
         check_steps(plc, port, eventually)
+
+
+def test_program_that_opens_and_never_closes_is_refused_past_the_limit(plcrt: Plcrt, tool) -> None:
+    image = tool.build("flood", FLOOD)
+    plcrt.stop()
+    plcrt.options = ("--tcp", "0")
+    plcrt.start()
+    with connect(f"tcp:{plcrt.tcp}") as plc:
+        plc.flash(image)
+        before = open_files(plcrt)
+        check_flood(plc, eventually, lambda: eventually(lambda: open_files(plcrt) == before))
+
+
+def open_files(plcrt: Plcrt) -> int:
+    return len(os.listdir(f"/proc/{plcrt.worker}/fd"))

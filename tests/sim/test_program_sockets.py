@@ -11,7 +11,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from socket_programs import LONG, NO_CONNECTION, PROGRAM, STEPS, ProgramSockets, check_steps
+from socket_programs import FLOOD, LONG, NO_CONNECTION, PROGRAM, STEPS, ProgramSockets, check_flood, check_steps
 
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -102,3 +102,10 @@ def test_functions_of_syslibsockets_reach_each_other(tmp_path: Path) -> None:
     source.write_text(STEPS)
     with Simulator.from_sources(source) as plc:
         check_steps(plc, 5020, lambda condition: run_until(lambda: plc.run_cycles(1), condition))
+
+
+def test_program_that_opens_and_never_closes_is_refused_past_the_limit(tmp_path: Path) -> None:
+    source = tmp_path / "flood.st"
+    source.write_text(FLOOD)
+    with Simulator.from_sources(source) as plc:
+        check_flood(plc, lambda condition: run_until(lambda: plc.run_cycles(1), condition), lambda: plc.run_for(100))
