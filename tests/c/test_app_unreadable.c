@@ -27,14 +27,14 @@ static RTS_RESULT check_until(RTS_UI32 read)
 
 enum { TRIES = 3 }; /* of a read */
 
-/* The sentence names the place where a name or a text was expected, elsewhere the flash. */
+/* The sentence names the place where a name or a string was expected, elsewhere the flash. */
 static bool is_about_a_name(void)
 {
     return strstr(refusal.text, "Application info") != NULL || strstr(refusal.text, "Name ") != NULL ||
            strstr(refusal.text, "damaged (table 0, ") != NULL;
 }
 
-/* Checks that `names` reads are of names and texts, and returns how many others a check takes. */
+/* Checks that `names` reads are of names and strings, and returns how many others a check takes. */
 static RTS_UI32 check_after_each_read(RTS_UI32 names)
 {
     RTS_UI32 found = 0;
