@@ -120,6 +120,74 @@ static void a_device_is_good_when_it_has_replied_to_all_that_it_was_asked(void)
     CHECK(!ModbusDeviceIsGood(&devices[0]));
 }
 
+/* ---- which one is asked ---- */
+
+static void begin_call(RTS_I64 due_ns)
+{
+    begin(1);
+    memset(waiting, 0, sizeof waiting);
+    ModbusClientSetCalls(&client, waiting, 1);
+    waiting[0].client = &client;
+    waiting[0].device = &devices[0];
+    waiting[0].request.function = ModbusFindFunction(MODBUS_READ_HOLDING_REGISTERS);
+    waiting[0].request.read_count = 1;
+    waiting[0].state = MODBUS_CALL_WAITS;
+    waiting[0].due_ns = due_ns;
+}
+
+static void a_call_of_a_lost_device_fails_until_it_is_asked_again(void)
+{
+    begin_call(0);
+    devices[0].failures = devices[0].retries + 1;
+    devices[0].retry_ns = NOW;
+    ModbusClientPoll(&client, NOW - 1);
+    CHECK_EQUAL(waiting[0].state, MODBUS_CALL_ENDED);
+    CHECK_EQUAL(waiting[0].result, ERR_TIMEOUT);
+    waiting[0].state = MODBUS_CALL_WAITS;
+    ModbusClientPoll(&client, NOW);
+    CHECK_EQUAL(waiting[0].state, MODBUS_CALL_WAITS);
+    CHECK_SAME(client.call, &waiting[0]);
+}
+
+static void a_job_of_a_lost_device_waits_until_it_is_asked_again(void)
+{
+    begin(1);
+    add(0, read_job(50));
+    devices[0].failures = devices[0].retries + 1;
+    devices[0].retry_ns = NOW;
+    ModbusClientPoll(&client, NOW - 1);
+    CHECK(client.device == NULL);
+    ModbusClientPoll(&client, NOW);
+    CHECK_SAME(client.device, &devices[0]);
+}
+
+static void a_call_is_sent_when_it_is_due_and_on_its_line_only(void)
+{
+    begin_call(NOW + 1);
+    ModbusClientPoll(&client, NOW);
+    CHECK(client.device == NULL);
+    ModbusClientPoll(&client, NOW + 1);
+    CHECK_SAME(client.device, &devices[0]);
+    begin_call(NOW);
+    waiting[0].client = NULL;
+    ModbusClientPoll(&client, NOW);
+    CHECK(client.device == NULL);
+}
+
+static void a_call_comes_before_a_job_that_is_due_at_the_same_time(void)
+{
+    begin_call(NOW - 5);
+    add(0, read_job(50));
+    states[0][0].due_ns = NOW - 5;
+    ModbusClientPoll(&client, NOW);
+    CHECK(client.job == NULL);
+    begin_call(NOW - 4);
+    add(0, read_job(50));
+    states[0][0].due_ns = NOW - 5;
+    ModbusClientPoll(&client, NOW);
+    CHECK_SAME(client.job, &states[0][0]);
+}
+
 /* ---- the last writes ---- */
 
 static const MODBUS_JOB write_on_change = {MODBUS_WRITE_REGISTER, MODBUS_JOB_ON_CHANGE, 0, 0, 4, 1, 0, 50};
@@ -205,6 +273,10 @@ int main(void)
     RUN(a_request_on_its_way_is_needed_at_its_time_out);
     RUN(a_call_of_this_line_that_waits_is_needed_at_once);
     RUN(a_device_is_good_when_it_has_replied_to_all_that_it_was_asked);
+    RUN(a_call_of_a_lost_device_fails_until_it_is_asked_again);
+    RUN(a_job_of_a_lost_device_waits_until_it_is_asked_again);
+    RUN(a_call_is_sent_when_it_is_due_and_on_its_line_only);
+    RUN(a_call_comes_before_a_job_that_is_due_at_the_same_time);
     RUN(an_output_that_the_device_does_not_have_yet_is_hurried);
     RUN(what_need_not_or_cannot_be_written_is_not_hurried);
     RUN(every_job_of_every_device_is_hurried);

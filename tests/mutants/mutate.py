@@ -232,13 +232,15 @@ def is_both(node: tree_sitter.Node, operator: str) -> bool:
 
 
 def is_smaller_or_greater(self: Mutator, node: tree_sitter.Node) -> bool:
-    """True for a < b ? a : b: where a equals b, either is as good."""
+    """True for `a < b ? a : b` and `if (a > b) a = b;`: where a equals b, either is as good."""
     above = node.parent
     while above is not None and above.type == "parenthesized_expression":
         above = above.parent
-    if above is None or above.type != "conditional_expression":
+    if above is None or above.type not in ("conditional_expression", "if_statement"):
         return False
     condition, yes, no = (above.child_by_field_name(name) for name in ("condition", "consequence", "alternative"))
+    if yes is not None and yes.type == "expression_statement" and yes.children[0].type == "assignment_expression":
+        yes, no = yes.children[0].child_by_field_name("left"), yes.children[0].child_by_field_name("right")
     if condition is None or yes is None or no is None or bare(condition) != node:
         return False
     return {self.own(yes), self.own(no)} == {self.own(node.children[0]), self.own(node.children[2])}

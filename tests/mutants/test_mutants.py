@@ -53,6 +53,8 @@ def test_constants_of_a_configuration_have_no_mutants() -> None:
 
 def test_a_choice_of_the_smaller_one_is_the_same_at_equality() -> None:
     assert "f: a < b -> a <= b" not in changes("int f(int a, int b) { return a < b ? a : b; }")
+    assert "f: a < b -> a <= b" not in changes("void f(int a, int b) { if (a < b) a = b; }")
+    assert "f: a < b -> a <= b" in changes("void f(int a, int b) { if (a < b) a = 1; }")
 
 
 PROGRAM = """
