@@ -57,6 +57,7 @@ void begin(RTS_UI32 count)
     request_size = reply_size = queued = 0;
     deaf_ns = 0;
     for (RTS_UI32 i = 0; i < DEVICES; i++) {
+        remotes[i].exception = MODBUS_DEVICE_FAILURE;
         remotes[i].server.unit = (RTS_UI8)(i + 1);
         remotes[i].server.memory = &remotes[i].memory;
         remotes[i].server.range_count = 1;
@@ -159,7 +160,7 @@ static void serve(REMOTE *remote)
     reply_size = 1 + ModbusServerReply(&remote->server, reply + 1, request_size - 3);
     if (remote->fault == EXCEPTION || remote->fault == BUSY) {
         reply[1] = request[1] | MODBUS_EXCEPTION;
-        reply[2] = remote->fault == BUSY ? MODBUS_DEVICE_BUSY : MODBUS_DEVICE_FAILURE;
+        reply[2] = remote->fault == BUSY ? MODBUS_DEVICE_BUSY : remote->exception;
         reply_size = 3;
     }
     spoil(remote->fault);

@@ -35,6 +35,7 @@ typedef struct {
     MODBUS_MEMORY memory;
     RTS_UI8 data[2 * REGISTERS];
     FAULT fault;
+    RTS_UI8 exception; /* of the fault EXCEPTION: MODBUS_DEVICE_FAILURE */
     RTS_UI32 delay_ms; /* before it replies; 2 */
     RTS_UI32 deaf_ms;  /* after it has replied: it loses what comes */
     bool loses;        /* requests that come before it has replied; else it replies to all, one after the other */

@@ -82,6 +82,40 @@ static void one_reply_that_is_lost_is_asked_for_again(void)
     CHECK(ModbusDeviceIsGood(&devices[0]));
 }
 
+static void begin_exception(RTS_UI8 exception)
+{
+    begin(1);
+    add(0, read_job(100));
+    remotes[0].fault = EXCEPTION;
+    remotes[0].exception = exception;
+}
+
+static void both_exceptions_of_a_gateway_count_as_silence(void)
+{
+    static const RTS_UI8 exceptions[] = {MODBUS_NO_PATH, MODBUS_NO_TARGET};
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(exceptions); i++) {
+        begin_exception(exceptions[i]);
+        run_ms(1000);
+        CHECK(ModbusDeviceIsLost(&devices[0]));
+        CHECK_EQUAL(devices[0].miss, MODBUS_MISS_GATEWAY);
+        CHECK_EQUAL(devices[0].counters.last_exception, exceptions[i]);
+        CHECK_EQUAL(devices[0].counters.exceptions, 0);
+    }
+}
+
+/* Also before the first good reply. */
+static void a_device_that_acknowledges_is_asked_again_as_one_that_is_busy(void)
+{
+    begin_exception(MODBUS_ACKNOWLEDGE);
+    run_ms(50);
+    CHECK_EQUAL(devices[0].busy, 1);
+    CHECK_EQUAL(devices[0].counters.exceptions, 0);
+    remotes[0].fault = WELL;
+    run_ms(200);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
 static void an_exception_does_not_make_a_device_lost(void)
 {
     begin(1);
@@ -347,6 +381,8 @@ int main(void)
     RUN(half_a_reply_is_none);
     RUN(a_reply_with_a_wrong_crc_is_none);
     RUN(one_reply_that_is_lost_is_asked_for_again);
+    RUN(both_exceptions_of_a_gateway_count_as_silence);
+    RUN(a_device_that_acknowledges_is_asked_again_as_one_that_is_busy);
     RUN(an_exception_does_not_make_a_device_lost);
     RUN(a_write_that_is_refused_is_tried_once_a_second);
     RUN(a_dead_device_costs_the_others_one_time_out_in_ten_seconds);

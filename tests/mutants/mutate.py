@@ -239,8 +239,9 @@ def is_smaller_or_greater(self: Mutator, node: tree_sitter.Node) -> bool:
     if above is None or above.type not in ("conditional_expression", "if_statement"):
         return False
     condition, yes, no = (above.child_by_field_name(name) for name in ("condition", "consequence", "alternative"))
-    if yes is not None and yes.type == "expression_statement" and yes.children[0].type == "assignment_expression":
-        yes, no = yes.children[0].child_by_field_name("left"), yes.children[0].child_by_field_name("right")
+    statement = yes.children[0] if yes is not None and yes.type == "expression_statement" else None
+    if statement is not None and statement.type == "assignment_expression":
+        yes, no = statement.child_by_field_name("left"), statement.child_by_field_name("right")
     if condition is None or yes is None or no is None or bare(condition) != node:
         return False
     return {self.own(yes), self.own(no)} == {self.own(node.children[0]), self.own(node.children[2])}
