@@ -20,7 +20,8 @@ from plctool.compiler.codegen.emit import optimised
 from plctool.compiler.codegen.link import link
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.front import Trees, check_sources
+from plctool.compiler.front import check_sources
+from plctool.compiler.kept.kept_build import KeptBuild
 from plctool.compiler.sources.request import BuildRequest
 from plctool.compiler.syntax.diagnostics import Diagnostics
 from plctool.compiler.syntax.parser import parse
@@ -149,7 +150,7 @@ def bench_start() -> None:
 def bench_change() -> None:
     """One changed block of a project of 100 files, whose other code is in the cache."""
     with tempfile.TemporaryDirectory() as name, patch.dict(os.environ, XDG_CACHE_HOME=f"{name}/cache"):
-        folder, trees = Path(name) / "project", Trees()
+        folder, kept = Path(name) / "project", KeptBuild()
         folder.mkdir()
         project(folder)
 
@@ -168,7 +169,7 @@ def bench_change() -> None:
         rows = {
             "all compiled": seconds(lambda: best_of(1, command), 1),
             "one changed block": seconds(lambda: best_of(1, command), BUILDS),
-            "one changed block, in a process that stays": seconds(lambda: build(request, trees=trees), BUILDS + 1),
+            "one changed block, in a process that stays": seconds(lambda: build(request, kept=kept), BUILDS + 1),
         }
     print(f"\nBuilding {LINES} lines in 100 files, in seconds")
     for what, figure in rows.items():

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from plctool import connect
 from plctool.compiler import build, program_files
-from plctool.compiler.front import Trees
+from plctool.compiler.kept.kept_build import KeptBuild
 from plctool.compiler.sources.request import BuildRequest
 from plctool.debug.symbols import SymbolTable
 from plctool.device import Plc
@@ -86,14 +86,14 @@ def measure_edits(edits: int = 5) -> tuple[int, list[float], list[int]]:
     """Returns the lines of the program, the seconds from each edit of it until it runs, as `--watch` does it, and the
     times that tasks waited for the exchanges [us]."""
     with tempfile.TemporaryDirectory() as name, Plcrt(Path(name) / "plc.flash", "--tcp", "0") as plcrt:
-        trees, seconds = Trees(), []
+        kept, seconds = KeptBuild(), []
         with connect(f"tcp:{plcrt.tcp}") as plc:
             assert isinstance(plc, Plc)
             symbols = None
             for edited in range(edits + 1):
                 files = _write_large(Path(name), edited)
                 begin = time.monotonic()
-                result = build(BuildRequest(program_files(files), base=symbols), trees=trees)
+                result = build(BuildRequest(program_files(files), base=symbols, cache=True), kept=kept)
                 plc.add_symbols(result.symbols)
                 if symbols is None:
                     plc.flash(result.image)

@@ -49,7 +49,7 @@ COMPILER_FLOORS = (
     ("compiler.sources",),
     ("compiler.image", "compiler.semantics"),
     ("compiler.export_itf", "compiler.front"),
-    ("compiler.tree_cache",),
+    ("compiler.kept",),
 )
 NOT_BELOW = {
     "compiler.semantics": ("compiler.formats", "compiler.plcopen_export", "compiler.codegen"),

@@ -18,6 +18,7 @@ from plctool.compiler.codegen.object_cache import ObjectCache, cache_of_user
 from plctool.compiler.codegen.objects import object_key
 from plctool.compiler.codegen.partition import Part
 from plctool.compiler.front import Trees
+from plctool.compiler.kept.kept_build import KeptBuild
 from plctool.compiler.sources.request import BuildRequest
 from plctool.compiler.syntax.diagnostics import CompileError
 from plctool.image.targets import find_target
@@ -79,10 +80,10 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Part]]:
     yield found
 
 
-def image_of(folder: Path, lines: list[str], *, cache: bool, trees: Trees | None = None) -> bytes:
+def image_of(folder: Path, lines: list[str], *, cache: bool, kept: KeptBuild | None = None) -> bytes:
     source = folder / "main.st"
     source.write_text("".join(lines))
-    return build(BuildRequest(program_files([source]), cache=cache), trees=trees).image
+    return build(BuildRequest(program_files([source]), cache=cache), kept=kept).image
 
 
 def edited(lines: list[str], rng: random.Random) -> list[str]:
@@ -100,11 +101,11 @@ def edited(lines: list[str], rng: random.Random) -> list[str]:
 
 @pytest.mark.usefixtures("cache", "small_parts")
 def test_image_is_the_same_with_and_without_the_cache_after_each_of_many_edits(tmp_path: Path) -> None:
-    rng, lines, builds, trees = random.Random(1), program(), 0, Trees()
+    rng, lines, builds, kept = random.Random(1), program(), 0, KeptBuild(Trees())
     while builds < 4:
         changed = edited(lines, rng)
         try:
-            image = image_of(tmp_path, changed, cache=True, trees=trees)
+            image = image_of(tmp_path, changed, cache=True, kept=kept)
         except CompileError:
             continue
         builds += 1

@@ -14,11 +14,11 @@ from plctool.compiler import build, front, program_files
 from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.object_cache import ObjectCache
 from plctool.compiler.front import Trees, check_sources
+from plctool.compiler.kept.tree_cache import KeptTrees, read_tree, tree_folder, tree_key, trees_of_user, written_tree
 from plctool.compiler.sources.request import BuildRequest
 from plctool.compiler.sources.source_files import read_content
 from plctool.compiler.syntax.diagnostics import CompileError, Diagnostics
 from plctool.compiler.syntax.parser import parse_all
-from plctool.compiler.tree_cache import KeptTrees, read_tree, tree_folder, tree_key, trees_of_user, written_tree
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owner here")
 
@@ -166,7 +166,7 @@ def test_file_that_would_run_a_command_is_not_used(tmp_path: Path, cache: Object
         ("plctool.compiler.syntax.ast", "Source"),
         ("plctool.compiler.syntax.ast", "Source.pos"),
         ("plctool.compiler.syntax.parser", "parse_all"),
-        ("plctool.compiler.tree_cache", "trees_of_user"),
+        ("plctool.compiler.kept.tree_cache", "trees_of_user"),
     ],
 )
 def test_names_of_functions_are_refused(module: str, name: str) -> None:

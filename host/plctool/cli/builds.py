@@ -17,8 +17,8 @@ from plctool.printable import one_line
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
-    from plctool.compiler.front import Trees
     from plctool.compiler.image.build import BuildResult
+    from plctool.compiler.kept.kept_build import KeptBuild
     from plctool.compiler.sources.program_files import ProgramFiles
     from plctool.debug.symbols import SymbolTable
     from plctool.sim import Simulator
@@ -110,10 +110,10 @@ def simulator(program: Path | Built) -> Simulator:
     return Simulator(program.image, program.symbols)
 
 
-def build(settings: Settings, trees: Trees | None = None) -> tuple[Document, list[str]]:
+def build(settings: Settings, kept_build: KeptBuild | None = None) -> tuple[Document, list[str]]:
     """Compiles to an image and the symbol file beside it. Returns the document and the warnings as users read them.
-    `trees`: keeps the syntax trees for another build in this process. A build whose files are there already only gives
-    its report again.
+    `kept_build`: what the next build in this process uses again. A build whose files are there already only gives its
+    report again.
 
     Raises CompileError when the program has errors, UsageError when the image would overwrite one of its files. Files
     appear complete or not at all.
@@ -133,7 +133,7 @@ def build(settings: Settings, trees: Trees | None = None) -> tuple[Document, lis
     report = None if kept is None else kept.find()
     if report is not None:
         return report
-    result = _compile(settings, settings.target, trees)
+    result = _compile(settings, settings.target, kept_build)
     if result.change is not None:
         check_possible(result.change)
     result.symbols.made_of = made_of
@@ -177,12 +177,12 @@ def compiled(settings: Settings) -> BuildResult:
     return _compile(settings, settings.target)
 
 
-def _compile(settings: Settings, target: str | None, trees: Trees | None = None) -> BuildResult:
+def _compile(settings: Settings, target: str | None, kept_build: KeptBuild | None = None) -> BuildResult:
     from plctool.compiler import build
 
     is_own = target == settings.target  # else it is for this machine, whatever board the program is for
     request = settings if is_own else replace(settings, target=target, board=None, firmware=None)
-    return build(request, trees=trees)
+    return build(request, kept=kept_build)
 
 
 def build_text(document: dict[str, Any]) -> str:

@@ -23,16 +23,16 @@ from plctool.errors import PlcError, UsageError
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
-    from plctool.compiler.front import Trees
+    from plctool.compiler.kept.kept_build import KeptBuild
     from plctool.controller import Controller
     from plctool.debug.symbols import SymbolTable
 
 _POLL = 0.1  # how often the files of a project are looked at [s]
 
 
-def change(plc: Controller, args: argparse.Namespace, trees: Trees | None = None) -> Document:
+def change(plc: Controller, args: argparse.Namespace, kept: KeptBuild | None = None) -> Document:
     """Replaces the program that runs by the image or the project that the arguments name. With --dry-run it only says
-    what that would do. `trees`: keeps the syntax trees of the project for the next change."""
+    what that would do. `kept`: what the next change of the project uses again."""
     if args.back:
         return _change_back(plc, args)
     settings = project_of(args)
@@ -43,7 +43,7 @@ def change(plc: Controller, args: argparse.Namespace, trees: Trees | None = None
     settings = replace(settings, base=_base_of(plc, settings))
     if args.dry_run:
         return change_document(compiled(settings))
-    return _change_project(plc, settings, args, trees)
+    return _change_project(plc, settings, args, kept)
 
 
 def _base_of(plc: Controller, settings: Settings) -> SymbolTable:
@@ -67,13 +67,13 @@ def _base_of(plc: Controller, settings: Settings) -> SymbolTable:
         ) from None
 
 
-def _change_project(plc: Controller, settings: Settings, args: argparse.Namespace, trees: Trees | None) -> Document:
+def _change_project(plc: Controller, settings: Settings, args: argparse.Namespace, kept: KeptBuild | None) -> Document:
     from plctool.cli.fresh_image import fingerprint
 
     assert settings.base is not None
     if settings.base.made_of and settings.base.made_of == fingerprint(settings):
         return {"unchanged": f"{settings.base.image_crc:08X}"}
-    document, warnings = build(settings, trees)
+    document, warnings = build(settings, kept)
     output.print_warnings(args, warnings)
     plan: Document = document["change"]
     sent = _sent(plc, settings.output, not args.json)
@@ -130,15 +130,15 @@ def watch(
     is said, and the program goes on."""
     if project_of(args) is None:
         raise UsageError("--watch is for a project; name its folder.", "usage")
-    from plctool.compiler.tree_cache import trees_of_user
+    from plctool.compiler.kept.kept_build import KeptBuild
 
-    seen, trees = None, trees_of_user()
+    seen, kept = None, KeptBuild()
     while True:
         now = _state_of(args)
         if now != seen:
             seen = now
             try:
-                yield change(plc, args, trees)
+                yield change(plc, args, kept)
             except PlcError as error:
                 _say(error)
         wait()

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from plctool.compiler.codegen.lower_unit import Options
     from plctool.compiler.front import CheckResult, Trees
     from plctool.compiler.image.build import BuildResult
+    from plctool.compiler.kept.kept_build import KeptBuild
     from plctool.compiler.semantics.participants import Guest
     from plctool.compiler.semantics.python_functions import PythonFunctions
     from plctool.compiler.sources.imports import ImportedLibrary
@@ -196,9 +197,9 @@ def compile_sources(
 
 
 @no_collection()
-def build(request: BuildRequest, python: PythonFunctions | None = None, trees: Trees | None = None) -> BuildResult:
-    """Compiles a program. `python`: functions that Python implements, in the simulator. `trees`: keeps the syntax trees
-    for another build in this process.
+def build(request: BuildRequest, python: PythonFunctions | None = None, kept: KeptBuild | None = None) -> BuildResult:
+    """Compiles a program. `python`: functions that Python implements, in the simulator. `kept`: what the next build in
+    this process uses again.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
@@ -208,8 +209,8 @@ def build(request: BuildRequest, python: PythonFunctions | None = None, trees: T
     from plctool.compiler.image.build import build_program
     from plctool.compiler.image.fit import board_meant, check_program_fits
     from plctool.compiler.image.online_change import previous_of
+    from plctool.compiler.kept.tree_cache import trees_of_user
     from plctool.compiler.syntax.diagnostics import render_all
-    from plctool.compiler.tree_cache import trees_of_user
     from plctool.iec.dialect import find_dialect
 
     files = request.files
@@ -224,8 +225,10 @@ def build(request: BuildRequest, python: PythonFunctions | None = None, trees: T
     sources = files.load_sources()
     imported = files.load_libraries()
     shown = [*sources, *io_sources(description), *library_sources(imported)]
-    with bugs_reported():
-        checked = check_sources(
+    previous = None if request.base is None else previous_of(request.base)
+
+    def check(trees: Trees | None, observers: Sequence[Guest] = ()) -> CheckResult:
+        return check_sources(
             sources,
             warnings=request.warnings,
             io=description,
@@ -233,15 +236,28 @@ def build(request: BuildRequest, python: PythonFunctions | None = None, trees: T
             python=python,
             dialect=system,
             information=files.information,
-            trees=trees or (trees_of_user() if request.cache else None),
-            previous=None if request.base is None else previous_of(request.base),
+            trees=trees,
+            observers=observers,
+            previous=previous,
         )
+
+    with bugs_reported():
+        if kept is None:
+            checked = check(trees_of_user() if request.cache else None)
+        elif imported or description is not None or python is not None:
+            kept.forget()
+            checked = check(kept.trees)
+        else:
+            checked = kept.check(request, sources, previous, lambda observer: check(kept.trees, [observer]))
     if checked.program is None:
         raise CompileError(checked.diagnostics, shown)
     # No time of build: the same sources give the same image, so that its symbols are found again anywhere.
     info = replace(files.info, date=source_date(), properties=_properties_of(files.information))
     with bugs_reported():
-        built = build_program(checked.program, options, info, change=checked.change)
+        code, changed = (None, None) if kept is None else (kept.code, kept.changed)
+        built = build_program(checked.program, options, info, change=checked.change, code=code, changed=changed)
+    if kept is not None:
+        kept.built(built)
     if request.limits:
         check_program_fits(built, options.target, board, device)
     found = checked.diagnostics

@@ -59,6 +59,7 @@ class CheckResult:
     diagnostics: list[Diagnostic]
     has_tests: bool = False  # there are TEST blocks, whether they were looked at or not
     change: OnlineChange | None = None  # how it takes the place of the previous program
+    placed: Placed | None = None  # the last stage, for those that keep it
 
     @property
     def ok(self) -> bool:
@@ -109,7 +110,7 @@ def check_sources(
             placed = _placed(parsed, io, guests)
     program = None if placed is None or diagnostics.errors else placed.program
     change = None if placed is None else placed.change
-    return CheckResult(program, diagnostics.sorted(), parsed is not None and parsed.has_tests, change)
+    return CheckResult(program, diagnostics.sorted(), parsed is not None and parsed.has_tests, change, placed)
 
 
 def diagnostics_of(

@@ -16,9 +16,9 @@ from weakref import WeakKeyDictionary
 from plctool.compiler import check_with_tests
 from plctool.compiler.base.source import Source
 from plctool.compiler.front import KnownTree, Trees
+from plctool.compiler.kept.tree_cache import trees_of_user
 from plctool.compiler.syntax.diagnostics import Diagnostic, Diagnostics
 from plctool.compiler.syntax.parser import ParsedText
-from plctool.compiler.tree_cache import trees_of_user
 from plctool.errors import PlcError
 from plctool.lsp.incremental import Kept, Observer
 from plctool.lsp.project import Project, Snapshot

@@ -17,11 +17,11 @@ from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
 from plctool.compiler.image.build import BuildResult, build_program
+from plctool.compiler.kept.tree_cache import trees_of_user
 from plctool.compiler.semantics.assertions import FAILED, LIVE, NUMBER, Assertion, Operand
 from plctool.compiler.semantics.statement_marks import StatementMarks
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.syntax.warnings import ALL_WARNINGS, WarningOptions
-from plctool.compiler.tree_cache import trees_of_user
 from plctool.controller import ExceptionInfo
 from plctool.core import lib
 from plctool.debug.symbols import SourceLine

@@ -27,7 +27,7 @@ def cache(*, clear: bool) -> Document:
     """Describes the cache, or empties it. "usable": false where builds do without one."""
     from plctool.cli.kept_reports import report_folder
     from plctool.compiler.codegen.object_cache import ObjectCache
-    from plctool.compiler.tree_cache import tree_folder
+    from plctool.compiler.kept.tree_cache import tree_folder
 
     objects, trees, reports = ObjectCache(), tree_folder(), report_folder()
     usable = objects.usable() and trees.usable() and reports.usable()

@@ -173,7 +173,7 @@ def missing(settings: Settings) -> Document:
 def _checked(settings: Settings) -> tuple[list[Diagnostic], list[Source], list[Source]]:
     """Every diagnostic of a program, its sources, and all files that diagnostics are about."""
     from plctool.compiler import check_with_tests, io_sources, library_sources
-    from plctool.compiler.tree_cache import trees_of_user
+    from plctool.compiler.kept.tree_cache import trees_of_user
 
     files = settings.files
     sources, libraries = files.load_sources(), files.load_libraries()

@@ -98,6 +98,7 @@ class Module:
         self._metadata_ids: dict[str, int] = {}
         self._named_metadata: list[str] = []
         self._below: dict[int, list[int]] = {}  # the nodes that a node refers to
+        self.collided = False  # a name or number is not that of its content alone, so it depends on what came before
 
     def metadata(self, text: str) -> int:
         """The number of the metadata node `text`, e.g. '!{i64 8}'; equal nodes exist once."""
@@ -109,6 +110,7 @@ class Module:
     def _new_node(self, text: str) -> int:
         number = crc32(text.encode()) & _MOST_NODES
         while number in self._metadata:
+            self.collided = self.collided or self._metadata[number] != text
             number = (number + 1) & _MOST_NODES
         self._metadata[number] = text
         return number
@@ -116,6 +118,11 @@ class Module:
     def distinct_metadata(self, text: str) -> int:
         """A node of its own, e.g. a DISubprogram."""
         return self._new_node("distinct " + text)
+
+    def forget_metadata(self, number: int) -> None:
+        """Forgets a node of its own, which nothing refers to any more."""
+        del self._metadata[number]
+        self._below.pop(number, None)
 
     def named_metadata(self, name: str, nodes: list[int]) -> None:
         self._named_metadata.append(f"!{name} = !{{{', '.join(f'!{n}' for n in nodes)}}}")
@@ -142,6 +149,7 @@ class Module:
         text = f" = internal unnamed_addr constant [{len(data)} x i8] {bytes_literal(data)}, align {align}"
         number = crc32(text.encode())
         while self._constants.setdefault(f"@const.{number:x}", text) != text:
+            self.collided = True
             number += 1
         return Value(f"@const.{number:x}")
 

@@ -3,6 +3,7 @@ and one for the end."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -13,7 +14,7 @@ from plctool.compiler.codegen.lower_classes import write_dispatcher
 from plctool.compiler.codegen.lower_frame import Body, Frame, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Form, Options, Unit, value_type
-from plctool.compiler.codegen.partition import Part, parts
+from plctool.compiler.codegen.partition import KnownParts, Part, parts
 from plctool.compiler.codegen.sections import sections
 from plctool.compiler.codegen.signatures import (
     CONTEXT,
@@ -74,6 +75,22 @@ class Lowered:
 def lower(program: TypedProgram, options: Options) -> Lowered:
     """Lowers what the tasks of a checked program reach."""
     unit = Unit(options, program.area_sizes, program.defaults)
+    return finished(program, unit, lower_into(unit, program, write_pou))
+
+
+@dataclass(frozen=True)
+class Entries:
+    """The symbols of what the runtime calls, as in `Lowered`."""
+
+    tasks: list[str]
+    functions: dict[int, str]
+    events: list[str]
+    exports: list[str]
+
+
+def lower_into(unit: Unit, program: TypedProgram, write: Callable[[Unit, Pou, Effects, Form], None]) -> Entries:
+    """Writes all functions into the module of a new unit; `write` writes that of a POU. Returns their entries."""
+    options = unit.options
     unit.trail_variable = program.trail
     signatures = block_signatures(program, options)
     unit.handed, unit.transient, unit.closed = signatures.handed, signatures.transient, signatures.closed
@@ -102,7 +119,7 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
         if done < len(unit.pous):
             pou, form = list(unit.pous)[done]
             try:
-                _pou(unit, pou, effects, form)
+                write(unit, pou, effects, form)
             except Exception as error:
                 note_position(error, pou.pos)
                 raise
@@ -118,19 +135,27 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
             "target",
         )
     _struct_initialisers(unit)
+    return Entries(tasks, functions, events, exports)
+
+
+def finished(program: TypedProgram, unit: Unit, entries: Entries, known: KnownParts | None = None) -> Lowered:
+    """Returns what is made of a unit in which all functions are written. `known`: as in
+    `parts()`."""
+    options = unit.options
     for name in sorted(unit.helpers):
         unit.module.add_helper(name, string_function(name, unit.target, unit.strings))
     pous = {name: pou for (pou, _), name in unit.pous.items()}
     bounds = [*dict.fromkeys(unit.bounds)]
     options.passes.left(("sections", "memory", "lengths", "splice"), unit.module.whole)
-    made = parts(unit.module, cut=options.passes.runs("parts"), grouped=options.opt_level < FASTEST)
+    cut, grouped = options.passes.runs("parts"), options.opt_level < FASTEST
+    made = parts(unit.module, cut=cut, grouped=grouped, known=known)
     options.passes.left(("parts",), lambda: "\n".join(f"; part {n}\n{part.text}" for n, part in enumerate(made, 1)))
     return Lowered(
         made,
-        tasks,
-        functions,
-        events,
-        exports,
+        entries.tasks,
+        entries.functions,
+        entries.events,
+        entries.exports,
         pous,
         unit.imports,
         bounds,
@@ -155,7 +180,8 @@ def _task_entry(unit: Unit, number: int, task: Task) -> str:
     return name
 
 
-def _pou(unit: Unit, pou: Pou, effects: Effects, form: Form) -> None:
+def write_pou(unit: Unit, pou: Pou, effects: Effects, form: Form) -> None:
+    """Writes the function of a POU."""
     closed = unit.closed.get(pou)
     returned, name = returned_variable(pou, closed), unit.symbol(pou, form)
     signature = f"{returned_type(returned)} @{name}({parameter_list(pou, unit.handed, form, closed)})"

@@ -346,6 +346,12 @@ class Unit:
         self._scopes[scope, pos.file] = scope
         return scope
 
+    def forget_subprogram(self, scope: int) -> None:
+        """Forgets the debug scope of a function that is written again."""
+        self.module.forget_metadata(scope)
+        self._scopes = {key: inner for key, inner in self._scopes.items() if key[0] != scope}
+        self._locations = {key: text for key, text in self._locations.items() if key[2] != scope}
+
     def stack_variable(self, name: str, pos: Pos, scope: int) -> int:
         """The DILocalVariable of a name. Its type is in the symbol file."""
         metadata = self.module.metadata

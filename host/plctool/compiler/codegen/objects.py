@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 _LENGTH = 4  # bytes of the length of an object between processes
 
 
-def emit_objects(parts: Sequence[Part], options: Options) -> list[bytes]:
-    """The objects of the parts of a program: those that are not in the cache are compiled, several side by side in
-    processes of their own where the system can fork. The result is the same either way."""
+def emit_objects(parts: Sequence[Part], options: Options, known: Sequence[bytes | None] = ()) -> list[bytes]:
+    """The objects of the parts of a program: those that are neither in the cache nor `known` are compiled, several side
+    by side in processes of their own where the system can fork. The result is the same either way."""
     kept = None if options.passes.dump_after else options.cache
-    keys = ["" if kept is None else object_key(part, options) for part in parts]
-    found = [None if kept is None else kept.get(key) for key in keys]
+    found = list(known) if known else [None] * len(parts)
+    keys = ["" if kept is None or found[n] is not None else object_key(part, options) for n, part in enumerate(parts)]
+    found = [kept.get(key) if kept is not None and key else data for key, data in zip(keys, found, strict=True)]
     missing = [number for number, data in enumerate(found) if data is None]
     made = _compiled([parts[number] for number in missing], options)
     for number, data in zip(missing, made, strict=True):

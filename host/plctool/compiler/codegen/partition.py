@@ -21,6 +21,7 @@ _FEW = 5_000  # instructions for which several parts do not pay
 _GROUP = 2_000  # instructions, about, of what is compiled again when one function has changed
 _LONGEST_GROUP = 3 * _GROUP
 _COPIED = 300  # instructions of a function up to which LLVM may find it worth inlining when it is called often
+_DECLARED = "declared"  # in place of a linkage: of a function that is in another part
 _LONG_RUN = 50  # instructions between branches, on average: `memory.py` has left little for LLVM to find
 
 
@@ -34,10 +35,15 @@ class Part:
     plain: bool = False
 
 
-def parts(module: Module, *, cut: bool = True, grouped: bool = True) -> list[Part]:
+KnownParts = dict[tuple[tuple[Function, str, str], ...], str]
+"""The IR of parts by their functions, each with its linkage and its attribute about inlining."""
+
+
+def parts(module: Module, *, cut: bool = True, grouped: bool = True, known: KnownParts | None = None) -> list[Part]:
     """The parts of a module: one if it is small or not to be `cut`, else several, of plain functions and of others. A
     part has copies of functions of others that may be inlined. `grouped`: many small parts, which stay the same where a
-    program does; else an even number of the same size, in which LLVM sees more at once."""
+    program does; else an even number of the same size, in which LLVM sees more at once. `known`: the parts of the last
+    call for this module, which those of this one replace."""
     functions = module.functions
     calls = {name: Counter(c for c in d.function.callees if c in functions) for name, d in functions.items()}
     _limit_growth(functions, calls)
@@ -46,12 +52,24 @@ def parts(module: Module, *, cut: bool = True, grouped: bool = True) -> list[Par
     plain = {name: d for name, d in functions.items() if _is_plain(d.function, functions)}
     if _size(plain) < _FEW:
         plain = {}
-    found = []
+    found, written_parts = [], KnownParts()
     for some in (plain, {name: d for name, d in functions.items() if name not in plain}):
         for names in _groups(some) if grouped else _cut(some):
-            text = module.text(_part(names, functions, calls, _COPIED if grouped else _LARGE))
+            written = _part(names, functions, calls, _COPIED if grouped else _LARGE)
+            key = tuple((function, linkage, function.inlining) for function, linkage in written)
+            text = None if known is None else known.get(key)
+            if text is None:
+                text = module.text(_text(function, linkage) for function, linkage in written)
+            written_parts[key] = text
             found.append(Part(text, large=True, plain=bool(plain) and some is plain))
+    if known is not None:
+        known.clear()
+        known.update(written_parts)
     return found
+
+
+def _text(function: Function, linkage: str) -> str:
+    return function.declaration("hidden") if linkage == _DECLARED else function.definition(linkage)
 
 
 def _size(functions: dict[str, Definition]) -> int:
@@ -121,21 +139,24 @@ def _groups(functions: dict[str, Definition]) -> Iterator[list[str]]:
         yield group
 
 
-def _part(own: list[str], functions: dict[str, Definition], calls: dict[str, Counter[str]], copied: int) -> list[str]:
-    """The functions of one part, and what they call in others: a copy when it may be inlined and has no more than
-    `copied` instructions, else a declaration."""
-    found, seen, todo = [], set(own), list(own)
+def _part(
+    own: list[str], functions: dict[str, Definition], calls: dict[str, Counter[str]], copied: int
+) -> list[tuple[Function, str]]:
+    """The functions of one part, each with its linkage, and what they call in others: a copy when it may be inlined and
+    has no more than `copied` instructions, else a declaration."""
+    found: list[tuple[Function, str]] = []
+    seen, todo = set(own), list(own)
     here = frozenset(own)
     while todo:
         name = todo.pop()
         function, linkage = functions[name].function, functions[name].linkage
         if name in here:
-            found.append(function.definition("hidden" if linkage else ""))
+            found.append((function, "hidden" if linkage else ""))
         elif function.inlining == "noinline" or (function.size > copied and not function.inlining):
-            found.append(function.declaration("hidden"))
+            found.append((function, _DECLARED))
             continue
         else:
-            found.append(function.definition("available_externally hidden"))
+            found.append((function, "available_externally hidden"))
         todo += [callee for callee in calls[name] if callee not in seen]
         seen.update(calls[name])
     return found

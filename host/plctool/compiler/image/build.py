@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from plctool.compiler.base.garbage import no_collection
 from plctool.compiler.base.nesting import room_for_nesting
+from plctool.compiler.codegen.kept_code import KeptCode
 from plctool.compiler.codegen.link import Linked, link
 from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
@@ -94,21 +96,33 @@ def build_program(
     *,
     keeps: bool = True,
     change: OnlineChange | None = None,
+    code: KeptCode | None = None,
+    changed: Collection[Pou] | None = None,
 ) -> BuildResult:
     """Compiles a checked program. `keeps`: whether RETAIN and PERSISTENT variables outlive a start. `change`: how it
-    takes the place of the program that runs; what is in the way is added to it. Raises UsageError when the target
-    cannot run it."""
+    takes the place of the program that runs; what is in the way is added to it. `code`: that of the last build in this
+    process, which is kept; `changed`: the units that differ from it, as in `KeptCode.lower`. Raises UsageError when the
+    target cannot run it."""
     with no_collection():
-        return _build(program, options, info or ApplicationInfo(), keeps, change)
+        with room_for_nesting():
+            lowered = lower(program, options) if code is None else code.lower(program, options, changed)
+        is_kept = code is not None and not options.passes.dump_after
+        objects = emit_objects(lowered.parts, options, code.objects_of(lowered.parts) if code and is_kept else ())
+        if code is not None:
+            code.keep_objects(lowered.parts, objects)
+        return _build(program, options, info or ApplicationInfo(), keeps, change, lowered, objects)
 
 
 def _build(
-    program: TypedProgram, options: Options, info: ApplicationInfo, keeps: bool, change: OnlineChange | None
+    program: TypedProgram,
+    options: Options,
+    info: ApplicationInfo,
+    keeps: bool,
+    change: OnlineChange | None,
+    lowered: Lowered,
+    objects: list[bytes],
 ) -> BuildResult:
     target = options.target
-    with room_for_nesting():
-        lowered = lower(program, options)
-    objects = emit_objects(lowered.parts, options)
     linked = link(objects, target, lowered.entries, lowered.imports, options.cache)
     symbols = _symbols(program, lowered, linked, target, info.project, steps=options.steps)
     kept = kept_parts(v for v in program.globals if keeps and v.area is Area.RETAIN)

@@ -55,6 +55,15 @@ class CallGraph:
         if caller is not None:
             self._calls.setdefault(caller, {}).setdefault(callee, pos)
 
+    def of(self, caller: Pou) -> list[Pou]:
+        """Returns what a unit calls, in the order of its calls."""
+        return list(self._calls.get(caller, ()))
+
+    def forget(self, caller: Pou) -> None:
+        """Forgets the calls of a unit, whose body is checked again."""
+        if caller in self._calls:
+            self._calls[caller].clear()
+
     def add_possible(self, caller: Pou, targets: Iterable[Pou], pos: Pos) -> None:
         """Notes a call through a pointer or an interface: one of `targets` runs."""
         self._possible.append((caller, list(targets), pos))

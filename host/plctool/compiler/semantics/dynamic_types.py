@@ -135,12 +135,21 @@ class Dispatches:
         self._own_calls: list[tuple[Pou, Dispatch, Pos]] = []
         self._other_calls: list[tuple[Pou, Pou, Dispatch | None, Pos]] = []
 
+    @property
+    def count(self) -> int:
+        """How many there are, with what asks for interfaces."""
+        return len(self._dispatches) + sum(1 for _ in self.queries.pous())
+
     def dispatch(self, cls: ClassInfo, key: str, function: Pou) -> Dispatch | None:
         """For a call of the member `key`, or of the body for "", of an instance of `cls` or of a class that conforms;
         None when there is only `cls`."""
         if not cls.is_interface and not cls.number:
             return None
         return self._dispatches.setdefault((cls, key), Dispatch(function))
+
+    def calls_of(self, caller: Pou) -> int:
+        """Returns how many calls of a unit depend on classes."""
+        return sum(call[0] is caller for call in (*self._own_calls, *self._other_calls))
 
     def note_own_call(self, caller: Pou | None, dispatch: Dispatch, pos: Pos) -> None:
         """A call on the own instance, which counts as recursion when it leads back."""

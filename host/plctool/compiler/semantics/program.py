@@ -6,9 +6,11 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 
 from plctool.compiler.base.information import NO_INFORMATION, Information
 from plctool.compiler.base.internal import note_position
+from plctool.compiler.semantics.body_records import BodyRecords
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.construction import construct, construct_new
 from plctool.compiler.semantics.declarations.classes import Classes
@@ -54,6 +56,7 @@ class Program:
         self.may_recurse = False
         self.trail: Variable | None = None
         self.checked: list[Scope] = []  # of bodies without errors
+        self.records: BodyRecords | None = None  # for a process in which a changed body is checked again alone
         self.world = World(library, diagnostics, io, self._declared_by, information, previous)
 
     def _declared_by(self, world: World) -> Declarers:
@@ -145,7 +148,8 @@ class Program:
         before = world.diagnostics.errors
         world.pause()
         try:
-            write_body(Checker(world, scope), statements_of(world, decl, scope))
+            with nullcontext() if self.records is None else self.records.noted(world, scope, decl):
+                write_body(Checker(world, scope), statements_of(world, decl, scope))
         except Exception as error:
             note_position(error, scope.pos(decl.pos))
             raise

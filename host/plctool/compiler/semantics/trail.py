@@ -14,7 +14,7 @@ from plctool.iec.types import UDINT, ArrayType
 
 def reserve_trail(world: World) -> Variable | None:
     """The variable; None for a program in which no exception leaves a `__TRY` that is around a call."""
-    where = next((pou for pou in world.pous if _lets_out(pou)), None)
+    where = next((pou for pou in world.pous if lets_out(pou)), None)
     if where is None:
         return None
     variable = Variable(TRAIL, ArrayType(UDINT, ((0, DEPTH),)), Storage.AREA, where.pos)
@@ -22,5 +22,6 @@ def reserve_trail(world: World) -> Variable | None:
     return variable
 
 
-def _lets_out(pou: Pou) -> bool:
+def lets_out(pou: Pou) -> bool:
+    """True if an exception may leave a `__TRY` of the unit."""
     return any(isinstance(node, Try) and (node.exception is None or node.last) for node in walk(pou.body))

@@ -200,6 +200,14 @@ class World:
         self.loops: list[tuple[Pou, Loop]] = []  # of the program, each with the unit it stands in
         self.declared = declared_by(self)
 
+    @property
+    def extent(self) -> tuple[int, ...]:
+        """How much there is of all that the check of a body may add to."""
+        added = (self.allocation.variables, self.allocation.once_placed, self.blocks, self.open_members)
+        made = (self.interfaces, self.defaults, self.shared, self.enumeration_texts, self._copiers, self._texts)
+        more = (self._defaults_in_memory, self.constants, self.inferred, self.pools, self.closers, self.clock)
+        return (*(len(of) for of in (*added, *made, *more)), bool(self.bodies), self.dispatches.count)
+
     def scope(self, source: Source, *, library: bool = False) -> Scope:
         """An empty scope in a source."""
         return Scope(self.names, source, library)

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import islice
 from typing import Literal
 
 from plctool.compiler.base.missing_names import Use, library_of, table
@@ -109,6 +110,21 @@ class Diagnostics:
     def quiet(self, paths: Iterable[str]) -> None:
         """There are no warnings about these files."""
         self._quiet |= frozenset(paths)
+
+    @property
+    def count(self) -> int:
+        """How many findings there are."""
+        return len(self._found)
+
+    def since(self, count: int) -> list[Diagnostic]:
+        """Returns the findings after the first `count`."""
+        return list(islice(self._found, count, None))
+
+    def begin_again(self, found: Iterable[Diagnostic]) -> None:
+        """Puts these findings, which are warnings, in place of all that there are."""
+        self._found = dict.fromkeys(found)
+        self._reported = {(d.code, Pos(d.file, d.line, d.column)) for d in self._found}
+        self.errors = self._counted = 0
 
     def is_quiet(self, path: str) -> bool:
         """Whether there are no warnings about a file."""

@@ -76,7 +76,7 @@ def tree_key(source: Source, declared: frozenset[str]) -> str:
 def _parser() -> str:
     """A hash of the code that makes trees."""
     digest = sha256()
-    root = Path(__file__).parent
+    root = Path(__file__).parents[1]
     for folder in (root / "syntax", root / "base", root.parent / "iec"):
         for file in sorted(folder.iterdir()):
             if file.suffix in (".py", ".lark"):
