@@ -96,6 +96,17 @@ def test_node_that_is_pulled_is_lost_and_comes_back_while_others_keep_running(pl
     assert of_manager(plc) == [f"{name} is lost: its heartbeat is missing", f"{name} is back"]
 
 
+@pytest.mark.parametrize("seconds", [0.01, 0.1, 1, 10, 60, 600, 3600])
+def test_node_is_back_after_10_ms_to_an_hour(plc: Simulator, seconds: float) -> None:
+    plc.fault("Second", "absent")
+    plc.run_for(round(seconds * 1000))
+    assert in_operation(plc, "Valves", "Third")
+    plc.fault("Second", "absent", 0)
+    plc.run_for(BOOT_MS + 600)  # a node that was away for a moment is lost by its boot-up
+    assert in_operation(plc)
+    assert of_manager(plc)[-1] == "Second is back"
+
+
 def test_node_is_back_whenever_it_is_pulled_while_it_boots(tmp_path: Path) -> None:
     path = write_program(tmp_path)
     with Simulator.from_sources(path) as plc:
