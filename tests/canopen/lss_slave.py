@@ -1,34 +1,31 @@
-"""A device that speaks LSS (CiA 305) on a virtual bus."""
+"""A device that speaks LSS (CiA 305)."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import can
 
 REPLY, REQUEST = 0x7E4, 0x7E5
+Identity = tuple[int, int, int, int]  # vendor, product, revision, serial
 
 
-class LssSlave:
-    """Replies in a thread of python-can. `identity`: vendor, product, revision, serial."""
+class LssDevice:
+    """Replies by `send` to the requests that `take` is given."""
 
     def __init__(
-        self, channel: str, identity: tuple[int, int, int, int], node: int = 0xFF, *, refuses: int = 0
+        self, send: Callable[[can.Message], None], identity: Identity, node: int = 0xFF, *, refuses: int = 0
     ) -> None:
-        self.identity, self.node, self.refuses = identity, node, refuses
+        self._send, self.identity, self.node, self.refuses = send, identity, node, refuses
         self.bit_rate: int | None = None
         self.stored = False
         self._position, self._selected, self._matches = 0, False, 0
-        self._bus = can.Bus(interface="virtual", channel=channel)
-        self._notifier = can.Notifier(self._bus, [self._take], timeout=0.05)
-
-    def close(self) -> None:
-        self._notifier.stop()
-        self._bus.shutdown()
 
     def _reply(self, *data: int) -> None:
         frame = bytes(data).ljust(8, b"\0")
-        self._bus.send(can.Message(arbitration_id=REPLY, is_extended_id=False, data=frame))
+        self._send(can.Message(arbitration_id=REPLY, is_extended_id=False, data=frame))
 
-    def _take(self, message: can.Message) -> None:
+    def take(self, message: can.Message) -> None:
         if message.arbitration_id != REQUEST or len(message.data) != 8:
             return
         data = bytes(message.data)
@@ -75,3 +72,16 @@ class LssSlave:
             if bit == 0 and part == 3 and following == 0:
                 self._selected = True
             self._reply(0x4F)
+
+
+class LssSlave(LssDevice):
+    """A device on a virtual bus, in a thread of python-can."""
+
+    def __init__(self, channel: str, identity: Identity, node: int = 0xFF, *, refuses: int = 0) -> None:
+        self._bus = can.Bus(interface="virtual", channel=channel)
+        super().__init__(self._bus.send, identity, node, refuses=refuses)
+        self._notifier = can.Notifier(self._bus, [self.take], timeout=0.05)
+
+    def close(self) -> None:
+        self._notifier.stop()
+        self._bus.shutdown()
