@@ -614,7 +614,7 @@
 #define CANOPEN_CALL_SIZE 256
 #endif
 
-/* 1: the manager transfers objects of 128 bytes and more in blocks (CanopenSdoClient.h): 1 KiB of flash, 16 bytes of RAM
+/* 1: the manager transfers objects of 128 bytes and more in blocks (CanopenSdoClient.h): 1.1 KiB of flash, 16 bytes of RAM
  * for each node and transfer. */
 #ifndef CANOPEN_SDO_BLOCK
 #define CANOPEN_SDO_BLOCK (CANOPEN_CALL_SIZE >= 128)
