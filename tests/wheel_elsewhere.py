@@ -17,6 +17,7 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from debian_kernel import apt_settings
 from wheel import PROGRAM
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -67,27 +68,13 @@ def run(command: list[str], folder: Path, **environment: str) -> str:
 # ---- a Python for the processor ----
 
 
-def apt_settings(machine: Machine, folder: Path) -> Path:
-    """Those of an apt that knows another processor, and touches nothing of this system."""
-    for name in ("state/lists/partial", "cache/archives/partial"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-    (folder / "status").touch()
-    settings = folder / "apt.conf"
-    settings.write_text(
-        f'APT::Architecture "{machine.debian}";\nAPT::Architectures {{ "{machine.debian}"; }};\n'
-        f'Dir::State "{folder}/state";\nDir::State::status "{folder}/status";\nDir::Cache "{folder}/cache";\n'
-        'Debug::NoLocking "true";\nAPT::Sandbox::User "";\n'
-    )
-    return settings
-
-
 def make_root(machine: Machine) -> Path:
     """A folder with Debian's Python, fetched once."""
     folder = KEPT / machine.debian
     root = folder / "root"
     if (root / "complete").exists():
         return root
-    settings = {"APT_CONFIG": str(apt_settings(machine, folder))}
+    settings = {"APT_CONFIG": str(apt_settings(machine.debian, folder))}
     attempt(["apt-get", "-qq", "update"], folder, **settings)  # a part of the lists may be enough
     wanted = ["apt-get", "-qq", "-y", "--no-install-recommends", "--download-only", "install", *machine.packages]
     done = attempt(wanted, folder, **settings)

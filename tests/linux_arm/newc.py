@@ -5,15 +5,18 @@ from __future__ import annotations
 import os
 import stat
 import sys
+from collections.abc import Iterable
+from typing import BinaryIO
 
 
-def entry(number: int, name: str) -> bytes:
-    info = os.lstat(name)
+def entry(number: int, name: str, folder: str = ".") -> bytes:
+    place = os.path.join(folder, name)
+    info = os.lstat(place)
     data = b""
     if stat.S_ISLNK(info.st_mode):
-        data = os.readlink(name).encode()
+        data = os.readlink(place).encode()
     elif stat.S_ISREG(info.st_mode):
-        with open(name, "rb") as file:
+        with open(place, "rb") as file:
             data = file.read()
     return packed(number, name, info.st_mode, data)
 
@@ -28,7 +31,11 @@ def padded(data: bytes) -> bytes:
     return data + bytes(-len(data) % 4)
 
 
+def archive(names: Iterable[str], out: BinaryIO, folder: str = ".") -> None:
+    for number, name in enumerate(names, 1):
+        out.write(entry(number, name, folder))
+    out.write(packed(0, "TRAILER!!!", 0, b""))
+
+
 if __name__ == "__main__":
-    for number, line in enumerate(sys.stdin.read().splitlines(), 1):
-        sys.stdout.buffer.write(entry(number, line))
-    sys.stdout.buffer.write(packed(0, "TRAILER!!!", 0, b""))
+    archive(sys.stdin.read().splitlines(), sys.stdout.buffer)
