@@ -21,7 +21,7 @@ from plctool.compiler.syntax.lexer import KEYWORDS
 from plctool.iec.types import ELEMENTARY
 from plctool.sim import Simulator
 
-PROGRAMS = [p.read_text("latin-1") for p in sorted((Path(__file__).parents[1] / "st").glob("*.st"))]
+PROGRAMS = [p.read_text("latin-1") for p in sorted((Path(__file__).parents[1] / "st").rglob("*.st"))]
 VARIABLES = "x : INT; b : BOOL; a : ARRAY[0..3] OF INT;"
 DEEP = 20_000
 

@@ -19,7 +19,7 @@ from plctool.errors import UsageError
 from plctool.image.targets import find_target
 from plctool.sim import Simulator
 
-STRINGS = Path(__file__).parents[1] / "st/insert_delete_and_replace_may_change_their_own_string.st"
+STRINGS = Path(__file__).parents[1] / "st/strings/insert_delete_and_replace_may_change_their_own_string.st"
 LINES = 800  # of one body, which is more than one function takes
 
 TEXT = """FUNCTION_BLOCK Ramp

@@ -25,7 +25,7 @@ from plctool.image.targets import DEFAULT_TARGET, find_target
 from plctool.sim import Simulator
 
 FOLDER = Path(__file__).parents[1] / "st"
-PROGRAMS = sorted(FOLDER.glob("*.st"))
+PROGRAMS = sorted(FOLDER.rglob("*.st"))
 
 Value = bool | int | float | str
 
@@ -224,6 +224,15 @@ def test_every_comment_that_looks_like_a_directive_is_one() -> None:
         if head.match(line) and not DIRECTIVE.match(line)
     ]
     assert not misspelt
+
+
+def test_every_program_is_in_the_folder_of_a_subject() -> None:
+    listed = re.findall(r"^\| `(\w+)` \|", (FOLDER / "README.md").read_text(), re.MULTILINE)
+    assert {path.parent for path in PROGRAMS} == {FOLDER / name for name in listed}
+
+
+def test_names_of_programs_differ() -> None:
+    assert len({path.name for path in PROGRAMS}) == len(PROGRAMS)
 
 
 def test_every_program_expects_something() -> None:
