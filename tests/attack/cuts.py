@@ -121,7 +121,7 @@ STORIES = {
 class Cuts(Campaign):
     name = "cut"
     promise = "a power cut at any write leaves the old or the new program, whole"
-    short = 75
+    short = 30
 
     def cases(self) -> list[Case]:
         cases = []
@@ -148,7 +148,7 @@ class Cuts(Campaign):
 class Calls(Campaign):
     name = "call"
     promise = "a flash operation that fails, once or from then on, loses no program"
-    short = 75
+    short = 30
 
     def cases(self) -> list[Case]:
         chooser = random.Random(self.shop.seed)

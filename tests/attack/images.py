@@ -201,7 +201,7 @@ def hostile(shop: Workshop, base: str, kind: str, number: int) -> bytes:
 class Images(Campaign):
     name = "image"
     promise = "an image may hold anything: it is refused, or runs, or dies and is rolled back"
-    short = 150
+    short = 60
 
     def cases(self) -> list[Case]:
         kinds = list(MUTATIONS)

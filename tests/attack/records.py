@@ -64,7 +64,7 @@ def records(content: bytes) -> Iterator[Record]:
 class Records(Campaign):
     name = "record"
     promise = "a record may hold anything: a whole program runs, or it is stopped with the reason"
-    short = 30
+    short = 15
 
     def cases(self) -> list[Case]:
         return [

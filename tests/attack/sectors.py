@@ -19,7 +19,7 @@ PATTERNS = ("FF", "00", "random")
 class Sectors(Campaign):
     name = "sector"
     promise = "a lost sector costs the program that is in it, and nothing else"
-    short = 30
+    short = 15
 
     def cases(self) -> list[Case]:
         return [
