@@ -226,7 +226,7 @@ PROPERTIES = $(sort $(shell grep -rl --include='test_*.py' 'from hypothesis' tes
 
 properties: build/build.ninja
 	ninja --quiet -C build under_attack
-	@PYTHONPATH=.:host:build/host PLCRT=$(abspath build/firmware/port/linux/plcrt) \
+	@TEST_WHOLE=1 PYTHONPATH=.:host:build/host PLCRT=$(abspath build/firmware/port/linux/plcrt) \
 		$(BIN)/python -m pytest --quiet -m hypothesis --hypothesis-profile=new $(PROPERTIES) $(ARGS)
 
 # What the tests of the extension need, where npm is. Without it, or where its registry cannot be reached, they are skipped.

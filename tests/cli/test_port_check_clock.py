@@ -7,8 +7,9 @@ import random
 from unittest.mock import Mock
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.port_check.checks import Checks
 from plctool.port_check.clock import Rate, Reading, measure
@@ -33,7 +34,7 @@ def readings(drift=0.0, *, span=4.0, pause=0.02, trip=(0.001, 0.002), stalls=(),
     return found
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(st.floats(-0.2, 0.2), st.integers(0, 10**6))
 def test_the_rate_of_a_steady_clock_is_found(drift, seed):
     rate = measure(readings(drift, seed=seed), SHARPNESS)
@@ -41,7 +42,7 @@ def test_the_rate_of_a_steady_clock_is_found(drift, seed):
     assert rate.uncertainty < 0.01
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(st.integers(0, 10**6))
 def test_stalls_of_the_clock_are_no_drift(seed):
     chance = random.Random(seed)

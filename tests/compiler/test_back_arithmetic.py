@@ -8,8 +8,9 @@ import struct
 
 import pytest
 from back_support import ProgramBuilder, Running, binary, const, load, place
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
 from plctool.compiler.typed.nodes import (
@@ -51,7 +52,7 @@ INTEGERS = [SINT, INT, DINT, LINT, USINT, UINT, UDINT, ULINT]
 BITS = [BYTE, WORD, DWORD, LWORD]
 DIVIDEBYZERO = 0x102
 NO_DIV = ALL_CHECKS - {Check.DIV}
-few = settings(max_examples=30)
+few = examples(30)
 
 
 def wrap(value: int, t: Elementary) -> int:
@@ -204,7 +205,7 @@ def test_comparisons(t: Elementary) -> None:
     }  # fmt: skip
     strategy = reals if t in (REAL, LREAL) else values(t)
 
-    @settings(max_examples=25)
+    @examples(25)
     @given(strategy, strategy)
     def check(a: float, b: float) -> None:
         for op, model in table.items():
@@ -239,7 +240,7 @@ def test_bool_conversions() -> None:
 def test_reals_to_integers_round_and_saturate(source: Elementary, target: Elementary, how: str) -> None:
     low, high = limits(target)
 
-    @settings(max_examples=40)
+    @examples(40)
     @given(reals)
     def check(a: float) -> None:
         got = evaluate(how, (source,), target, a)

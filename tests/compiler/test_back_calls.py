@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 from back_support import POS, ProgramBuilder, binary, build, const, load, place
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler.typed.nodes import (
     ArrayInit,
@@ -342,7 +343,7 @@ def test_string_assignment_cuts_and_leaves_the_neighbours_alone(source: int, tar
     run = p.run(assign(b, load(a)))
     run["before"] = run["after"] = 0xA5
 
-    @settings(max_examples=40)
+    @examples(40)
     @given(text)
     def check(value: str) -> None:
         run["a"] = value[:source]
@@ -362,7 +363,7 @@ def test_strings_compare_byte_by_byte(capacities: tuple[int, int]) -> None:
     results = [p.variable(op.name, BOOL) for op in ops]
     run = p.run(*(assign(r, binary(op, load(a), load(b))) for op, r in zip(ops, results, strict=True)))
 
-    @settings(max_examples=80)
+    @examples(80)
     @given(text, st.one_of(text, st.none()), st.integers(0, 80))
     def check(left: str, right: str | None, cut: int) -> None:
         x = left[: capacities[0]]

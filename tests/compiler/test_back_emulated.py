@@ -97,7 +97,7 @@ def emulated(builds: list[BuildResult], target: str, folder: Path) -> dict[int, 
 )
 def test_programs_mean_the_same_on_every_processor(target: str, options: dict[str, Any], tmp_path: Path) -> None:
     chosen = Options(find_target(target), **options)
-    seeds = share(SEEDS, 2, len(f"{target}{options}"))
+    seeds = share(SEEDS, 4, len(f"{target}{options}"))
     builds = [build_program(Generator(seed).program(), chosen) for seed in seeds]
     found = emulated(builds, target, tmp_path)
     for number, seed in enumerate(seeds):

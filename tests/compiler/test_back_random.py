@@ -287,7 +287,7 @@ def outcome(program: TypedProgram, level: int) -> list[tuple[int, object, bytes]
     return found
 
 
-@pytest.mark.parametrize("seed", share(range(36), 3))
+@pytest.mark.parametrize("seed", share(range(36), 6))
 def test_optimised_programs_do_the_same(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = outcome(Generator(seed).program(), 0)
     assert outcome(Generator(seed).program(), 2) == expected

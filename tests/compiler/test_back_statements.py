@@ -6,8 +6,9 @@ import functools
 
 import pytest
 from back_support import POS, ProgramBuilder, Running, binary, const, load, place, pos
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
 from plctool.compiler.typed.nodes import (
@@ -159,7 +160,7 @@ def test_for_runs_as_specified_at_all_limits(t: Elementary, modified: bool) -> N
     number = edge.map(lambda v: min(max(v, low), high))
     steps = st.sampled_from([1, 2, 3, 7, 100, -1, -2, -7, -100, -128])
 
-    @settings(max_examples=250)
+    @examples(250)
     @given(number, number, steps, st.booleans(), st.booleans(), st.sampled_from([0, 2]))
     def check(start: int, stop: int, step: int, signed: bool, constant: bool, level: int) -> None:
         step_type = SIGNED[t.bits] if signed or step < 0 else t

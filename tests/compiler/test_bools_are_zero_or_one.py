@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool import Simulator
 from plctool.compiler.base.source import Source
@@ -68,7 +69,7 @@ TERMS = st.recursive(
 )
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.lists(TERMS, min_size=12, max_size=12))
 @pytest.mark.parametrize("level", [0, 2])
 def test_every_result_is_the_byte_zero_or_one(level: int, terms: list[Term]) -> None:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import pytest
 from checked_program import checked
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler import Level, compile_sources
 from plctool.debug.symbols import SymbolTable
@@ -101,7 +102,7 @@ def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
     return [(place.pou, place.line) for place in symbols.call_stack(exception.code_offset, exception.trace)]
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(units=UNITS, connected=st.booleans())
 @example(
     units=[

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 from front_support import check, main, messages, verify
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler import compile_sources
 from plctool.compiler.front import Source, check_sources
@@ -126,13 +127,13 @@ def test_mutated_programs_are_diagnosed(seed: int) -> None:
             raise AssertionError(f"seed {seed}:\n{text}") from error
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(st.text())
 def test_any_text_is_diagnosed(text: str) -> None:
     all_of(text)
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(st.lists(st.sampled_from([*KEYWORDS, *OPERATORS, *VALUES, "x", ";", ":", ","]), max_size=40))
 def test_any_tokens_are_diagnosed(tokens: list[str]) -> None:
     all_of(" ".join(tokens))

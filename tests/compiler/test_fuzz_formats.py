@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 import test_codesys2_networks as codesys2
 import twincat_archive
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from plcopen_support import pou, project, variables
+from shares import examples
 from test_codesys2_exports import HARDWARE, LIBRARY, PROGRAM, SETTINGS, TASKS, VISUALISATION
 from test_object_texts import COUNTER
 from test_plcopen import BLOCK, GLOBALS, MIXED, TYPES, USER
@@ -90,7 +91,7 @@ SPLICES = [
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-@settings(max_examples=60)
+@examples(60)
 @given(data=st.data())
 def test_a_mutated_file_gives_diagnostics_with_a_line(tmp_path: Path, name: str, data: st.DataObject) -> None:
     text = SAMPLES[name]

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import pytest
 from front_support import verify
+from shares import share
 from test_back_random import meaningful
 
 from plctool.compiler.codegen.lower_unit import Options
@@ -342,7 +343,7 @@ def outcome(program: TypedProgram, level: int) -> list[object]:
     return found
 
 
-@pytest.mark.parametrize("seed", range(14))
+@pytest.mark.parametrize("seed", share(range(14), 3))
 def test_random_program_does_the_same_at_every_level(seed: int) -> None:
     text = Writer(seed, 0).program()
     result = checked(text)
@@ -350,7 +351,7 @@ def test_random_program_does_the_same_at_every_level(seed: int) -> None:
     assert outcome(result.program, 2) == outcome(checked(text).program or result.program, 0), text
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", share(range(4), 2))
 def test_random_program_with_wrong_types_is_diagnosed(seed: int) -> None:
     errors = 0
     for number in range(15):

@@ -7,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler import compile_sources
 from plctool.core import ffi, lib
@@ -69,7 +70,7 @@ run = st.builds(
 )  # fmt: skip
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(
     st.builds(
         Image,
@@ -108,7 +109,7 @@ def test_the_crc_is_that_of_zlib_with_its_own_word_zero() -> None:
     assert zlib.crc32(data) == crc == parse_image(build_image(SAMPLE)).crc
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(st.data())
 def test_every_changed_bit_is_refused(data: st.DataObject) -> None:
     image = bytearray(build_image(SAMPLE))
@@ -125,7 +126,7 @@ def test_every_truncated_image_is_refused() -> None:
             parse_image(image[:length])
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(st.lists(st.tuples(st.integers(0, 103), st.integers(0, 255)), min_size=1, max_size=4))
 def test_a_damaged_header_with_a_good_checksum_never_crashes(changes: list[tuple[int, int]]) -> None:
     image = bytearray(build_image(SAMPLE))
@@ -137,7 +138,7 @@ def test_a_damaged_header_with_a_good_checksum_never_crashes(changes: list[tuple
         assert error.message.endswith("build it again.")
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(st.data())
 def test_damaged_tables_with_a_good_checksum_never_crash(data: st.DataObject) -> None:
     image = bytearray(build_image(SAMPLE))

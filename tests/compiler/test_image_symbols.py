@@ -6,8 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.debug.symbols import (
     CodeUnit,
@@ -253,7 +254,7 @@ def test_without_a_pattern_all_variables_are_listed_as_they_were_declared() -> N
     assert names[:3] == ["Main.n", "Main.word", "Main.fb"] and names[-3:] == ["GVL.x", "Main.limit", "Main.title"]
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(st.text("Mainfb.arr[]234,^-xyq ", max_size=24))
 def test_any_text_is_resolved_or_refused(path: str) -> None:
     try:

@@ -68,7 +68,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> CheckedProgram:
 CASES = [(target, level) for target in WITH_STUBS for level in (0, 2, "s", 1, 3)]
 
 
-@pytest.mark.parametrize(("target", "level"), share(CASES, 2), ids=lambda x: getattr(x, "name", str(x)))
+@pytest.mark.parametrize(("target", "level"), share(CASES, 4), ids=lambda x: getattr(x, "name", str(x)))
 def test_imports_are_those_of_the_processor(program: CheckedProgram, target: Target, level: Level) -> None:
     image = parse_image(program.built(level, target.name).image)
     found = {external.name: find_c_function(external.name, external.signature) for external in image.externals}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from plcopen_support import errors, pou, project, started, variables
+from shares import share
 
 from plctool.compiler import load_sources
 from plctool.compiler.front import check_sources
@@ -85,7 +86,7 @@ LIST = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", share(range(40), 4))
 def test_damaged_lists_are_compiled_or_named(tmp_path: Path, seed: int) -> None:
     r = random.Random(seed)
     lines = [r.choice(LIST) for _ in range(r.randint(1, 30))]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from shares import share
 
 from plctool.compiler import compile_sources
 from plctool.sim import Simulator
@@ -187,7 +188,7 @@ def bodies(seed: int) -> list[list[tuple[str, str, str]]]:
     return found
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", share(range(12), 3))
 def test_random_lists(tmp_path: Path, seed: int) -> None:
     made = bodies(seed)
     numbers = "i0 : INT := 1; i1 : INT := 7; i2 : INT := -3; i3 : INT := 100;"

@@ -184,7 +184,7 @@ def program(model: Model, kind: str) -> str:
     return f"{UNITS}PROGRAM Main VAR {DECLARATIONS} {rest}\n{model.body}\nEND_PROGRAM"
 
 
-@pytest.mark.parametrize("seed", share(range(9), 3))
+@pytest.mark.parametrize("seed", share(range(9), 5))
 def test_strings_and_lengths_are_those_of_the_model(seed: int, tmp_path: Path) -> None:
     """The lowering knows the lengths; the optimiser, which takes most of the time, works on some of the programs."""
     model, kind = Model(seed), KINDS[seed % len(KINDS)]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bit_programs import BitProgram, bit_programs, block_programs
-from hypothesis import given, settings
+from hypothesis import given
+from shares import examples
 
 from plctool.compiler.base.source import Source
 from plctool.compiler.codegen.lower_unit import Options
@@ -23,13 +24,13 @@ def run(p: BitProgram) -> None:
         assert {name: plc.read(name) for name in p.expected} == p.expected
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(bit_programs())
 def test_a_write_reaches_its_bit_only(p: BitProgram) -> None:
     run(p)
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(block_programs())
 def test_bits_of_blocks_are_copied_alone(p: BitProgram) -> None:
     run(p)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 from front_support import main, program
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from shares import share
+from shares import examples, share
 
 from plctool import Simulator
 from plctool.compiler import compile_sources
@@ -33,7 +33,7 @@ ACCESSES = st.lists(
 )
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(ACCESSES)
 def test_memory_and_values_are_as_with_every_load_and_store(accesses: list[tuple[bool, Value, int, str]]) -> None:
     whole, held = bytearray(ROOM), Memory()
@@ -78,7 +78,7 @@ SIMPLE = {  # a type and a value that is not its zero
 }  # fmt: skip
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.lists(st.sampled_from([*SIMPLE, "BOOL", "BOOL"]), min_size=8, max_size=8), st.permutations(range(8)))
 @pytest.mark.parametrize("packed", ["", "{attribute 'pack_mode' := '1'}\n"])
 def test_constants_in_a_block_leave_what_is_beside_them_alone(packed: str, types: list[str], order: list[int]) -> None:
@@ -119,7 +119,7 @@ p := ADR(a); q := ADR(list[2]); r REF= b; i := 2;
 """
 
 
-@pytest.mark.parametrize("seed", share(range(12), 3))
+@pytest.mark.parametrize("seed", share(range(12), 6))
 def test_a_program_does_the_same_as_without_optimisation(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from shares import share
 
 from plctool.compiler import compile_sources
 from plctool.sim import Simulator
@@ -57,7 +58,7 @@ def value(m: Member, number: int) -> int:
 
 
 @pytest.mark.parametrize("level", [0, 2])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", share(range(6), 3))
 def test_members_are_where_the_rule_says_and_keep_their_values(seed: int, level: int, tmp_path: Path) -> None:
     types, variables, body, expected = "", "", "", {}
     for k in range(8):

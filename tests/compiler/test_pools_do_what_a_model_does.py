@@ -4,8 +4,9 @@ model, and each keeps its value."""
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -110,7 +111,7 @@ class Model:
 OPERATIONS = st.tuples(st.integers(1, 3), st.integers(0, POINTERS - 1), st.integers(-1, SIZE + 1))
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.lists(OPERATIONS, max_size=40))
 def test_the_elements_in_use_are_those_of_a_model(built: BuildResult, operations: list[tuple[int, int, int]]) -> None:
     model = Model()

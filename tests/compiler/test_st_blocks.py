@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -17,7 +18,7 @@ from plctool.sim import Simulator
 
 CYCLE_MS = 10
 CYCLES = 40
-CASES = settings(max_examples=40)
+CASES = examples(40)
 
 PROGRAM = """
 PROGRAM Main

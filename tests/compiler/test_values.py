@@ -6,8 +6,9 @@ import math
 from datetime import UTC, date, datetime, time, timedelta
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.debug.variables import Change, Symbol
 from plctool.errors import UsageError
@@ -75,7 +76,7 @@ NUMBERS = [SINT, USINT, INT, WORD, DINT, UDINT, ULINT]
 def test_numbers_are_read_as_they_were_written(t: Elementary) -> None:
     low = -(1 << (t.bits - 1)) if t.signed else 0
 
-    @settings(max_examples=50)
+    @examples(50)
     @given(st.integers(low, low + (1 << t.bits) - 1))
     def check(value: int) -> None:
         assert decode(t, encode(t, value)) == value
@@ -299,7 +300,7 @@ TYPES = [
 
 @pytest.mark.parametrize("t", TYPES, ids=str)
 def test_what_is_shown_can_be_typed(t: Type) -> None:
-    @settings(max_examples=60)
+    @examples(60)
     @given(st.binary(min_size=t.size, max_size=t.size))
     def check(data: bytes) -> None:
         if isinstance(t, PointerType):
@@ -387,7 +388,7 @@ def test_what_is_not_all_of_a_variable_cannot_be_written_as_a_whole(t: Type, val
         encode(t, value)
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(st.sampled_from(TYPES), st.text("[](),'\"$ 0123456789abcTRUE#:=-.xy", max_size=24))
 def test_any_text_is_a_value_or_refused(t: Type, text: str) -> None:
     try:
@@ -409,7 +410,7 @@ PYTHON = st.recursive(
 )
 
 
-@settings(max_examples=500)
+@examples(500)
 @given(st.sampled_from(TYPES), PYTHON)
 def test_any_object_of_python_is_a_value_or_refused(t: Type, value: object) -> None:
     try:

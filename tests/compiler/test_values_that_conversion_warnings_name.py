@@ -6,8 +6,9 @@ from __future__ import annotations
 import re
 
 from front_support import check
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.image.build import build_program
@@ -29,7 +30,7 @@ TEXT_CALLS = st.tuples(st.one_of(NUMBERS, PIECES).map(lambda text: f"'{text}'"),
 REAL_CALLS = st.tuples(REALS.map(lambda text: f"LREAL#{text}"), st.just("LREAL"))
 
 
-@settings(max_examples=40)
+@examples(40)
 @example([(("'016#'", "STRING"), "SINT"), (("'016#7F'", "STRING"), "INT"), (("'-002#101'", "STRING"), "INT")])
 @given(st.lists(st.tuples(st.one_of(TEXT_CALLS, REAL_CALLS), st.sampled_from(TYPES)), min_size=10, max_size=30))
 def test_named_values_are_right(calls: list[tuple[tuple[str, str], str]]) -> None:

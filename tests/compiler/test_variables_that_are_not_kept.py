@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from shares import share
 
 from plctool import ProgramStopped, Simulator, UsageError
 from plctool.compiler.base.source import Source
@@ -258,7 +259,7 @@ class Writer:
         )
 
 
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("seed", share(range(25), 4))
 def test_the_program_does_the_same(seed: int) -> None:
     text = Writer(seed).text()
     all_kept, less_kept = build(text, size=False), build(text, size=True)

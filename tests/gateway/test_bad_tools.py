@@ -7,9 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from served import BAUD, PATIENCE, Gate, Served, answer_on
+from shares import examples
 
 from plctool.gateway import server
 from plctool.gateway.frames import MAX_PAYLOAD, PROTOCOL, Frame, Kind, Pipe, Request, document_frame, encode
@@ -62,7 +63,7 @@ def raw(served: Served, data: bytes) -> socket.socket:
 
 
 @given(polite=st.booleans(), sent=st.lists(SENT, max_size=6))
-@settings(max_examples=150)
+@examples(150)
 def test_whatever_a_tool_sends_another_one_is_served(served: Served, polite: bool, sent: list[bytes]) -> None:
     """It may even take the device for itself: when it goes, that ends."""
     served.answer(lambda message: message)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.iec.types import BOOL, ELEMENTARY, Type
 from plctool.io.layout import lay_out
@@ -12,7 +13,7 @@ TYPES = st.sampled_from([BOOL, *(ELEMENTARY[n] for n in ("BYTE", "INT", "REAL", 
 VARIABLES = st.dictionaries(st.from_regex(r"[A-D][a-z]{1,3}", fullmatch=True), TYPES, max_size=40)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(VARIABLES, st.integers(0, 40))
 def test_variables_do_not_overlap_and_are_aligned(variables: dict[str, Type], first: int) -> None:
     found = lay_out(variables, first)
@@ -26,7 +27,7 @@ def test_variables_do_not_overlap_and_are_aligned(variables: dict[str, Type], fi
     assert found.keys() == variables.keys()
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(VARIABLES, st.randoms())
 def test_order_of_the_description_does_not_matter(variables: dict[str, Type], random: object) -> None:
     names = list(variables)

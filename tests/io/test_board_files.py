@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.cli.commands.exports import export_board
 from plctool.cli.commands.io import init
@@ -95,7 +96,7 @@ def written(folder: Path, device: dict[str, Any]) -> Path | None:
 
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only"]
 COMMENTED = re.compile(r"^# (?=\[|\w+ = )", re.MULTILINE)
-SETTINGS = settings(max_examples=30)
+SETTINGS = examples(30)
 
 
 @SETTINGS

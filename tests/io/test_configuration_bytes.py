@@ -7,8 +7,9 @@ from dataclasses import replace
 from itertools import accumulate
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
@@ -50,7 +51,7 @@ CONFIGURATIONS = st.builds(
 )
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(CONFIGURATIONS)
 def test_what_is_read_is_what_was_written(configuration: Configuration) -> None:
     packed = pack_configuration(configuration)
@@ -58,7 +59,7 @@ def test_what_is_read_is_what_was_written(configuration: Configuration) -> None:
     assert len(packed) % 4 == 0
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(CONFIGURATIONS, st.data())
 def test_what_is_cut_off_is_refused(configuration: Configuration, data: st.DataObject) -> None:
     packed = pack_configuration(configuration)
@@ -66,7 +67,7 @@ def test_what_is_cut_off_is_refused(configuration: Configuration, data: st.DataO
         parse_configuration(packed[: data.draw(st.integers(0, len(packed) - 1))])
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(CONFIGURATIONS, st.data())
 def test_changed_bytes_are_read_or_refused(configuration: Configuration, data: st.DataObject) -> None:
     packed = bytearray(pack_configuration(configuration))

@@ -7,8 +7,9 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.cli.commands.exports import export_board
 from plctool.cli.commands.io import init
@@ -145,7 +146,7 @@ def taken_or_reported(folder: Path, description: str, device: str) -> None:
             compile_sources([folder], target="cortex-m3")
 
 
-HOW = settings(max_examples=40)
+HOW = examples(40)
 
 
 @HOW

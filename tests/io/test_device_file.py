@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.errors import UsageError
 from plctool.iec.types import ELEMENTARY
@@ -129,7 +130,7 @@ VALUES = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(st.sampled_from(NAMES), VALUES)
 def test_default_that_is_taken_is_a_value_of_its_type(name: str, value: str) -> None:
     device, found = read(parameter(f"type = '{name}', default = {value}"))

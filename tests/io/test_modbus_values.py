@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from itertools import chain
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.core import ffi, lib
 from plctool.files import Pos
@@ -130,7 +131,7 @@ def job(found: Sequence[Variable], function: int, order: str) -> tuple[object | 
 ORDERS = st.sampled_from(["ABCD", "CDAB", "BADC", "DCBA"])
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(st.lists(variables(), min_size=1, max_size=4))
 def test_coils_have_the_bits_of_the_variables_one_after_the_other(found: list[Variable]) -> None:
     made, channels, mistakes = job(found, 15, "ABCD")
@@ -142,7 +143,7 @@ def test_coils_have_the_bits_of_the_variables_one_after_the_other(found: list[Va
     assert bits_of_data(copied(channels, found, len(wanted)))[: len(wanted)] == wanted
 
 
-@settings(max_examples=400)
+@examples(400)
 @given(st.lists(variables(), min_size=1, max_size=4), ORDERS)
 def test_registers_have_the_bytes_of_the_variables_in_their_order(found: list[Variable], order: str) -> None:
     made, channels, mistakes = job(found, 16, order)
@@ -155,7 +156,7 @@ def test_registers_have_the_bytes_of_the_variables_in_their_order(found: list[Va
     assert sent(copied(channels, found, 8 * len(wanted)), reverse) == wanted
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(variables().filter(lambda v: v.type.size <= 2), ORDERS, st.binary(min_size=2, max_size=2))
 def test_mask_write_changes_the_bits_of_the_variable_only(variable: Variable, order: str, before: bytes) -> None:
     made, channels, mistakes = job([variable], 22, order)
@@ -184,7 +185,7 @@ def server_range(variable: Variable, table: int, order: str, bit: int | None = N
     return made, channel
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(variables(), ORDERS)
 def test_registers_of_a_server_have_the_bytes_of_a_variable(variable: Variable, order: str) -> None:
     made, channel = server_range(variable, int(lib.MODBUS_INPUT_REGISTERS), order)
@@ -195,7 +196,7 @@ def test_registers_of_a_server_have_the_bytes_of_a_variable(variable: Variable, 
     assert sent(copied([channel], [variable], made.bits), made.reverse) == wanted  # type: ignore[attr-defined]
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(variables())
 def test_coils_of_a_server_have_the_bits_of_a_variable(variable: Variable) -> None:
     made, channel = server_range(variable, int(lib.MODBUS_DISCRETE_INPUTS), "ABCD")

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from io_support import addresses, build, messages
+from shares import examples
 
 PROGRAM = """\
 TYPE Point : STRUCT x : INT; y : INT; END_STRUCT; END_TYPE
@@ -86,7 +87,7 @@ INDICES = st.integers(-3, 3)
 SPELLINGS = st.sampled_from(["{}", " {}", "{} ", "0{}", "00{}"])
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(INDICES, INDICES, SPELLINGS, SPELLINGS)
 def test_elements_are_the_same_if_their_numbers_are(tmp_path: Path, i: int, j: int, one: str, other: str) -> None:
     program = "PROGRAM Main\nVAR list : ARRAY[-3..3] OF INT; END_VAR\nlist := list;\nEND_PROGRAM\n"

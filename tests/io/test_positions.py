@@ -6,8 +6,9 @@ import json
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.io.positions import BadToml, Path, TomlText
 
@@ -46,7 +47,7 @@ def _paths(value: Any, path: Path = ()) -> list[tuple[Path, Any]]:
     return found
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(TABLES, st.booleans())
 def test_keys_and_values_are_where_they_stand(tables: dict[str, dict[str, Any]], arrays: bool) -> None:
     opening, closing = ("[[", "]]") if arrays else ("[", "]")

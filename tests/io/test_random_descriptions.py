@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from io_support import build, configuration
+from shares import examples
 
 from plctool.io.configuration import ConnectorEntry
 
@@ -17,7 +18,7 @@ DEVICES = st.lists(st.tuples(st.booleans(), st.booleans(), CHANNELS), min_size=1
 STOPS = {0: '"hold"', 1: '"zero"', 2: "1"}
 
 
-@settings(max_examples=12)
+@examples(12)
 @given(DEVICES)
 def test_image_has_what_was_described(tmp_path: Path, devices: list[Any]) -> None:
     declared, used, text = [], [], ""

@@ -9,8 +9,9 @@ from contextlib import suppress
 
 import pytest
 from fake_device import FakeDevice, FakeLine, damage
-from hypothesis import given, reject, settings
+from hypothesis import given, reject
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.core import lib
 from plctool.errors import LinkError
@@ -224,7 +225,7 @@ def exchange_surely(connection: Connection, message: bytes) -> bytes:
     return connection.exchange(message)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(
     st.integers(0, 2**32),
     st.sampled_from([0.0003, 0.001]),
@@ -245,7 +246,7 @@ def test_messages_arrive_intact_over_bad_lines(
     assert {m[0] for m in device.messages} == {0, 1, 2}
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.integers(0, 2**32), st.sampled_from([0.003, 0.01, 0.1]), st.integers(1, 3000))
 def test_over_hopeless_lines_a_message_arrives_intact_or_fails(seed: int, rate: float, size: int) -> None:
     line = FakeLine(FakeDevice(reverse), to_device=damage(seed, rate), to_client=damage(seed + 1, rate))
@@ -256,7 +257,7 @@ def test_over_hopeless_lines_a_message_arrives_intact_or_fails(seed: int, rate: 
         assert error.exit_code == 3
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.integers(0, 2**32), st.integers(1, 12))
 def test_streams_lose_no_request_and_invent_no_reply(seed: int, count: int) -> None:
     device = FakeDevice(acknowledge, buffer_size=2048)
@@ -288,7 +289,7 @@ def test_requests_may_share_replies() -> None:
     assert connection.exchange(b"after") == acknowledge(b"after")
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.integers(0, 2**32), st.sampled_from([0.0002, 0.001]))
 def test_shared_replies_arrive_over_bad_lines(seed: int, rate: float) -> None:
     device = FakeDevice(acknowledge, buffer_size=2048)
@@ -587,7 +588,7 @@ def test_packages_of_strangers_and_nonsense_are_ignored() -> None:
     assert connection.exchange(b"ab") == b"ba"
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(st.integers(0, 2**32), st.integers(1, 2000))
 def test_a_device_that_talks_nonsense_gives_a_link_error_or_the_right_answer(seed: int, size: int) -> None:
     """Its packages are changed before they get their frame CRC, so all of the nonsense reaches the channel."""

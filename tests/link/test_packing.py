@@ -6,8 +6,9 @@ import random
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 from test_runtime import SimSerial, damage, power_on
 
 from plctool.compiler import compile_sources
@@ -50,7 +51,7 @@ def runtime() -> Iterator[None]:
     yield
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(code=CODE)
 def test_what_was_packed_arrives(code: bytes) -> None:
     power_on()

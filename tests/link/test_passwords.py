@@ -8,8 +8,9 @@ import hmac
 
 import pytest
 from fake_device import FakeDevice, FakeLine, FakePlc
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError, UsageError
@@ -53,7 +54,7 @@ def test_the_keys_are_those_of_scram_sha_256() -> None:
 
 
 @given(st.text(min_size=8, max_size=40), st.binary(min_size=16, max_size=16))
-@settings(max_examples=20)
+@examples(20)
 def test_a_proof_shows_the_key_of_the_verifier(password: str, nonce: bytes) -> None:
     verifier = verifier_of(password)
     challenge = nonce + verifier[32:]

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 
 import pytest
 from fake_device import damage
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 from small_app import RETURN, make_application
 
 from plctool.core import ffi, lib
@@ -97,7 +98,7 @@ def test_a_second_client_learns_that_the_device_is_busy() -> None:
     assert services.echo(second, b"mine") == b"mine"
 
 
-@settings(max_examples=10)
+@examples(10)
 @given(st.integers(0, 2**32), st.sampled_from([0.0003, 0.001]))
 def test_over_bad_lines_everything_arrives_intact(seed: int, rate: float) -> None:
     power_on()
@@ -109,7 +110,7 @@ def test_over_bad_lines_everything_arrives_intact(seed: int, rate: float) -> Non
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the application's code is for x86-64")
-@settings(max_examples=5)
+@examples(5)
 @given(st.integers(0, 2**32))
 def test_what_runs_after_a_download_over_a_bad_line_is_what_was_sent(seed: int) -> None:
     power_on()

@@ -19,8 +19,9 @@ from fake_device import (
     image_crc,
     make_image,
 )
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.core import lib
 from plctool.device import Plc
@@ -130,7 +131,7 @@ def test_a_firmware_without_single_cycles_is_named_with_what_to_do() -> None:
     assert caught.value.code == "no-single-cycle"
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(st.binary(max_size=60))
 def test_random_answers_are_errors_of_ours(content: bytes) -> None:
     bench = Bench()
@@ -153,7 +154,7 @@ READERS: dict[str, Callable[[Session], object]] = {
 
 
 @pytest.mark.parametrize("reader", READERS)
-@settings(max_examples=150)
+@examples(150)
 @given(st.integers(0, 400), st.integers(0, 255), st.integers(-8, 8))
 def test_answers_with_a_changed_byte_are_values_or_errors_of_ours(reader: str, at: int, byte: int, longer: int) -> None:
     bench = Bench()
@@ -404,7 +405,7 @@ def test_a_reader_encodes_its_ranges_once_for_a_size_of_messages(monkeypatch: py
 
 
 @given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 69000), st.integers(1, 1000)), max_size=30))
-@settings(max_examples=30)
+@examples(30)
 def test_any_ranges_read_what_is_in_memory(ranges: list[tuple[int, int, int]]) -> None:
     bench = Bench(buffer_size=600)
     for area, memory in bench.plc.memory.items():
@@ -758,7 +759,7 @@ def test_a_lost_verdict_is_asked_for_again() -> None:
     assert bench.plc.image == image
 
 
-@settings(max_examples=12)
+@examples(12)
 @given(st.integers(0, 2**32), st.sampled_from([2048, 16384]))
 def test_what_arrives_over_a_bad_line_is_what_was_sent(seed: int, buffer_size: int) -> None:
     bench = Bench(buffer_size, to_device=damage(seed, 0.001), to_client=damage(seed + 1, 0.001))

@@ -6,8 +6,9 @@ import random
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool import Simulator
 
@@ -50,7 +51,7 @@ def delay_ms(plc: Simulator, name: str, value: int) -> int:
     raise AssertionError(f"{name} never became {value}")
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     baud=st.sampled_from([9600, 19200, 115200]),
     reads=st.lists(READS, min_size=1, max_size=4),

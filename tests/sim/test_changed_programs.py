@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler import compile_sources
 from plctool.core import lib
@@ -132,7 +133,7 @@ def build(tmp_path_factory):
     return compile_text
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(old=programs, new=programs, cut=st.booleans())
 def test_only_what_changed_begins_again(build, old, new, cut) -> None:
     before, after = build(source(old)), build(source(new))
@@ -149,7 +150,7 @@ def test_only_what_changed_begins_again(build, old, new, cut) -> None:
         assert plc.read_all(new_leaves) == expected_values(old_leaves, new_leaves)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(old=programs, new=programs)
 def test_the_host_names_what_the_device_keeps(build, old, new) -> None:
     changes = kept_changes(build(source(old)).symbols.kept, build(source(new)).symbols.kept)

@@ -6,8 +6,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -111,7 +112,7 @@ def rises(first: list[int], second: list[int], ms: int) -> int:
 SCRIPT = st.lists(st.integers(0, 7), min_size=LENGTH, max_size=LENGTH)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(first=SCRIPT, second=SCRIPT, ms=st.integers(0, 80))
 def test_every_rise_between_cycles_is_a_run_at_every_priority(scripted, first, second, ms):
     with Simulator(scripted.image, scripted.symbols, start=False) as plc:
@@ -124,7 +125,7 @@ def test_every_rise_between_cycles_is_a_run_at_every_priority(scripted, first, s
         assert all(task.overruns == 0 for task in plc.tasks())
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(posts=st.lists(st.tuples(st.sampled_from(["door", "bell"]), st.integers(0, 250), st.integers(0, 3)), max_size=6))
 def test_every_post_is_a_run_or_counted_as_lost(waits, posts):
     with Simulator(waits.image, waits.symbols) as plc:

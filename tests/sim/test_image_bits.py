@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler import compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -109,7 +110,7 @@ def test_every_bit_takes_its_value_and_no_other_changes(bench: Bench, who: str, 
 STEPS = st.lists(st.tuples(st.sampled_from(WRITERS), st.integers(0, len(BITS) - 1), st.booleans()), max_size=30)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(start=st.lists(st.booleans(), min_size=len(BITS), max_size=len(BITS)), steps=STEPS)
 def test_whoever_writes_in_whatever_order(bench: Bench, start: list[bool], steps: list[tuple[str, int, bool]]) -> None:
     for n, value in enumerate(start):

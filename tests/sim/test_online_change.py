@@ -9,6 +9,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from shares import share
 
 sys.path.append(str(Path(__file__).parents[1]))
 
@@ -53,7 +54,7 @@ def write_all(plc: Simulator, written: dict[str, Any]) -> None:
             plc.write({name: value})
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", share(range(10), 3))
 def test_a_changed_program_behaves_as_one_that_began_with_these_values(seed: int, tmp_path: Path) -> None:
     """Any program and any edit: what both have keeps its value, new ones have their initial values, pointers lead to
     the same variables; and from then on it does what a download would do that is given these values."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool.compiler import Level, compile_sources
 from plctool.compiler.image.build import BuildResult
@@ -49,7 +50,7 @@ def test_any_overrun_of_a_local_array_in_a_cycle_is_an_exception(tmp_path: Path,
     built = build(tmp_path, CLEAR + BODY + TASKS[task])
     with Simulator(built.image, built.symbols) as plc:
 
-        @settings(max_examples=60)
+        @examples(60)
         @given(over=st.integers(20, 4096) | st.integers(4096, 9_000_000), value=st.integers(0, 255))
         def overrun(over: int, value: int) -> None:
             plc.reset("cold")

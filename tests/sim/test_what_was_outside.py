@@ -6,8 +6,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from shares import examples
 
 from plctool import Simulator
 from plctool.compiler import compile_sources
@@ -107,7 +108,7 @@ INTEGERS = {"SINT": (-128, 127), "USINT": (0, 255), "INT": (-32768, 32767), "UIN
 VARIABLES = st.sampled_from([*INTEGERS]).flatmap(lambda t: st.tuples(st.just(t), st.integers(*INTEGERS[t])))
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     st.lists(st.tuples(VARIABLES, st.integers(-3, 3)), min_size=1, max_size=3),
     st.integers(-20, 20),
