@@ -15,14 +15,14 @@ from typing import Literal
 
 from hypothesis import settings
 from hypothesis import strategies as st
-from shares import fewer
+from shares import WHOLE
 
 from plctool.compiler import compile_sources
 from plctool.sim import Simulator
 
 Value = bool | int | float | str
 
-PROGRAM = settings(max_examples=fewer(12), report_multiple_bugs=False)
+PROGRAM = settings(max_examples=12 if WHOLE else 4, report_multiple_bugs=False)
 EXPRESSIONS = 30  # per program
 OPTIMISED = 4  # one program in so many, because optimising takes ten times as long as all else
 
