@@ -15,6 +15,7 @@ import breakpoints
 from breakpoints import FILE, Breaking
 from environment import TARGET
 from hostile_debugger import act
+from shares import share
 
 from plctool.device import Plc
 from plctool.errors import DeviceError
@@ -37,7 +38,7 @@ class TestBoard(Breaking):
     target = TARGET
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", share(range(6), 3))
 def test_a_hostile_debugger_leaves_a_board_that_takes_a_program(plc, tmp_path, seed):
     chooser = random.Random(seed)
     for _ in range(40):
