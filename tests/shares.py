@@ -4,7 +4,8 @@ properties` tries all random values."""
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import zlib
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from hypothesis import settings
@@ -21,6 +22,12 @@ def share(cases: Sequence[Case], of: int, first: int = 0) -> list[Case]:
     """Returns one of `of` cases. Lists with another `first`, 0 to `of` - 1, have no case in common, and `of` of them
     have all."""
     return list(cases) if WHOLE else list(cases[first % of :: of])
+
+
+def share_by_name(cases: Sequence[Case], name: Callable[[Case], str], of: int, part: int) -> list[Case]:
+    """Returns one of `of` parts of the cases. The name of a case decides on its part, so it stays there when cases are
+    added or removed."""
+    return [case for case in cases if WHOLE or zlib.crc32(name(case).encode()) % of == part % of]
 
 
 def examples(count: int) -> settings:

@@ -10,9 +10,10 @@ from difflib import SequenceMatcher
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from test_st_programs import PROGRAMS, built_without_optimisation, read_script, runs
+from shares import examples
+from test_st_programs import PROGRAMS, build, read_script, runs
 
 from plctool.compiler.codegen.lower_unit import Options, parse_checks
 from plctool.compiler.formats.il_files import has_lists
@@ -216,7 +217,7 @@ def test_a_range_leaves_other_lines_alone() -> None:
     assert formatted("t.st", "\n".join(lines), ranges=[(9, 10), (900, 901)]) == "\n".join(lines)
 
 
-@settings(max_examples=12, deadline=None)
+@examples(12)
 @given(st.randoms(use_true_random=False))
 def test_a_range_changes_nothing_outside_of_its_statements(chance: random.Random) -> None:
     text = chance.choice(EXAMPLES).read_text()
@@ -258,7 +259,7 @@ def test_the_image_is_the_same(path: Path) -> None:
     text = path.read_text("utf-8")
     found = check_sources(read_content(path, formatted(str(path), text).encode()))
     assert found.program is not None
-    assert build_program(found.program, OPTIONS).image == built_without_optimisation(path, "all").image
+    assert build_program(found.program, OPTIONS).image == build(path, 0, "all").image
 
 
 def test_examples_are_formatted() -> None:
@@ -267,7 +268,7 @@ def test_examples_are_formatted() -> None:
         assert formatted(str(path), text) == text, f"run 'plctool fmt {path}'"
 
 
-@settings(max_examples=12, deadline=None)
+@examples(12)
 @given(st.randoms(use_true_random=False))
 def test_white_space_does_not_matter(chance: random.Random) -> None:
     path = chance.choice(WITHOUT_LISTS)
@@ -298,7 +299,7 @@ def test_a_pragma_at_the_end_of_the_file_is_kept() -> None:
     assert formatted("t.st", result) == result
 
 
-@settings(max_examples=12, deadline=None)
+@examples(12)
 @given(st.randoms(use_true_random=False))
 def test_comments_anywhere_are_kept_and_settle_at_once(chance: random.Random) -> None:
     path = chance.choice(WITHOUT_LISTS)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from shares import share
-from test_st_programs import PROGRAMS, built_without_optimisation, read_script, runs
+from test_st_programs import PROGRAMS, build, read_script, runs
 
 from plctool.compiler import IoFiles, check_with_tests, program_files
 from plctool.compiler.base.source import Source
@@ -55,7 +55,7 @@ def image_of(result: CheckResult) -> bytes:
 def test_program(path: Path) -> None:
     written = exported_program(path)
     assert written.ok
-    image = built_without_optimisation(path, "all").image
+    image = build(path, 0, "all").image
     again = check_sources(read_project("p.xml", written.text))
     if ASKS_FOR_ITS_PLACE in path.read_text("utf-8"):
         assert again.ok

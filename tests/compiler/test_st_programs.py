@@ -145,16 +145,12 @@ def checked(path: Path) -> CheckResult:
     return check_sources([path])
 
 
+@cache
 def build(path: Path, level: Level, checks: str) -> BuildResult:
+    """A program as it is built, for all that runs it; of level 0 also for what is looked at as it is lowered."""
     typed_program = checked(path).program
     assert typed_program is not None, "it does not compile"
     return build_program(typed_program, Options(find_target(DEFAULT_TARGET), level, parse_checks(checks)))
-
-
-@cache
-def built_without_optimisation(path: Path, checks: str) -> BuildResult:
-    """A program as it is lowered, for all that is looked at of it."""
-    return build(path, 0, checks)
 
 
 def run_program(script: Script, result: BuildResult) -> list[str]:
@@ -210,7 +206,7 @@ def test_program(path: Path) -> None:
 def test_program_without_optimisation(path: Path) -> None:
     """What the optimiser makes of it must not depend on luck."""
     script = read_script(path)
-    wrong = run_program(script, built_without_optimisation(path, script.options.get("checks", "all")))
+    wrong = run_program(script, build(path, 0, script.options.get("checks", "all")))
     assert not wrong, "\n".join(wrong)
 
 

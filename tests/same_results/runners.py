@@ -175,8 +175,8 @@ RUNNERS = {
             family="riscv",
         ),
         Runner("aarch64-linux", "aarch64-linux-gnu-gcc", ("-static", "-pthread"), ("qemu-aarch64",), bare=False),
+        Runner("armv7-linux", "arm-linux-gnueabihf-gcc", ("-static", "-pthread"), ("qemu-arm",), bare=False),
         Runner("x86_64-windows", "x86_64-w64-mingw32-gcc-posix",
                ("-static", "-pthread", f"-I{FIRMWARE / 'port/windows'}"), ("wine",), bare=False, windows=True),
-        Runner("armv7-linux", "arm-linux-gnueabihf-gcc", ("-static", "-pthread"), ("qemu-arm",), bare=False),
     )
 }  # fmt: skip

@@ -1,7 +1,7 @@
 """The programs of tests/st give the same values in every area after every cycle on every target, exceptions included.
 
 The simulator on this machine says what is right; each other target runs its programs in one start of QEMU. In
-`make test` each program is run by two targets, in `make test-whole` by all.
+`make test` each program is run by one target, which its name decides, in `make test-whole` by all.
 """
 
 from __future__ import annotations
@@ -18,17 +18,15 @@ sys.path.append(str(Path(__file__).parents[1] / "compiler"))
 from batch import Recorder, Recording, State, run_batch
 from comparison import differences
 from runners import RUNNERS, Runner
-from shares import share
-from test_st_programs import PROGRAMS, Script, read_script, run_cycle
+from shares import share_by_name
+from test_st_programs import PROGRAMS, Script, build, checked, read_script, run_cycle
 
-from plctool.compiler import load_sources
-from plctool.compiler.front import check_sources
 from plctool.compiler.typed.nodes import TypedProgram
 
 UNOPTIMISED = 6  # of so many programs one is repeated without optimisation
 # The clock of the runners is not set back for each program, and the bare ones have none.
 OF_ONE_DEVICE = ("wall_clock_is_read_and_set", "time_passes_within_a_cycle_under_the_names_of_syslibtime")
-TARGETS_OF_ALL = 4  # so many targets, one after the other in RUNNERS, run all programs
+TARGETS = [target for target in RUNNERS if target != "x86_64-windows"]  # these together run all programs
 KEEPS_ALL = 2  # the highest level at which no variable is in registers only, and memory is that of -O0
 
 
@@ -36,7 +34,9 @@ def record(path: Path, script: Script, typed: TypedProgram, highest: int = 3) ->
     """Runs a program as its comments say, at that level or the `highest` one."""
     options = script.options
     level = min(int(options.get("level", "2")), highest)
-    recording = Recording(path.stem, typed, level, options.get("checks", "all"))
+    checks = options.get("checks", "all")
+    recording = Recording(path.stem, typed, level, checks)
+    recording.built = build(path, level, checks)  # which tests/compiler has built in the same process
     plc = Recorder(recording)
     with plc:
         if script.time_ms:
@@ -53,7 +53,7 @@ def programs() -> list[tuple[Path, Script, TypedProgram]]:
     for path in (path for path in PROGRAMS if path.stem not in OF_ONE_DEVICE):
         script = read_script(path)
         if not any(severity == "error" for severity, *_ in script.diagnostics):
-            program = check_sources(load_sources([path])).program
+            program = checked(path).program
             if program is not None:  # what does not compile is a failure of tests/compiler
                 found.append((path, script, program))
     return found
@@ -68,7 +68,7 @@ def recordings() -> list[Recording]:
 @pytest.mark.parametrize("runner", RUNNERS.values(), ids=lambda r: r.target)
 def test_results_are_the_same(runner: Runner, tmp_path: Path) -> None:
     runner.skip_without_tools()
-    chosen = share(recordings(), TARGETS_OF_ALL, list(RUNNERS).index(runner.target))
+    chosen = share_by_name(recordings(), lambda r: r.name, len(TARGETS), list(RUNNERS).index(runner.target))
     results = run_batch(runner, chosen, tmp_path)
     wrong = [text for r, states in zip(chosen, results, strict=True) for text in differences(r, states)]
     assert not wrong, "\n".join(wrong)
@@ -78,7 +78,8 @@ def test_results_are_the_same_without_optimisation(tmp_path: Path) -> None:
     """The optimiser leaves out what is wrong but has no effect; some programs show what it would have been."""
     runner = RUNNERS["cortex-m3"]
     runner.skip_without_tools()
-    chosen = share(list(zip(programs(), recordings(), strict=True)), UNOPTIMISED)
+    both = list(zip(programs(), recordings(), strict=True))
+    chosen = share_by_name(both, lambda case: case[1].name, UNOPTIMISED, 0)
     kept = [r if r.level <= KEEPS_ALL else record(*program, KEEPS_ALL) for program, r in chosen]
     plain = [replace(recording, level=0) for recording in kept]
     results = run_batch(runner, plain, tmp_path)
