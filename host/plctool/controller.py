@@ -6,15 +6,23 @@ each does its own way is abstract.
 
 from __future__ import annotations
 
-import re
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Never, Self, overload
 
+from plctool.controller_results import (
+    ChangeResult,
+    Closed,
+    ExceptionInfo,
+    FlashResult,
+    OtherTool,
+    PlcStatus,
+    ProgramStopped,
+)
 from plctool.core import lib
 from plctool.debug.alarms import (
     CONFIRM,
@@ -33,7 +41,8 @@ from plctool.debug.alarms import (
     variables_of,
 )
 from plctool.debug.breakpoints import Debugger
-from plctool.debug.forced import ForcedPlace, ForceList, name_at, name_forced, place_of
+from plctool.debug.exchange import check_base, is_at, other_tasks, removed_variables, with_names
+from plctool.debug.forced import ForcedPlace, ForceList, forcible, name_forced, not_forced, place_of
 from plctool.debug.kept_changes import KeptChanges, kept_changes
 from plctool.debug.recipes import (
     Difference,
@@ -59,10 +68,8 @@ from plctool.debug.symbols import (
     symbol_path,
 )
 from plctool.debug.variables import Change, Reading, Symbol
-from plctool.errors import DeviceError, UsageError, with_article
+from plctool.errors import DeviceError, UsageError
 from plctool.files import write_atomically
-from plctool.iec.areas import Area
-from plctool.iec.types import ArrayType, StringType, StructType
 from plctool.image.file import image_crc, parse_image, read_program
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, AppState, LogEntry, Status, TaskInfo, went_down
@@ -77,6 +84,19 @@ from plctool.link.traces import (
     encode_config,
 )
 
+__all__ = [
+    "OPERATIONS",
+    "RESET_OPTIONS",
+    "ChangeResult",
+    "Closed",
+    "Controller",
+    "ExceptionInfo",
+    "FlashResult",
+    "OtherTool",
+    "PlcStatus",
+    "ProgramStopped",
+]
+
 _CONDITION_S = 2.0  # a debugger needs less for a condition, unless its machine is very busy
 _CONDITION_POLL_S = 0.01
 RESET_OPTIONS = {
@@ -87,118 +107,6 @@ RESET_OPTIONS = {
 
 OPERATIONS = ("online change", "download", "stop", "breakpoint", "write", "force", "reset")
 """What a program may forbid, by the number OPERATION_* (CmpOperationControl.h)."""
-
-_DANGLES = re.compile(r"pointer \(area (\d+), (\d+)\) leads to what is removed \(area (\d+), (\d+)\)")
-
-
-def _is_at(table: SymbolTable, name: str, place: object) -> bool:
-    """True if a program has a variable of that name at that place."""
-    with suppress(UsageError):
-        return table.resolve(name).place == place
-    return False
-
-
-def _other_tasks(had: SymbolTable, has: SymbolTable) -> set[int]:
-    """The numbers of tasks that the new program does not have, or by which it has another one."""
-    return {number for number, name in enumerate(had.tasks) if has.tasks[number : number + 1] != [name]}
-
-
-def _removed_variables(had: SymbolTable, has: SymbolTable) -> list[Symbol]:
-    """The variables that the new program does not have, or has at another place."""
-    places = {name.casefold(): symbol.place for name, symbol in has.variables.items()}
-    return [s for name, s in had.variables.items() if places.get(name.casefold()) != s.place]
-
-
-@dataclass(frozen=True)
-class ExceptionInfo:
-    """What stopped the program. `task` is None for initialisation code; the location is None without symbols. `calls`
-    led there, the nearest first. `detail`: which index or value was outside, if that is known."""
-
-    code: int
-    name: str
-    task: str | None
-    pou: str | None = None
-    file: str | None = None
-    line: int | None = None
-    calls: list[SourceLine] = field(default_factory=list)
-    detail: str = ""
-
-    def __str__(self) -> str:
-        task = f" in task {self.task}" if self.task else ""
-        place = f", {self.pou}, {self.file}:{self.line}" if self.file else ""
-        calls = "".join(f", called from {c.pou}, {c.file}:{c.line}" for c in self.calls)
-        detail = f": {self.detail}" if self.detail else ""
-        return f"{self.name}{task}{place}{calls}{detail}"
-
-
-class ProgramStopped(DeviceError):
-    """The program ended with an exception."""
-
-    def __init__(self, exception: ExceptionInfo) -> None:
-        super().__init__(f"The program stopped: {exception}.", "exception")
-        self.exception = exception
-
-
-@dataclass(frozen=True)
-class PlcStatus:
-    """`state` is "run", "halted", "stop", "exception" or "none"; `image_crc` is 0 without application. `forced`: the
-    names of the variables that are forced. `forbidden`: the operations that the program forbids now, of OPERATIONS.
-    `boots`: it is what starts at power-up."""
-
-    state: AppState
-    image_crc: int
-    image_size: int
-    exception: ExceptionInfo | None
-    forced: list[str] = field(default_factory=list)
-    forbidden: list[str] = field(default_factory=list)
-    boots: bool = True
-
-
-@dataclass(frozen=True)
-class FlashResult:
-    """`skipped`: the controller had this very image already. `seconds` is the time the transfer took. `persistent`:
-    what became of PERSISTENT values, None if the symbols of one of the programs are missing. `boots`: it is what starts
-    at power-up."""
-
-    bytes: int
-    seconds: float
-    skipped: bool
-    state: AppState
-    persistent: KeptChanges | None = None
-    boots: bool = True
-
-
-@dataclass(frozen=True)
-class ChangeResult:
-    """What an online change has done. `released`: the variables that were forced, and are removed. `ended`: the names
-    of traces that recorded removed variables, "" of one of a tool."""
-
-    bytes: int
-    seconds: float
-    state: AppState
-    released: list[str] = field(default_factory=list)
-    ended: list[str] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class OtherTool:
-    """Another tool of this machine that uses the same line: how its user called it, and its process number."""
-
-    tool: str
-    pid: int
-
-    def __str__(self) -> str:
-        return f"{self.tool} (pid {self.pid})"
-
-
-class Closed:
-    """In place of what a controller that is closed has no more."""
-
-    def __init__(self, message: str) -> None:
-        self._message = message
-
-    def __getattr__(self, name: str) -> Any:
-        raise UsageError(self._message, "closed")
 
 
 class Controller(ABC):
@@ -311,19 +219,19 @@ class Controller(ABC):
                 _keep_symbols(Path(image), image_crc(data))
             status = self._status_before(data)
             if not unchecked:
-                _check_base(data, status.image_crc)
+                check_base(data, status.image_crc)
             self._wait_for_conditions(status)
             self.end_debugging()  # its breakpoints are in the old code
             tables = self._both_tables(status.image_crc, image_crc(data))
             forced = {} if tables is None else self._release(*tables)
-            removed = ([], set[int]()) if tables is None else (_removed_variables(*tables), _other_tasks(*tables))
+            removed = ([], set[int]()) if tables is None else (removed_variables(*tables), other_tasks(*tables))
             ended = self._end_traces_of(*removed)
             begin = self._now()
             try:
                 self._change(data, lambda done: progress(done, len(data)))
             except DeviceError as error:
                 self._force_again(forced)
-                raise self._with_names(error, status.image_crc) from None
+                raise with_names(error, self._tables.get(status.image_crc)) from None
             seconds = self._now() - begin
             now = self.raw_status()
             if now.image_crc != image_crc(data):
@@ -332,22 +240,6 @@ class Controller(ABC):
             if tables is not None:
                 self._renew_traces(status.image_crc, now.image_crc, *removed)
         return ChangeResult(len(data), seconds, now.state, released, ended)
-
-    def _with_names(self, error: DeviceError, crc: int) -> DeviceError:
-        """The refusal of an online change with the names of the variables that it is about."""
-        found = _DANGLES.search(error.message)
-        table = self._tables.get(crc)
-        if found is None or table is None:
-            return error
-        numbers = [int(number) for number in found.groups()]
-        variables = list(table.variables.values())
-        pointer = name_at(numbers[0], numbers[1], int(lib.APP_POINTER_SIZE), variables)
-        gone = "the old code" if numbers[2] == Area.CODE.value else name_at(numbers[2], numbers[3], 1, variables)
-        return DeviceError(
-            f"No online change: {pointer} leads to {gone}, which is removed. Set {pointer} to another variable or to 0 "
-            "first, or download the program with 'plctool flash'.",
-            error.code,
-        )
 
     def _wait_for_conditions(self, status: Status) -> None:
         """A debugger that evaluates a condition halts the program for some milliseconds. Raises DeviceError when it
@@ -375,8 +267,8 @@ class Controller(ABC):
             places = []
             for place in self._read_forces().places:
                 named = name_forced([place], variables)
-                known = any(_is_at(had, name, symbol.place) for name, (symbol, _) in named.items())
-                if known and not all(_is_at(has, name, symbol.place) for name, (symbol, _) in named.items()):
+                known = any(is_at(had, name, symbol.place) for name, (symbol, _) in named.items())
+                if known and not all(is_at(has, name, symbol.place) for name, (symbol, _) in named.items()):
                     places.append(place)
                     released |= named
             if places:
@@ -690,14 +582,14 @@ class Controller(ABC):
         if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
             raise UsageError(f'This takes names with values, such as {{"Main.speed": 5}}, not {values!r}.')
         table = self.symbols()
-        named = [(_forcible(table.resolve(name)), value) for name, value in values.items()]
+        named = [(forcible(table.resolve(name)), value) for name, value in values.items()]
         for symbol, _ in named:
             symbol.check_writable(symbol.area)
         changes = [(symbol, replace(place_of(symbol), value=symbol.change(value).data)) for symbol, value in named]
         try:
             self._force(table, changes)
         except DeviceError as error:
-            raise self._not_forced(error, [symbol for symbol, _ in changes]) from None
+            raise not_forced(error, [symbol for symbol, _ in changes], self._read_forces) from None
 
     def unforce(self, names: Sequence[str] | None = None) -> None:
         """Ends the force of these variables, or of all with None. They keep their values until they are written.
@@ -731,19 +623,6 @@ class Controller(ABC):
             variables = list(self._symbols_of(crc).variables.values())
         self._forces = self._read_forces()
         return name_forced(self._forces.places, variables)
-
-    def _not_forced(self, error: DeviceError, symbols: Sequence[Symbol]) -> DeviceError:
-        """The same in the words of who wanted to force these."""
-        if error.result == lib.MONITORING_ERR_FORCE_FAILED:
-            listed = self._read_forces()
-            message = f"This controller forces {listed.room} variables at most, and {len(listed.places)} are forced"
-            advice = "end some with 'plctool unforce'"
-            return DeviceError(f"{message}; {len(symbols)} more have no room: {advice}.", "force-full", error.result)
-        if error.result == lib.MONITORING_ERR_NESTING_DEPTH:
-            deep = max(symbols, key=lambda s: len(s.place[2]))
-            message = f"{deep.name} is at the end of more than {lib.PLACE_POINTERS} pointers"
-            return DeviceError(f"{message}; force it by the name that it was declared with.", "pointers", error.result)
-        return error
 
     # ---- traces ----
 
@@ -929,32 +808,6 @@ class Controller(ABC):
 
 def _recipe(recipe: Recipe | Path | str) -> Recipe:
     return recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))
-
-
-def _check_base(data: bytes, running: int) -> None:
-    """Raises UsageError for an image that cannot replace the program with the CRC `running`."""
-    change = parse_image(data).change
-    if change is None:
-        raise UsageError("This image replaces no program that runs; build it with --base OLD.cdl.", "no-base")
-    if running not in (change.base, image_crc(data)):
-        raise UsageError(
-            f"This image replaces the program with CRC {change.base:08X}, and {running:08X} runs; "
-            "build it again with that as --base.",
-            "other-base",
-        )
-
-
-def _forcible(symbol: Symbol) -> Symbol:
-    """Raises UsageError for what is more than a number."""
-    if isinstance(symbol.type, StringType):
-        raise UsageError(f"{symbol.name} is a string, which cannot be forced; write it.", "not-forcible")
-    if isinstance(symbol.type, StructType | ArrayType):
-        part = next(symbol.leaves(), symbol).name
-        raise UsageError(
-            f"{symbol.name} is {with_article(symbol.type)}; force its parts by their names, such as {part}.",
-            "not-forcible",
-        )
-    return symbol
 
 
 def _keep_symbols(image: Path, crc: int) -> None:

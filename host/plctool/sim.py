@@ -14,6 +14,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, SupportsFloat, SupportsIndex
 
+from plctool import sim_traces
 from plctool.controller import Closed, Controller
 from plctool.core import Core, error_name, give_back_core, lib, take_core
 from plctool.debug.breakpoints import Debugger
@@ -23,7 +24,7 @@ from plctool.debug.recording import Recording
 from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.debug.target import DeviceCondition, Target
 from plctool.debug.trace import Trace
-from plctool.debug.variables import Change, Symbol, unreachable
+from plctool.debug.variables import Change, Symbol
 from plctool.errors import DeviceError, UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import Type
@@ -31,7 +32,7 @@ from plctool.image.file import image_crc, parse_image, read_program
 from plctool.image.targets import host_target
 from plctool.io.canopen.events import posted_events
 from plctool.io.configuration import configuration_of_image
-from plctool.link import l7, traces
+from plctool.link import l7
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
 from plctool.link.session import no_application
@@ -40,6 +41,7 @@ from plctool.sim_can import CanFrame, send_frame, take_frames
 from plctool.sim_functions import SimFunctions
 from plctool.sim_io import SimIo, is_input, read_parameter, set_fault, set_modbus
 from plctool.sim_net import Datagram, send_datagram, take_datagrams
+from plctool.sim_variables import SimVariables
 from plctool.sim_worker import Worker
 
 if TYPE_CHECKING:
@@ -52,7 +54,6 @@ _KEPT_LOG = 2 * _SECTOR  # bytes for the log that outlasts power-off
 _FILE_STORE = (1 << 20) - _KEPT_LOG  # bytes for files, as on plcrt; the program's own room stays as it was
 _PROGRAM_UNIT = 8
 MAX_NS = 2**62  # at once; the clock goes twice as far
-_TRACE_MESSAGE = 64 * 1024  # bytes of samples at a time
 _SERIAL = 64 * 1024  # bytes that a serial line holds
 _NEVER = 2**63 - 1  # the last moment of that clock [ns]
 # What the C core runs before Python is asked whether the user wants it to end.
@@ -125,6 +126,7 @@ class Simulator(Controller):
             self.add_symbols(symbols)
         self._core = take_core()
         self._ffi, self._lib = self._core.ffi, self._core.lib
+        self._variables: SimVariables | Closed = SimVariables(self._core)
         self._closed = False
         try:
             self._power_on(cycle_limit_ms)
@@ -216,7 +218,7 @@ class Simulator(Controller):
             self._functions.disconnect(self._core)
             if self._limited:
                 self._lib.SimSetCycleLimit(0)
-            self._lib = self._ffi = Closed(
+            self._lib = self._ffi = self._variables = Closed(
                 "The simulator is closed; make another one."
             )  # before another one has the runtime
             give_back_core(self._core)
@@ -607,13 +609,13 @@ class Simulator(Controller):
     def _read(self, table: SymbolTable, symbols: Sequence[Symbol]) -> Contents:
         """As they are between two cycles."""
         forced = self._lib.ForceGetSerial() if self._lib.ForceGetCount() else None
-        return Contents([self._content(symbol) for symbol in symbols], consistent=True, forced=forced)
+        return Contents([self._variables.content(symbol) for symbol in symbols], consistent=True, forced=forced)
 
     def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> int:
         for symbol, _ in changes:
-            self._writable(symbol)  # all or none are written
+            self._variables.writable(symbol)  # all or none are written
         for symbol, change in changes:
-            memory = self._writable(symbol)
+            memory = self._variables.writable(symbol)
             part = slice(change.offset, change.offset + len(change.data))
             both = zip(change.data, memory[part], strict=True)
             memory[part] = bytes(new & change.mask | old & ~change.mask for new, old in both)
@@ -624,118 +626,45 @@ class Simulator(Controller):
 
     def _force(self, table: SymbolTable, changes: Sequence[tuple[Symbol, ForcedPlace]]) -> None:
         self._check_allowed(lib.OPERATION_FORCE, "force")
-        listed = self._read_forces()
-        new = [p for _, p in changes if not any(p.same_place(old) for old in listed.places)]
-        if len(listed.places) + len(new) > listed.room:
-            _check_monitoring(lib.MONITORING_ERR_FORCE_FAILED)
-        for symbol, place in changes:
-            self._writable(symbol)
-            if len(place.hops) > lib.PLACE_POINTERS:
-                _check_monitoring(lib.MONITORING_ERR_NESTING_DEPTH)
-            _check_monitoring(self._lib.ForceCheck(self._c_place(place)))
-        for _, place in changes:
-            _check_monitoring(self._lib.ForceSet(self._c_place(place), int.from_bytes(place.value, "little")))
+        self._variables.force(changes)
 
     def _unforce(self, table: SymbolTable, places: Sequence[ForcedPlace]) -> None:
-        for place in places:
-            self._lib.ForceEnd(self._c_place(place))
+        self._variables.unforce(places)
 
     def _unforce_all(self) -> None:
         self._lib.ForceEndAll()
 
     def _read_forces(self) -> ForceList:
-        forced = (self._lib.ForceGet(index) for index in range(self._lib.ForceGetCount()))
-        return ForceList(self._lib.ForceGetSerial(), self._lib.ForceGetRoom(), [_forced_place(f) for f in forced])
+        return self._variables.forces()
+
+    def memory(self, area: Area, offset: int, size: int) -> memoryview:
+        """Bytes of an area, to read and to write, until this simulator is closed."""
+        return self._variables.area(area, offset, size)
 
     # ---- traces ----
 
     def create_trace(self, config: bytes) -> int:
-        """It stays until it is ended: virtual time is no reason to forget it."""
-        kept = bytearray(config)
-        kept[self._ffi.offsetof("TRACE_CONFIG", "flags")] |= lib.TRACE_KEEP
-        packet, bad, error = self._ffi.new("RTS_UI32 *"), self._ffi.new("RTS_UI32 *"), self._ffi.new("MON_RESULT *")
-        result = self._lib.TraceCreate(bytes(kept), len(kept), packet, bad, error)
-        if result == lib.ERR_INVALID_REFERENCE:
-            raise traces.bad_place(error[0])
-        _check_trace(result)
-        return int(packet[0])
+        return sim_traces.create_trace(self._running(), config)
 
     def delete_trace(self, packet: int) -> None:
-        _check_trace(self._lib.TraceDelete(packet))
+        sim_traces.delete_trace(self._running(), packet)
 
     def next_trace(self, packet: int) -> tuple[int, bytes] | None:
-        following, size = self._ffi.new("RTS_UI32 *", packet), self._ffi.new("RTS_UI32 *")
-        config = self._lib.TraceGetNext(following, size)
-        return None if config == self._ffi.NULL else (int(following[0]), bytes(self._ffi.buffer(config, size[0])))
+        return sim_traces.next_trace(self._running(), packet)
 
     def read_trace(self, packet: int, first: int, sizes: Sequence[int]) -> TraceState:
-        data, size = self._ffi.new("RTS_UI8[]", _TRACE_MESSAGE), self._ffi.new("RTS_UI32 *", _TRACE_MESSAGE)
-        state = self._ffi.new("TRACE_STATE *")
-        _check_trace(self._lib.TraceRead(packet, first, data, size, state))
-        packed = bytes(self._ffi.buffer(data, size[0]))
-        return traces.decode_state(bytes(self._ffi.buffer(state)), packed, sizes)
+        return sim_traces.read_trace(self._running(), packet, first, sizes)
+
+    def _running(self) -> Core:
+        """The core, as far as it is not given back."""
+        return Core(self._ffi, self._lib)
 
     def _pass_cycle(self, recording: Recording) -> None:
         self.run_for(max(recording.interval_us / 1000, 1))
 
-    def _c_place(self, place: ForcedPlace) -> Any:
-        c = self._ffi.new("APP_PLACE *")
-        c.area, c.pointers, c.size, c.mask = place.area, len(place.hops), place.size, place.mask
-        c.offset[0 : 1 + len(place.hops)] = [place.offset, *place.hops]
-        return c
-
-    def _writable(self, symbol: Symbol) -> Any:
-        """Its memory. Raises DeviceError if a pointer leads to none, UsageError if it is a constant."""
-        place = self._place(symbol)
-        symbol.check_writable(symbol.area if place is None else place[0])
-        memory = self._memory(symbol)
-        if memory is None:
-            raise unreachable(symbol, self._content)
-        return memory
-
     def follow_inputs(self, first_bit: int, end_bit: int) -> None:
         """These bits of the inputs were written: the devices measure that from now on."""
         self.io.follow(first_bit, end_bit, partial(self.memory, Area.INPUT))
-
-    def memory(self, area: Area, offset: int, size: int) -> memoryview:
-        """Bytes of an area, to read and to write, until this simulator is closed."""
-        return memoryview(self._ffi.buffer(self._lib.AppGetAreaAddress(area.value, offset, size), size))
-
-    def _content(self, symbol: Symbol) -> bytes | None:
-        if symbol.fixed is not None:
-            return symbol.fixed
-        memory = self._memory(symbol)
-        return None if memory is None else bytes(memory)
-
-    def _memory(self, symbol: Symbol) -> Any:
-        """A variable as a writable buffer; None when a pointer to it leads to none."""
-        place = self._place(symbol)
-        address = self._ffi.NULL if place is None else self._lib.AppGetAreaAddress(*place, symbol.size)
-        if address != self._ffi.NULL:
-            return self._ffi.buffer(address, symbol.size)
-        if symbol.pointer is not None:
-            return None
-        if symbol.name.startswith("%"):
-            raise DeviceError(f"The program has no memory at {symbol.name}.", "no-memory")
-        raise DeviceError(
-            f"{symbol.name} is not in the memory of the program; the symbols do not belong to it.", "wrong-symbols"
-        )
-
-    def _place(self, symbol: Symbol) -> tuple[int, int] | None:
-        """Area and offset."""
-        if symbol.pointer is None:
-            return symbol.area, symbol.offset
-        held = self._memory(symbol.pointer)
-        area, offset = self._ffi.new("RTS_UI32 *"), self._ffi.new("RTS_UI32 *")
-        if held is None or not self._lib.AppFindArea(int.from_bytes(held[:], "little"), area, offset):
-            return None
-        return area[0], offset[0] + symbol.offset
-
-
-def _forced_place(forced: Any) -> ForcedPlace:
-    p = forced.place
-    offset, *hops = p.offset[0 : 1 + p.pointers]
-    return ForcedPlace(p.area, offset, tuple(hops), p.size, p.mask, forced.value.to_bytes(8, "little")[: p.size])
 
 
 class _DebuggedSimulator(Target):
@@ -784,7 +713,7 @@ class _DebuggedSimulator(Target):
         c.offset, c.skip = offset, skip
         if condition is not None:
             c.condition.relation, c.condition.kind = condition.relation, condition.kind
-            c.condition.place = self._sim._c_place(condition.place)[0]
+            c.condition.place = self._sim._variables.c_place(condition.place)[0]
             c.condition.value = int.from_bytes(condition.place.value, "little")
         _check(self._lib.AppBpSet(c), "The breakpoint cannot be set")
 
@@ -801,7 +730,7 @@ class _DebuggedSimulator(Target):
     def watch(self, places: Sequence[ForcedPlace], offsets: Sequence[int]) -> None:
         self._lib.AppBpClearWatches()
         for place in places:
-            _check(self._lib.AppBpAddWatch(self._sim._c_place(place)), "The variable cannot be compared")
+            _check(self._lib.AppBpAddWatch(self._sim._variables.c_place(place)), "The variable cannot be compared")
         for offset in offsets:
             _check(self._lib.AppBpAddWatchTrap(offset), "The variable cannot be compared there")
 
@@ -836,7 +765,7 @@ class _DebuggedSimulator(Target):
 
     def _read_area(self, symbol: Symbol) -> bytes | None:
         with suppress(DeviceError):
-            return self._sim._content(symbol)
+            return self._sim._variables.content(symbol)
         return None
 
     def write_area(self, symbol: Symbol, change: Change) -> None:
@@ -875,17 +804,6 @@ def _ns(ms: float, seconds: float = 0) -> int:
 def _check_callable(step: object) -> None:
     if not callable(step):
         raise UsageError(f"A plant is a function that gets the simulator, not {step!r}.", "plant")
-
-
-def _check_monitoring(result: int) -> None:
-    if result != lib.MONITORING_ERR_OK:
-        name = l7.monitoring_error_name(result)
-        raise DeviceError(f"The simulator refused the force: {name}.", l7.slug(name), result)
-
-
-def _check_trace(result: int) -> None:
-    with traces.explained():
-        l7.check_result(result, "trace")
 
 
 def _check(result: int, what: str) -> None:

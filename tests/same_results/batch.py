@@ -80,9 +80,9 @@ class Recorder(Simulator):
     def write(self, values: Mapping[str, object]) -> None:
         super().write(values)
         for symbol in map(self.symbols().resolve, values):
-            place = self._place(symbol)
+            place = self._variables.place(symbol)
             assert place is not None
-            self.writes.append((*place, bytes(self._memory(symbol))))
+            self.writes.append((*place, bytes(self._variables.memory(symbol))))
 
     def run_cycles(self, count: int, *, check: bool = False) -> None:
         super().run_cycles(count, check=check)

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
+from plctool.core import lib
 from plctool.debug.variables import Symbol
+from plctool.errors import DeviceError, UsageError, with_article
 from plctool.iec.areas import Area
-from plctool.iec.types import ELEMENTARY, ArrayType, Elementary, Kind, PointerType, StructType, Type, base_of
+from plctool.iec.types import (
+    ELEMENTARY,
+    ArrayType,
+    Elementary,
+    Kind,
+    PointerType,
+    StringType,
+    StructType,
+    Type,
+    base_of,
+)
 
 _LETTERS = {Area.INPUT.value: "I", Area.OUTPUT.value: "Q", Area.MEMORY.value: "M"}
 _WIDTHS = {1: "B", 2: "W", 4: "D", 8: "L"}
@@ -161,3 +173,33 @@ def _address(place: ForcedPlace) -> Symbol:
     way = "^+".join(map(str, (place.offset, *place.hops)))
     name = f"{Area(place.area).name.lower()}+{way}" + ("" if bit is None else f".{bit}")
     return Symbol(name, place.area, place.begin, t, bit)
+
+
+# ---- what cannot be forced ----
+
+
+def forcible(symbol: Symbol) -> Symbol:
+    """Raises UsageError for what is more than a number."""
+    if isinstance(symbol.type, StringType):
+        raise UsageError(f"{symbol.name} is a string, which cannot be forced; write it.", "not-forcible")
+    if isinstance(symbol.type, StructType | ArrayType):
+        part = next(symbol.leaves(), symbol).name
+        raise UsageError(
+            f"{symbol.name} is {with_article(symbol.type)}; force its parts by their names, such as {part}.",
+            "not-forcible",
+        )
+    return symbol
+
+
+def not_forced(error: DeviceError, symbols: Sequence[Symbol], read_forces: Callable[[], ForceList]) -> DeviceError:
+    """Returns the refusal to force these variables with their names and what to do."""
+    if error.result == lib.MONITORING_ERR_FORCE_FAILED:
+        listed = read_forces()
+        message = f"This controller forces {listed.room} variables at most, and {len(listed.places)} are forced"
+        advice = "end some with 'plctool unforce'"
+        return DeviceError(f"{message}; {len(symbols)} more have no room: {advice}.", "force-full", error.result)
+    if error.result == lib.MONITORING_ERR_NESTING_DEPTH:
+        deep = max(symbols, key=lambda s: len(s.place[2]))
+        message = f"{deep.name} is at the end of more than {lib.PLACE_POINTERS} pointers"
+        return DeviceError(f"{message}; force it by the name that it was declared with.", "pointers", error.result)
+    return error
