@@ -16,6 +16,8 @@ import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 SOURCE = FIRMWARE / "src"
+PORT = FIRMWARE / "port"
+PORTS = sorted({path.parent for path in PORT.rglob("*.c")})
 FLOORS = ["core", "sys", "modbus", "canopen", "cycle", "load", "app", "can", "io", "comm"]
 
 # Two sources with the same functions, of which a firmware has one.
@@ -78,6 +80,19 @@ def stands_on(module: str) -> set[str]:
     }
 
 
+def _stands_on_in_port(folder: Path) -> dict[str, set[str]]:
+    """The sources of a port by those of the same folder that they use. Other folders are other ports; what a board and
+    the common sources have of each other is in headers for both, such as BareMetal.h."""
+    code = {path.stem: _code(path) for path in folder.glob("*.c")}
+    defined = {name: set(DEFINITION.findall(text)) for name, text in code.items()}
+    shared = [*DECLARED.values(), *(set(DECLARATION.findall(_code(path))) for path in folder.glob("*.h"))]
+    words = {name: _words(text) & set().union(*shared) for name, text in code.items()}
+    return {
+        name: {other for other in code if other != name and (words[name] - defined[name]) & defined[other]}
+        for name in code
+    }
+
+
 def _owner(header: str) -> str | None:
     """The module that defines what a header declares; None: a port, or nothing is to be defined."""
     owners = [name for name, defined in DEFINED.items() if defined & DECLARED.get(header, set()) - HOOKS]
@@ -107,6 +122,17 @@ def test_no_modules_stand_on_each_other_in_a_circle() -> None:
 
 def test_no_modules_include_the_headers_of_each_other_in_a_circle() -> None:
     TopologicalSorter({name: _knows(name) for name in MODULES}).prepare()
+
+
+@pytest.mark.parametrize("folder", PORTS, ids=lambda path: str(path.relative_to(PORT)))
+def test_no_sources_of_a_port_stand_on_each_other_in_a_circle(folder: Path) -> None:
+    TopologicalSorter(_stands_on_in_port(folder)).prepare()
+
+
+def test_sources_of_ports_are_read_as_meant() -> None:
+    assert len(PORTS) > 10
+    assert "IecStack" in _stands_on_in_port(PORT / "linux")["SysExcept"]
+    assert "SimModbus" in _stands_on_in_port(PORT / "sim")["SimWire"]
 
 
 @pytest.mark.parametrize("floor", FLOORS)
