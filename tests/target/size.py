@@ -57,15 +57,13 @@ class Usage:
 
 @dataclass
 class Part:
-    """Some components together, in one configuration, and what they may take; `why`: what is between the two.
-    `elsewhere`: bytes of flash in other components, as a build without the part has shown."""
+    """Some components together, in one configuration, and what they may take; `why`: what is between the two."""
 
     config: str
     components: list[str]
     flash: int
     ram: int
     why: str = ""
-    elsewhere: int = 0
 
 
 @dataclass
@@ -247,7 +245,6 @@ def print_parts(measured: dict[str, dict[str, Usage]], parts: dict[str, Part]) -
     print(f"\n{'parts':<36}{'configuration':>14}{'flash':>8}{'goal':>8}{'RAM':>8}{'goal':>8}")
     for name, part in known.items():
         used = total({c: u for c, u in measured[part.config].items() if c in part.components})
-        used.flash += part.elsewhere
         print(f"{name:<36}{part.config:>14}{used.flash:>8}{part.flash:>8}{used.ram:>8}{part.ram:>8}")
         if part.why and (used.flash > part.flash or used.ram > part.ram):
             print(f"  {part.why}")
