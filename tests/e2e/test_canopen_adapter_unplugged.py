@@ -20,6 +20,7 @@ from plctool.testing.can_hub import CanHub
 from plctool.testing.plcrt import Plcrt
 from plctool.testing.waiting import eventually
 
+RESETS = (0x81, 0x82)
 MOST_LOAD = 0.05  # of a processor
 
 
@@ -34,13 +35,18 @@ def plugged_in(adapter: Path) -> Iterator[CanHub]:
             adapter.unlink()
 
 
-@contextmanager
-def node_on(hub: CanHub) -> Iterator[None]:
-    """A node that gets power once the manager has sent a frame: python canopen's sends no boot-up after a reset."""
-    node = ForeignNode(f"slcan:{hub.paths[1]}")
-    eventually(lambda: hub.frames > 0)
-    with node:
-        yield
+class BootingNode(ForeignNode):
+    """A node that sends its boot-up after a reset, which python canopen's does not."""
+
+    def __enter__(self) -> BootingNode:
+        super().__enter__()
+        self._network.subscribe(0, lambda _cob, data, _time: self._boot() if data[0] in RESETS else None)
+        return self
+
+    def _boot(self) -> None:
+        self.node.nmt.stop_heartbeat()
+        self.node.nmt.state = "INITIALISING"
+        self.node.nmt.state = "PRE-OPERATIONAL"
 
 
 def load_of(pid: int) -> float:
@@ -59,14 +65,14 @@ def test_nodes_are_lost_with_the_adapter_and_come_back_with_it(tmp_path: Path, t
         with Plcrt(tmp_path / "flash", "--can", f"slcan:{adapter}") as plcrt, connect(f"serial:{plcrt.port}") as plc:
             plc.flash(image)
             for _ in range(2):
-                bus.enter_context(node_on(hub))
+                bus.enter_context(BootingNode(f"slcan:{hub.paths[1]}"))
                 eventually(lambda: plc.read("Valves.ok"))
                 bus.close()
                 eventually(lambda: not plc.read("Valves.ok"))
                 assert plcrt.worker is not None
                 assert load_of(plcrt.worker) < MOST_LOAD
                 hub = bus.enter_context(plugged_in(adapter))
-            bus.enter_context(node_on(hub))
+            bus.enter_context(BootingNode(f"slcan:{hub.paths[1]}"))
             eventually(lambda: plc.read("Valves.ok"))
             texts = [entry.text for entry in plc.log()]
     assert "Valves is lost: the bus is off" in texts, texts
