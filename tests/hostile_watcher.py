@@ -10,12 +10,12 @@ from plctool.debug.forced import ForcedPlace
 from plctool.device import Plc
 from plctool.errors import PlcError
 from plctool.link import bintag
-from plctool.link.monitoring import force_memory
+from plctool.link.monitoring import force_memory, unforce_memory
 from plctool.link.session import Session
 from plctool.link.wire import Layout
 
 _CONFIG = Layout("TRACE_CONFIG")
-_PLACE = Layout("TRACE_PLACE")
+_PLACE = Layout("MON2_PLACE")
 _NAMES = (
     b"",
     b"night",
@@ -35,14 +35,14 @@ def act(plc: Plc, session: Session, image_crc: int, chooser: random.Random) -> N
     action = chooser.randrange(9)
     if action < 2:
         places = [_place(chooser) for _ in range(chooser.choice((1, 1, 1, 3, 200)))]
-        force_memory(session, image_crc, places, chooser.choice((lib.MON2_FORCE, lib.MON2_FORCE, lib.MON2_UNFORCE, 7)))
+        chooser.choice((force_memory, force_memory, unforce_memory))(session, image_crc, places)
     elif action == 2:
         entries = chooser.randbytes(chooser.randrange(64))
         tags = [
             bintag.raw(lib.TAG_MON2_APPLICATION, chooser.randbytes(8)),
-            bintag.raw(lib.TAG_MON2_WRITE_LIST, entries),
+            bintag.raw(lib.TAG_MON2_FORCED, entries),
         ]
-        session.call(lib.SG_MONITORING2, lib.SRV_MON2_FORCE, tags)
+        session.call(lib.SG_MONITORING2, chooser.choice((lib.SRV_MON2_FORCE, lib.SRV_MON2_UNFORCE)), tags)
     elif action < 6:
         plc.create_trace(_damaged(_config(image_crc, chooser), chooser))
     elif action == 6:

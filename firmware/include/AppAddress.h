@@ -41,8 +41,8 @@ enum {
     PLACE_ALL_BITS = 0xFF /* APP_PLACE.mask */
 };
 
-/* A number in the areas that is used in each cycle: forced or traced. Members that are not used are 0, so that two places
- * can be compared as bytes. */
+/* A number in the areas that is used in each cycle: forced or traced. Laid out as a MON2_PLACE: it is copied from requests.
+ * Members that are not used are 0, so that two places can be compared as bytes. */
 typedef struct {
     RTS_UI8 area; /* APP_AREA_* */
     RTS_UI8 pointers;
@@ -56,5 +56,15 @@ MON_RESULT AppPlaceCheck(const APP_PLACE *place);
 
 /* Finds a place by way of its pointers: *address has its area and the offset there. The errors of the functions above. */
 MON_RESULT AppPlaceFind(const APP_PLACE *place, AREA_ADDRESS *address, RTS_UI8 **at);
+
+/* What a number of 1, 2, 4 or 8 bytes is; a REAL has 4 or 8. */
+enum { NUMBER_UNSIGNED, NUMBER_SIGNED, NUMBER_REAL };
+
+/* Finds a key for a number: keys have the order of the numbers. False for NAN, which has none. */
+bool AppNumberKey(RTS_UI64 value, RTS_UI32 size, RTS_UI32 kind, RTS_I64 *key);
+
+/* How a key is to another one. */
+enum { NUMBER_LESS = 1, NUMBER_EQUAL = 2, NUMBER_GREATER = 4 };
+#define NUMBER_ORDER(key, other) ((key) < (other) ? NUMBER_LESS : (key) == (other) ? NUMBER_EQUAL : NUMBER_GREATER)
 
 #endif

@@ -34,7 +34,7 @@
 /* BP_CONDITION.relation: of the variable to the value. */
 enum { BP_ALWAYS, BP_EQUAL, BP_NOT_EQUAL, BP_LESS, BP_LESS_EQUAL, BP_GREATER, BP_GREATER_EQUAL };
 /* BP_CONDITION.kind. */
-enum { BP_UNSIGNED, BP_SIGNED, BP_REAL };
+enum { BP_UNSIGNED = NUMBER_UNSIGNED, BP_SIGNED = NUMBER_SIGNED, BP_REAL = NUMBER_REAL };
 
 /* The breakpoint counts while it holds: the device compares, in some microseconds. */
 typedef struct {
@@ -58,6 +58,7 @@ enum {
     BP_STEP_OUT, /* the same, perhaps in the next cycle: the other tasks go on if this one waits for an event */
 };
 
+/* Laid out as a BP_STATE. */
 typedef struct {
     RTS_UI32 supported; /* 0: this device has no traps */
     RTS_UI32 attached;

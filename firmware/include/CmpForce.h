@@ -24,21 +24,20 @@
 #include "rts_config.h"
 #endif
 
+/* Laid out as a MON2_FORCED. */
 typedef struct {
     APP_PLACE place;
-    bool is_searched; /* where it is, in each cycle */
-    RTS_UI64 value;   /* in its first `size` bytes */
+    RTS_UI32 value[2]; /* in its first `place.size` bytes */
 } FORCED_VALUE;
 
 /* Checks whether a place can be forced now, on an application that is loaded. MONITORING_ERR_UNSUPPORTED_DATATYPE: its
- * size, or bits of more than a byte; MONITORING_ERR_OPERATION_DENIED: code and constants; or as AppAddressFollow. From
- * main. */
-MON_RESULT ForceCheck(const APP_PLACE *place);
-bool ForceHas(const APP_PLACE *place);
+ * size, or bits of more than a byte; MONITORING_ERR_OPERATION_DENIED: code and constants; MONITORING_ERR_FORCE_FAILED: no
+ * room after the *added ones that were checked before, which it counts; or as AppPlaceFind. From main. */
+MON_RESULT ForceCheck(const APP_PLACE *place, RTS_UI32 *added);
 
 /* Forces a checked place, at once and in each cycle; in place of the value that it has been forced to, as the last one:
  * where two overlap, the last one holds. MONITORING_ERR_FORCE_FAILED above FORCE_MAX. From main. */
-MON_RESULT ForceSet(const APP_PLACE *place, RTS_UI64 value);
+MON_RESULT ForceSet(const FORCED_VALUE *value);
 
 /* Ends it for one place, if it is forced, or for all. The variable keeps the value until it is written. From main. */
 void ForceEnd(const APP_PLACE *place);

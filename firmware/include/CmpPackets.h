@@ -324,26 +324,22 @@ typedef struct {
     WIRE_UI32 size;
 } MON2_VALUE;
 
-/* One of TAG_MON2_FORCED (own): APP_PLACE and value. */
-typedef struct {
-    RTS_UI8 area;
-    RTS_UI8 pointers;
-    RTS_UI8 size;
-    RTS_UI8 mask;
-    RTS_UI8 offset[16]; /* four numbers of 4 bytes */
-    RTS_UI8 value[8];
-} MON2_FORCED;
-
-/* A place that is traced (own): APP_PLACE. */
+/* A place that is forced, traced or compared (own): APP_PLACE. */
 typedef struct {
     RTS_UI8 area; /* APP_AREA_*, or TRACE_SYSTEM */
     RTS_UI8 pointers;
     RTS_UI8 size;
     RTS_UI8 mask;
     RTS_UI8 offset[16]; /* four numbers of 4 bytes */
-} TRACE_PLACE;
+} MON2_PLACE;
 
-/* TAG_TRACE_CONFIG (own): the configuration of a packet. Its records follow, a TRACE_PLACE each. */
+/* One of TAG_MON2_FORCED (own): FORCED_VALUE. */
+typedef struct {
+    MON2_PLACE place;
+    RTS_UI8 value[8];
+} MON2_FORCED;
+
+/* TAG_TRACE_CONFIG (own): the configuration of a packet. Its records follow, a MON2_PLACE each. */
 typedef struct {
     WIRE_UI32 image_crc; /* of the application that it is for */
     char name[16];       /* with NUL; "" if it has none */
@@ -355,7 +351,7 @@ typedef struct {
     WIRE_UI32 samples;   /* how many, those before the trigger among them; 0: without end */
     WIRE_UI32 before;    /* how many of them from before the trigger */
     WIRE_UI64 constant;  /* the trigger compares with it */
-    TRACE_PLACE trigger;
+    MON2_PLACE trigger;
 } TRACE_CONFIG;
 
 /* TAG_TRACE_STATE (own): what a packet has recorded. Samples are numbered from 0. */
@@ -377,11 +373,7 @@ typedef struct {
     RTS_UI8 relation;
     RTS_UI8 kind;
     WIRE_UI16 reserved;
-    RTS_UI8 area;
-    RTS_UI8 pointers;
-    RTS_UI8 size;
-    RTS_UI8 mask;
-    RTS_UI8 offset[16]; /* four numbers of 4 bytes */
+    MON2_PLACE place;
     RTS_UI8 value[8];
 } BP_RECORD;
 
@@ -480,8 +472,8 @@ WIRE_SIZE(CDL_PACKED, 4);
 WIRE_SIZE(TASK_INFO, 40);
 WIRE_SIZE(MON2_APPLICATION, 20);
 WIRE_SIZE(MON2_VALUE, 6);
+WIRE_SIZE(MON2_PLACE, 20);
 WIRE_SIZE(MON2_FORCED, 28);
-WIRE_SIZE(TRACE_PLACE, 20);
 WIRE_SIZE(TRACE_CONFIG, 64);
 WIRE_SIZE(TRACE_STATE, 28);
 WIRE_SIZE(BP_RECORD, 44);

@@ -46,7 +46,7 @@ enum {
 };
 
 /* TRACE_CONFIG.comparison: the trigger is true if its value is one of these to the constant. NAN is none of them. */
-enum { TRACE_LESS = 1, TRACE_EQUAL = 2, TRACE_GREATER = 4 };
+enum { TRACE_LESS = NUMBER_LESS, TRACE_EQUAL = NUMBER_EQUAL, TRACE_GREATER = NUMBER_GREATER };
 
 /* The area of a place that is a system value of the task; its offset says which. 4 bytes each. */
 enum {

@@ -41,6 +41,7 @@ from plctool.link.monitoring import (
     force_memory,
     read_forced,
     read_memory,
+    unforce_memory,
     write_memory,
 )
 from plctool.link.names import Node
@@ -361,13 +362,13 @@ class Plc(Controller):
 
     def _force(self, table: SymbolTable, changes: Sequence[tuple[Symbol, ForcedPlace]]) -> None:
         try:
-            force_memory(self._session, table.image_crc, [place for _, place in changes], lib.MON2_FORCE)
+            force_memory(self._session, table.image_crc, [place for _, place in changes])
         except DeviceError:
             self._check_reachable(table, [symbol for symbol, _ in changes if symbol.pointer is not None])
             raise
 
     def _unforce(self, table: SymbolTable, places: Sequence[ForcedPlace]) -> None:
-        force_memory(self._session, table.image_crc, places, lib.MON2_UNFORCE)
+        unforce_memory(self._session, table.image_crc, places)
 
     def _unforce_all(self) -> None:
         services.end_all_forces(self._session)

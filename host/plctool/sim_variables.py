@@ -82,9 +82,10 @@ class SimVariables:
             self.writable(symbol)
             if len(place.hops) > lib.PLACE_POINTERS:
                 _check_monitoring(lib.MONITORING_ERR_NESTING_DEPTH)
-            _check_monitoring(self._lib.ForceCheck(self.c_place(place)))
+            _check_monitoring(self._lib.ForceCheck(self.c_place(place), self._ffi.new("RTS_UI32 *")))
         for _, place in changes:
-            _check_monitoring(self._lib.ForceSet(self.c_place(place), int.from_bytes(place.value, "little")))
+            value = self._ffi.from_buffer("RTS_UI32[2]", place.value.ljust(8, b"\0"))
+            _check_monitoring(self._lib.ForceSet(self._ffi.new("FORCED_VALUE *", [self.c_place(place)[0], value])))
 
     def unforce(self, places: Sequence[ForcedPlace]) -> None:
         """Ends the force of these places."""
@@ -100,7 +101,8 @@ class SimVariables:
 def _forced_place(forced: Any) -> ForcedPlace:
     p = forced.place
     offset, *hops = p.offset[0 : 1 + p.pointers]
-    return ForcedPlace(p.area, offset, tuple(hops), p.size, p.mask, forced.value.to_bytes(8, "little")[: p.size])
+    value = (forced.value[0] | forced.value[1] << 32).to_bytes(8, "little")[: p.size]
+    return ForcedPlace(p.area, offset, tuple(hops), p.size, p.mask, value)
 
 
 def _check_monitoring(result: int) -> None:

@@ -64,7 +64,7 @@ static RTS_UI32 set(const BP_RECORD *record, RTS_UI32 size)
 
 static void a_breakpoint_arrives_with_its_condition(void)
 {
-    BP_RECORD record = {{0x10}, {3}, {0}, BP_LESS, BP_SIGNED, {0}, 1, 2, 4, 0xFF, {8, 0, 0, 0, 12}, {0xFE, 0xFF}};
+    BP_RECORD record = {{0x10}, {3}, {0}, BP_LESS, BP_SIGNED, {0}, {1, 2, 4, 0xFF, {8, 0, 0, 0, 12}}, {0xFE, 0xFF}};
     const BP_BREAKPOINT *entry = &fakes.bp.list[0];
 
     setup();
@@ -80,7 +80,7 @@ static void a_breakpoint_arrives_with_its_condition(void)
 
 static void a_bad_breakpoint_is_refused(void)
 {
-    BP_RECORD record = {{0x10}, {0}, {0}, BP_EQUAL, 0, {0}, 0, PLACE_POINTERS + 1, 4, 0xFF, {0}, {0}};
+    BP_RECORD record = {{0x10}, {0}, {0}, BP_EQUAL, 0, {0}, {0, PLACE_POINTERS + 1, 4, 0xFF, {0}}, {0}};
 
     setup();
     CHECK_EQUAL(set(&record, sizeof record), ERR_PARAMETER);
@@ -111,7 +111,7 @@ static void temporary_traps_replace_those_of_before_unless_more_come(void)
 
 static void variables_to_compare_arrive_with_or_without_their_traps(void)
 {
-    BP_RECORD record = {{0}, {0}, {0}, 0, 0, {0}, 1, 1, 4, 0xFF, {8, 0, 0, 0, 12}, {0}};
+    BP_RECORD record = {{0}, {0}, {0}, 0, 0, {0}, {1, 1, 4, 0xFF, {8, 0, 0, 0, 12}}, {0}};
 
     setup();
     begin();
@@ -126,7 +126,7 @@ static void variables_to_compare_arrive_with_or_without_their_traps(void)
     CHECK_EQUAL(call(SRV_BP_WATCH), ERR_OK);
     CHECK_EQUAL(fakes.bp.watches, 1);
     CHECK_EQUAL(fakes.bp.watch_traps, 3);
-    record.pointers = PLACE_POINTERS + 1;
+    record.place.pointers = PLACE_POINTERS + 1;
     begin();
     BTagWrite(&writer, TAG_BP_RECORD, BTAG_ALIGN_0, &record, sizeof record);
     CHECK_EQUAL(call(SRV_BP_WATCH), ERR_PARAMETER);
@@ -185,7 +185,7 @@ static void the_stack_is_read_and_written_within_its_bounds(void)
 
 static void one_breakpoint_is_cleared_or_all(void)
 {
-    BP_RECORD record = {{0x10}, {0}, {0}, 0, 0, {0}, 0, 0, 0, 0, {0}, {0}};
+    BP_RECORD record = {{0x10}, {0}, {0}, 0, 0, {0}, {0, 0, 0, 0, {0}}, {0}};
     BTAG offsets;
 
     setup();

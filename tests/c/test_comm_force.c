@@ -10,40 +10,43 @@
 static void begin_force(void)
 {
     begin_request();
-    BTagOpen(&writer, TAG_MON2_WRITE_LIST, BTAG_ALIGN_0);
+    BTagOpen(&writer, TAG_MON2_FORCED, BTAG_ALIGN_0);
 }
 
-static void add_program(RTS_UI32 action, RTS_UI32 size, const void *value, const void *code, RTS_UI32 code_size)
+static void add_place(const MON2_PLACE *place, const void *value, RTS_UI32 size)
 {
-    BTagAppend16(&writer, action);
-    BTagAppend32(&writer, size);
+    BTagAppend(&writer, place, sizeof(*place));
     BTagAppend(&writer, value, size);
-    BTagAppend16(&writer, code_size);
-    BTagAppend(&writer, code, code_size);
+    BTagAppendZeros(&writer, 8 - size);
 }
 
-static void add(RTS_UI32 action, RTS_UI32 size, const void *value, RTS_UI8 area, RTS_UI32 offset)
+static void add(RTS_UI8 size, const void *value, RTS_UI8 area, RTS_UI32 offset)
 {
-    RTS_UI8 code[] = {MON2_OP_LD16, 0, 0, MON2_OP_RAO, area};
+    MON2_PLACE place = {area, 0, size, PLACE_ALL_BITS, {0}};
 
-    BytesPut16(code + 1, offset);
-    add_program(action, size, value, code, sizeof(code));
+    BytesPut32(place.offset, offset);
+    add_place(&place, value, size > 8 ? 8 : size);
 }
 
 /* Sends; returns TAG_ERROR, or TAG_MON2_ERROR, or ERR_OK when the reply is empty. */
-static RTS_UI32 send_force(void)
+static RTS_UI32 send_to(RTS_UI16 service)
 {
     BTagClose(&writer);
-    CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_FORCE, &writer, &reply));
+    CHECK(client_call(&client, SG_MONITORING2, service, &writer, &reply));
     if (reply.size == 20)
         return ERR_OK;
     return reply_error(&reply) != ERR_OK ? reply_error(&reply) : reply_number(&reply, TAG_MON2_ERROR);
 }
 
-static RTS_UI32 force(RTS_UI32 size, const void *value, RTS_UI8 area, RTS_UI32 offset)
+static RTS_UI32 send_force(void)
+{
+    return send_to(SRV_MON2_FORCE);
+}
+
+static RTS_UI32 force(RTS_UI8 size, const void *value, RTS_UI8 area, RTS_UI32 offset)
 {
     begin_force();
-    add(MON2_FORCE, size, value, area, offset);
+    add(size, value, area, offset);
     return send_force();
 }
 
@@ -68,13 +71,14 @@ static void setup_forces(void)
 
 static void variables_are_forced_and_listed(void)
 {
+    static const MON2_PLACE bit = {APP_AREA_DATA, 0, 1, 0x04, {0x20}};
     BTAG entries;
 
     setup_forces();
     begin_force();
-    add(MON2_FORCE, 1, "\xA1", APP_AREA_RETAIN, 1);
-    add(MON2_FORCE, 8, "\xB1\xB2\xB3\xB4\xB5\xB6\xB7\xB8", APP_AREA_DATA, 8);
-    add_program(MON2_FORCE, 1, "\x04", "\x02\x20\x00\x06\x00\x40\x04", 7);
+    add(1, "\xA1", APP_AREA_RETAIN, 1);
+    add(8, "\xB1\xB2\xB3\xB4\xB5\xB6\xB7\xB8", APP_AREA_DATA, 8);
+    add_place(&bit, "\x04", 1);
     CHECK_EQUAL(send_force(), ERR_OK);
     CHECK_EQUAL(fakes_area(APP_AREA_RETAIN)[1], 0xA1);
     CHECK_EQUAL(list(0, &entries), 3);
@@ -109,9 +113,9 @@ static void one_force_ends_or_all_do(void)
     CHECK_EQUAL(force(1, "\x01", APP_AREA_DATA, 1), ERR_OK);
     CHECK_EQUAL(force(1, "\x02", APP_AREA_DATA, 2), ERR_OK);
     begin_force();
-    add(MON2_UNFORCE, 1, "\0", APP_AREA_DATA, 1);
-    add(MON2_UNFORCE, 1, "\0", APP_AREA_DATA, 3); /* not forced: another tool may have ended it */
-    CHECK_EQUAL(send_force(), ERR_OK);
+    add(1, "\0", APP_AREA_DATA, 1);
+    add(1, "\0", APP_AREA_DATA, 3); /* not forced: another tool may have ended it */
+    CHECK_EQUAL(send_to(SRV_MON2_UNFORCE), ERR_OK);
     CHECK_EQUAL(list(0, &entries), 1);
     CHECK_EQUAL(entries.data[4], 2);
     BTagWriterInit(&writer, content, sizeof(content) - 20);
@@ -126,54 +130,45 @@ static void one_force_ends_or_all_do(void)
 static void one_bad_entry_forces_nothing(void)
 {
     static const struct {
-        RTS_UI32 action;
-        RTS_UI32 size;
-        RTS_UI32 offset;
+        MON2_PLACE place;
         RTS_UI32 error;
-        RTS_UI8 area;
     } bad[] = {
-        {MON2_FORCE, 1, FAKE_AREA_SIZE, MONITORING_ERR_INVALID_INDEX, APP_AREA_DATA},
-        {MON2_FORCE, 8, FAKE_AREA_SIZE - 7, MONITORING_ERR_INVALID_INDEX, APP_AREA_DATA},
-        {MON2_FORCE, 1, 0, MONITORING_ERR_INVALID_AREA, APP_AREA_COUNT},
-        {MON2_FORCE, 1, 0, MONITORING_ERR_INVALID_AREA, 0xFF},
-        {MON2_FORCE, 1, 0, MONITORING_ERR_OPERATION_DENIED, APP_AREA_CODE},
-        {MON2_FORCE, 0, 0, MONITORING_ERR_UNSUPPORTED_DATATYPE, APP_AREA_DATA},
-        {MON2_FORCE, 3, 0, MONITORING_ERR_UNSUPPORTED_DATATYPE, APP_AREA_DATA},
-        {MON2_FORCE, 16, 0, MONITORING_ERR_UNSUPPORTED_DATATYPE, APP_AREA_DATA},
-        {1, 1, 0, MONITORING_ERR_UNSUPPORTED_OPERATOR, APP_AREA_DATA}, /* and restore */
-        {0xFFFE, 1, 0, MONITORING_ERR_UNSUPPORTED_OPERATOR, APP_AREA_DATA},
+        {{APP_AREA_DATA, 0, 1, 0xFF, {FAKE_AREA_SIZE & 0xFF, FAKE_AREA_SIZE >> 8}}, MONITORING_ERR_INVALID_INDEX},
+        {{APP_AREA_DATA, 0, 8, 0xFF, {(FAKE_AREA_SIZE - 7) & 0xFF, (FAKE_AREA_SIZE - 7) >> 8}},
+         MONITORING_ERR_INVALID_INDEX},
+        {{APP_AREA_DATA, 0, 4, 0xFF, {0xFF, 0xFF, 0xFF, 0xFF}}, MONITORING_ERR_INVALID_INDEX},
+        {{APP_AREA_COUNT, 0, 1, 0xFF, {0}}, MONITORING_ERR_INVALID_AREA},
+        {{0xFF, 0, 1, 0xFF, {0}}, MONITORING_ERR_INVALID_AREA},
+        {{APP_AREA_CODE, 0, 1, 0xFF, {0}}, MONITORING_ERR_OPERATION_DENIED},
+        {{APP_AREA_DATA, 0, 0, 0xFF, {0}}, MONITORING_ERR_UNSUPPORTED_DATATYPE},
+        {{APP_AREA_DATA, 0, 3, 0xFF, {0}}, MONITORING_ERR_UNSUPPORTED_DATATYPE},
+        {{APP_AREA_DATA, 0, 16, 0xFF, {0}}, MONITORING_ERR_UNSUPPORTED_DATATYPE},
+        {{APP_AREA_DATA, 0, 2, 0x04, {0}}, MONITORING_ERR_UNSUPPORTED_DATATYPE},
+        {{APP_AREA_DATA, PLACE_POINTERS + 1, 1, 0xFF, {0}}, MONITORING_ERR_NESTING_DEPTH},
+        {{APP_AREA_DATA, 0xFF, 1, 0xFF, {0}}, MONITORING_ERR_NESTING_DEPTH},
     };
-    static const RTS_UI8 value[16] = {0};
     BTAG entries;
 
     for (RTS_UI32 i = 0; i < RTS_COUNT(bad); i++) {
         setup_forces();
         begin_force();
-        add(MON2_FORCE, 1, "\x01", APP_AREA_DATA, 1);
-        add(bad[i].action, bad[i].size, value, bad[i].area, bad[i].offset);
+        add(1, "\x01", APP_AREA_DATA, 1);
+        add_place(&bad[i].place, "\1", 1);
         CHECK_EQUAL(send_force(), bad[i].error);
         CHECK_EQUAL(reply_number(&reply, TAG_MON2_ERROR_INDEX), 1);
         CHECK_EQUAL(list(0, &entries), 0);
     }
 }
 
-static void a_size_of_257_is_not_one_byte(void)
-{
-    static RTS_UI8 value[257];
-
-    setup_forces();
-    CHECK_EQUAL(force(sizeof(value), value, APP_AREA_DATA, 0), MONITORING_ERR_UNSUPPORTED_DATATYPE);
-}
-
 static void a_list_that_is_cut_off_forces_nothing(void)
 {
     BTAG entries;
 
-    for (RTS_UI32 missing = 1; missing <= 13; missing++) {
+    for (RTS_UI32 missing = 1; missing <= 2 * sizeof(MON2_FORCED); missing += missing == 27 ? 2 : 1) {
         setup_forces();
         begin_force();
-        add(MON2_FORCE, 1, "\x01", APP_AREA_DATA, 1);
-        add(MON2_FORCE, 1, "\x02", APP_AREA_DATA, 2);
+        add(1, "\x01", APP_AREA_DATA, 1);
+        add(1, "\x02", APP_AREA_DATA, 2);
         writer.size -= missing;
         CHECK(send_force() != ERR_OK);
         CHECK_EQUAL(list(0, &entries), 0);
@@ -190,9 +185,9 @@ static void a_full_list_refuses_the_first_one_that_has_no_room(void)
     for (RTS_UI32 i = 0; i < FORCE_MAX - 1; i++)
         CHECK_EQUAL(force(1, "\x01", APP_AREA_DATA, i), ERR_OK);
     begin_force();
-    add(MON2_FORCE, 1, "\x09", APP_AREA_DATA, 0); /* is there */
-    add(MON2_FORCE, 1, "\x01", APP_AREA_DATA, 500);
-    add(MON2_FORCE, 1, "\x01", APP_AREA_DATA, 501);
+    add(1, "\x09", APP_AREA_DATA, 0); /* is there */
+    add(1, "\x01", APP_AREA_DATA, 500);
+    add(1, "\x01", APP_AREA_DATA, 501);
     CHECK_EQUAL(send_force(), MONITORING_ERR_FORCE_FAILED);
     CHECK_EQUAL(reply_number(&reply, TAG_MON2_ERROR_INDEX), 2);
     while ((got = list(all, &entries)) != 0) /* in as many replies as it takes */
@@ -201,33 +196,28 @@ static void a_full_list_refuses_the_first_one_that_has_no_room(void)
     CHECK_EQUAL(force(1, "\x01", APP_AREA_DATA, 500), ERR_OK);
 }
 
-static void pointers_are_noted_and_too_many_are_refused(void)
+static void pointers_are_noted_and_must_lead_somewhere(void)
 {
-    RTS_UI8 code[5 + (PLACE_POINTERS + 1) * 6] = {MON2_OP_LD16, POINTER_AT, 0, MON2_OP_RAO, APP_AREA_DATA};
-    static const RTS_UI8 step[] = {MON2_OP_DER, MON2_POINTER_SIZE, MON2_OP_LD16, 0, 0, MON2_OP_ADD};
+    MON2_PLACE place = {APP_AREA_DATA, 0, 1, PLACE_ALL_BITS, {POINTER_AT}};
     BTAG entries;
 
-    for (RTS_UI32 i = 0; i <= PLACE_POINTERS; i++)
-        memcpy(code + 5 + 6 * i, step, sizeof(step));
     setup_forces();
     put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)(fakes_area(APP_AREA_DATA) + POINTER_AT)); /* to itself */
-    for (RTS_UI32 pointers = 1; pointers <= PLACE_POINTERS; pointers++) {
+    for (place.pointers = 1; place.pointers <= PLACE_POINTERS; place.pointers++) {
         begin_force();
-        add_program(MON2_FORCE, 1, fakes_area(APP_AREA_DATA) + POINTER_AT, code, 5 + 6 * pointers);
+        add_place(&place, fakes_area(APP_AREA_DATA) + POINTER_AT, 1);
         CHECK_EQUAL(send_force(), ERR_OK);
-        CHECK_EQUAL(list(pointers - 1, &entries), 1);
-        CHECK_EQUAL(entries.data[1], pointers);
+        CHECK_EQUAL(list(place.pointers - 1u, &entries), 1);
+        CHECK_EQUAL(entries.data[1], place.pointers);
     }
-    begin_force();
-    add_program(MON2_FORCE, 1, "\0", code, sizeof(code));
-    CHECK_EQUAL(send_force(), MONITORING_ERR_NESTING_DEPTH);
+    place.pointers = 1;
     put_pointer(APP_AREA_DATA, POINTER_AT, 0);
     begin_force();
-    add_program(MON2_FORCE, 1, "\x02", code, 11);
+    add_place(&place, "\x02", 1);
     CHECK_EQUAL(send_force(), MONITORING_ERR_INVALID_POINTER);
     begin_force();
-    add_program(MON2_UNFORCE, 1, "\0", code, 11); /* ends all the same */
-    CHECK_EQUAL(send_force(), ERR_OK);
+    add_place(&place, "", 0); /* ends all the same */
+    CHECK_EQUAL(send_to(SRV_MON2_UNFORCE), ERR_OK);
     CHECK_EQUAL(list(0, &entries), PLACE_POINTERS - 1);
 }
 
@@ -262,10 +252,9 @@ int main(void)
     RUN(variables_are_forced_and_listed);
     RUN(one_force_ends_or_all_do);
     RUN(one_bad_entry_forces_nothing);
-    RUN(a_size_of_257_is_not_one_byte);
     RUN(a_list_that_is_cut_off_forces_nothing);
     RUN(a_full_list_refuses_the_first_one_that_has_no_room);
-    RUN(pointers_are_noted_and_too_many_are_refused);
+    RUN(pointers_are_noted_and_must_lead_somewhere);
     RUN(a_read_says_that_something_is_forced);
     RUN(another_application_is_not_forced);
     return test_result();

@@ -9,7 +9,7 @@
 
 typedef struct {
     TRACE_CONFIG head;
-    TRACE_PLACE records[2];
+    MON2_PLACE records[2];
 } CONFIG;
 
 static CONFIG config;

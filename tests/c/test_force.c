@@ -22,12 +22,26 @@ static APP_PLACE place_of(RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size)
     return place;
 }
 
+static MON_RESULT check(const APP_PLACE *place)
+{
+    RTS_UI32 added = 0;
+
+    return ForceCheck(place, &added);
+}
+
+static MON_RESULT set(const APP_PLACE *place, RTS_UI64 value)
+{
+    FORCED_VALUE forced = {*place, {(RTS_UI32)value, (RTS_UI32)(value >> 32)}};
+
+    return ForceSet(&forced);
+}
+
 static MON_RESULT force(RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size, RTS_UI64 value)
 {
     APP_PLACE place = place_of(area, offset, size);
-    MON_RESULT result = ForceCheck(&place);
+    MON_RESULT result = check(&place);
 
-    return result == MONITORING_ERR_OK ? ForceSet(&place, value) : result;
+    return result == MONITORING_ERR_OK ? set(&place, value) : result;
 }
 
 static void end(RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size)
@@ -117,8 +131,8 @@ static void forced_bits_leave_the_others_to_the_program(void)
     begin_program();
     load();
     place.mask = 0x84;
-    CHECK_EQUAL(ForceCheck(&place), MONITORING_ERR_OK);
-    CHECK_EQUAL(ForceSet(&place, 0x04), MONITORING_ERR_OK);
+    CHECK_EQUAL(check(&place), MONITORING_ERR_OK);
+    CHECK_EQUAL(set(&place, 0x04), MONITORING_ERR_OK);
     *at(APP_AREA_DATA, 0) = 0x80;
     run_cycle();
     CHECK_EQUAL(*at(APP_AREA_DATA, 0), 6); /* two cycles */
@@ -208,10 +222,10 @@ static void a_pointer_is_followed_in_each_cycle(void)
     place.offset[1] = 4;
     begin_program();
     load();
-    CHECK_EQUAL(ForceCheck(&place), MONITORING_ERR_INVALID_POINTER);
+    CHECK_EQUAL(check(&place), MONITORING_ERR_INVALID_POINTER);
     put_pointer((uintptr_t)at(APP_AREA_DATA, 40));
-    CHECK_EQUAL(ForceCheck(&place), MONITORING_ERR_OK);
-    CHECK_EQUAL(ForceSet(&place, 99), MONITORING_ERR_OK);
+    CHECK_EQUAL(check(&place), MONITORING_ERR_OK);
+    CHECK_EQUAL(set(&place, 99), MONITORING_ERR_OK);
     CHECK_EQUAL(read_u32(APP_AREA_DATA, 44), 99);
     put_pointer((uintptr_t)at(APP_AREA_RETAIN, 0));
     run_cycle();
@@ -222,7 +236,7 @@ static void a_pointer_is_followed_in_each_cycle(void)
     run_cycle();
     put_pointer((uintptr_t)at(APP_AREA_CODE, 0)); /* not written, or this test would fault */
     run_cycle();
-    CHECK_EQUAL(ForceCheck(&place), MONITORING_ERR_OPERATION_DENIED);
+    CHECK_EQUAL(check(&place), MONITORING_ERR_OPERATION_DENIED);
     CHECK_EQUAL(AppGetState(), AS_RUN);
     ForceEnd(&place);
     CHECK_EQUAL(ForceGetCount(), 0);
@@ -352,7 +366,7 @@ static void force_mixed(RTS_UI32 count)
         CHECK_EQUAL(force(APP_AREA_DATA, 4 + 4 * i, 4, 1000 + i), MONITORING_ERR_OK);
     CHECK_EQUAL(force(APP_AREA_RETAIN, 8, 8, 0x0102030405060708), MONITORING_ERR_OK);
     CHECK_EQUAL(force(APP_AREA_RETAIN, 2, 2, 0x2233), MONITORING_ERR_OK);
-    CHECK_EQUAL(ForceSet(&by_pointer, 0x4455), MONITORING_ERR_OK);
+    CHECK_EQUAL(set(&by_pointer, 0x4455), MONITORING_ERR_OK);
     CHECK_EQUAL(force(APP_AREA_RETAIN, 5, 1, 0x66), MONITORING_ERR_OK); /* after what the pointer leads to */
     memset(at(APP_AREA_RETAIN, 0), 0xEE, 16);
     memset(at(APP_AREA_DATA, 4), 0xEE, 4 * count);
@@ -387,7 +401,7 @@ static void what_cannot_be_forced_is_refused(void)
         if (size != 1 && size != 2 && size != 4 && size != 8)
             CHECK_EQUAL(force(APP_AREA_DATA, 0, (RTS_UI8)size, 1), MONITORING_ERR_UNSUPPORTED_DATATYPE);
     place.mask = 1;
-    CHECK_EQUAL(ForceCheck(&place), MONITORING_ERR_UNSUPPORTED_DATATYPE);
+    CHECK_EQUAL(check(&place), MONITORING_ERR_UNSUPPORTED_DATATYPE);
     CHECK_EQUAL(ForceGetCount(), 0);
 }
 

@@ -16,12 +16,12 @@ enum { CYCLE_NS = 10000000, POINTER_AT = 32, MAX_SAMPLES = 512, MAX_VALUES = 8 }
 
 typedef struct {
     TRACE_CONFIG head;
-    TRACE_PLACE records[TRACE_MAX_RECORDS];
+    MON2_PLACE records[TRACE_MAX_RECORDS];
 } CONFIG;
 
 static CONFIG config;
 
-static void place(TRACE_PLACE *to, RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size)
+static void place(MON2_PLACE *to, RTS_UI8 area, RTS_UI32 offset, RTS_UI8 size)
 {
     memset(to, 0, sizeof *to);
     to->area = area;
@@ -54,7 +54,7 @@ static void set_trigger(RTS_UI32 offset, RTS_UI8 size, RTS_UI8 comparison, RTS_U
 
 static RTS_UI32 config_size(void)
 {
-    return (RTS_UI32)(sizeof config.head + config.head.records * sizeof(TRACE_PLACE));
+    return (RTS_UI32)(sizeof config.head + config.head.records * sizeof(MON2_PLACE));
 }
 
 static RTS_UI32 id;
@@ -506,7 +506,7 @@ static void packets_share_the_buffer_and_give_it_back(void)
         for (RTS_UI32 i = 0; i < 3; i++) {
             CHECK(TraceGetNext(&id, &size) != NULL);
             CHECK_EQUAL(id, ids[i]);
-            CHECK_EQUAL(size, sizeof(TRACE_CONFIG) + sizeof(TRACE_PLACE));
+            CHECK_EQUAL(size, sizeof(TRACE_CONFIG) + sizeof(MON2_PLACE));
         }
         CHECK(TraceGetNext(&id, &size) == NULL);
         for (RTS_UI32 i = 0; i < 3; i++)

@@ -15,12 +15,15 @@ import struct
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from plctool.core import lib
 from plctool.errors import LinkError
 from plctool.link import bintag, router, simplecom
 from plctool.link.transport import NO_PLACES
 from plctool.testing.line import BITS_PER_BYTE, Damage
+
+_FORCED = struct.Struct("<4B16s8s")  # MON2_FORCED: what says its place, and the value
 
 DEVICE_ADDRESS = b"\x00\x01"
 CLIENT_ADDRESS = b"\x00\x02"
@@ -346,7 +349,7 @@ class FakePlc:
         self.lateness: list[list[list[tuple[int, int]]]] = [[]]  # one reply after the other, the last one again
         self.requests: list[tuple[int, int]] = []
         self.writes = 0
-        self.forced: dict[tuple[int, int, int, int, bytes], bytes] = {}  # what by place
+        self.forced: dict[tuple[Any, ...], bytes] = {}  # what by place
         self.password = b""  # its verifier
         self.wrong = 0  # proofs of another one
         self.pauses = 0  # proofs from now on that come too early after a wrong one
@@ -388,6 +391,7 @@ class FakePlc:
             (lib.SG_MONITORING2, lib.SRV_MON2_READ): self._read,
             (lib.SG_MONITORING2, lib.SRV_MON2_WRITE): self._write,
             (lib.SG_MONITORING2, lib.SRV_MON2_FORCE): self._force,
+            (lib.SG_MONITORING2, lib.SRV_MON2_UNFORCE): self._unforce,
             (lib.SG_MONITORING2, lib.SRV_MON2_FORCE_LIST): self._force_list,
             (app, lib.SRV_APP_RELEASE_FORCE_LIST): self._release_forces,
             (lib.SG_LOG, lib.SRV_LOG_GET_ENTRIES): self._log,
@@ -572,29 +576,24 @@ class FakePlc:
     def _force(self, tags: bintag.Tags) -> list[bintag.Tag]:
         if error := self._check_monitoring(tags):
             return error
-        data, at, index = tags.bytes(lib.TAG_MON2_WRITE_LIST), 0, 0
-        while at + 6 < len(data):
-            action, size = struct.unpack_from("<HI", data, at)
-            value, code = data[at + 6 : at + 6 + size], data[at + 8 + size :]
-            at += 8 + size + struct.unpack_from("<H", data, at + 6 + size)[0]
-            mask = code[6] if code[5:6] == bytes([lib.MON2_OP_MASK]) else 0xFF
-            place = (code[4], 0, size, mask, struct.pack("<4I", self._load(code)[0], 0, 0, 0))
-            if action == lib.MON2_UNFORCE:
-                self.forced.pop(place, None)
-            elif len(self.forced) == self.FORCE_ROOM and place not in self.forced:
+        for index, (*place, value) in enumerate(_FORCED.iter_unpack(tags.bytes(lib.TAG_MON2_FORCED))):
+            if len(self.forced) == self.FORCE_ROOM and tuple(place) not in self.forced:
                 full = bintag.u32(lib.TAG_MON2_ERROR, lib.MONITORING_ERR_FORCE_FAILED)
                 return [full, bintag.u32(lib.TAG_MON2_ERROR_INDEX, index)]
-            else:
-                self.forced[place] = value
-            index += 1
+            self.forced[tuple(place)] = value
+        return []
+
+    def _unforce(self, tags: bintag.Tags) -> list[bintag.Tag]:
+        if error := self._check_monitoring(tags):
+            return error
+        for *place, _ in _FORCED.iter_unpack(tags.bytes(lib.TAG_MON2_FORCED)):
+            self.forced.pop(tuple(place), None)
         return []
 
     def _force_list(self, tags: bintag.Tags) -> list[bintag.Tag]:
         """Two at a time."""
         start = tags.u32(lib.TAG_MON2_FORCE_START)
-        entries = [
-            struct.pack("<4B16s8s", *place, value) for place, value in list(self.forced.items())[start : start + 2]
-        ]
+        entries = [_FORCED.pack(*place, value) for place, value in list(self.forced.items())[start : start + 2]]
         listed = [bintag.raw(lib.TAG_MON2_FORCED, b"".join(entries))] if entries else []
         room = bintag.u32(lib.TAG_MON2_FORCE_MAX, self.FORCE_ROOM)
         return [bintag.u32(lib.TAG_MON2_FORCE_SERIAL, 1), room, *listed]

@@ -9,7 +9,7 @@ from plctool.core import lib
 from plctool.debug.forced import ForcedPlace
 from plctool.errors import DeviceError
 from plctool.link import services
-from plctool.link.monitoring import force_memory, read_forced
+from plctool.link.monitoring import force_memory, read_forced, unforce_memory
 
 
 def places(count: int) -> list[ForcedPlace]:
@@ -19,10 +19,10 @@ def places(count: int) -> list[ForcedPlace]:
 def test_a_list_that_takes_several_replies_is_read_whole():
     bench = Bench()
     session, plc, image_crc = bench.session, bench.plc, bench.crc
-    force_memory(session, image_crc, places(3), lib.MON2_FORCE)
+    force_memory(session, image_crc, places(3))
     listed = read_forced(session)
     assert (listed.room, listed.places) == (plc.FORCE_ROOM, places(3))
-    force_memory(session, image_crc, places(2), lib.MON2_UNFORCE)
+    unforce_memory(session, image_crc, places(2))
     assert read_forced(session).places == places(3)[2:]
     services.end_all_forces(session)
     assert read_forced(session).places == []
@@ -32,5 +32,5 @@ def test_one_too_many_is_an_error_of_monitoring():
     bench = Bench()
     session, plc, image_crc = bench.session, bench.plc, bench.crc
     with pytest.raises(DeviceError) as failed:
-        force_memory(session, image_crc, places(plc.FORCE_ROOM + 1), lib.MON2_FORCE)
+        force_memory(session, image_crc, places(plc.FORCE_ROOM + 1))
     assert failed.value.result == lib.MONITORING_ERR_FORCE_FAILED

@@ -83,3 +83,23 @@ MON_RESULT AppPlaceFind(const APP_PLACE *place, AREA_ADDRESS *address, RTS_UI8 *
     }
     return result == MONITORING_ERR_OK ? AppAddressResolve(address, place->size, at) : result;
 }
+
+#if TRACE_BUFFER > 0 || BP_MAX > 0
+bool AppNumberKey(RTS_UI64 value, RTS_UI32 size, RTS_UI32 kind, RTS_I64 *key)
+{
+    const RTS_UI32 top = 0x80000000u;
+    RTS_UI32 low = (RTS_UI32)value;
+    RTS_UI32 high = (RTS_UI32)(value >> 32) & ~top;
+
+    *key = size == 1 ? (RTS_I8)low : size == 2 ? (RTS_I16)low : size == 4 ? (RTS_I32)low : (RTS_I64)value;
+    if (kind == NUMBER_UNSIGNED)
+        *key = (RTS_I64)(value ^ (RTS_UI64)top << 32);
+    if (kind != NUMBER_REAL)
+        return true;
+    if (*key < 0) /* the bits of a REAL are sign and magnitude */
+        *key = size == 8 ? -(RTS_I64)(value << 1 >> 1) : -(RTS_I64)(low & ~top);
+    if (size == 4)
+        return (low & ~top) <= 0x7F800000u;
+    return high < 0x7FF00000u || (high == 0x7FF00000u && low == 0);
+}
+#endif

@@ -132,32 +132,23 @@ static void take_out(const TRAP *trap)
         SysDebugRestore(address_of(trap->offset), trap->original);
 }
 
-/* From the end on, so that those that move have been looked at. */
-static void remove_owner(RTS_UI32 owner)
+/* A trap without an owner ends; the last one takes its place. */
+static void disown(TRAP *trap, RTS_UI32 owners)
 {
-    RTS_UI32 i = bp.trap_count;
-
-    while (i-- > 0) {
-        TRAP *trap = &bp.trap[i];
-        trap->owners &= ~owner;
-        if (trap->owners == 0) {
-            take_out(trap);
-            *trap = bp.trap[--bp.trap_count];
-        }
-    }
-}
-
-static void remove_trap(RTS_UI32 offset, RTS_UI32 owner)
-{
-    TRAP *trap = find_trap(offset);
-
-    if (trap == NULL)
-        return;
-    trap->owners &= ~owner;
+    trap->owners &= ~owners;
     if (trap->owners == 0) {
         take_out(trap);
         *trap = bp.trap[--bp.trap_count];
     }
+}
+
+/* From the end on, so that those that move have been looked at. */
+static void disown_all(RTS_UI32 owners)
+{
+    RTS_UI32 i = bp.trap_count;
+
+    while (i-- > 0)
+        disown(&bp.trap[i], owners);
 }
 
 static void put_in_all(void)
@@ -180,61 +171,19 @@ static void take_out_all(void)
 
 /* ---- conditions ---- */
 
-static RTS_I64 sign_extend(RTS_UI64 value, RTS_UI32 size)
-{
-    RTS_UI32 unused = 64 - 8 * size;
-
-    return (RTS_I64)(value << unused) >> unused;
-}
-
-static double real_of(RTS_UI64 value, RTS_UI32 size)
-{
-    RTS_UI32 low = (RTS_UI32)value;
-    float small;
-    double large;
-
-    memcpy(&small, &low, sizeof small);
-    memcpy(&large, &value, sizeof large);
-    return size == sizeof small ? (double)small : large;
-}
-
-static RTS_UI32 bit_if(bool relates, RTS_UI32 one, RTS_UI32 other, RTS_UI32 third)
-{
-    return relates ? 1u << one | 1u << other | 1u << third : 0;
-}
-
-/* The bits of BP_EQUAL .. BP_GREATER_EQUAL that hold; of what cannot be ordered, that of BP_NOT_EQUAL. */
-static RTS_UI32 relations(bool less, bool equal, bool greater)
-{
-    RTS_UI32 found = bit_if(less, BP_LESS, BP_LESS_EQUAL, BP_NOT_EQUAL) |
-                     bit_if(equal, BP_EQUAL, BP_LESS_EQUAL, BP_GREATER_EQUAL) |
-                     bit_if(greater, BP_GREATER, BP_GREATER_EQUAL, BP_NOT_EQUAL);
-
-    return found != 0 ? found : 1u << BP_NOT_EQUAL;
-}
-
-static RTS_UI32 relations_of_reals(double a, double b)
-{
-    return relations(a < b, a >= b && a <= b, a > b);
-}
-
-static RTS_UI32 relations_of_signed(RTS_I64 a, RTS_I64 b)
-{
-    return relations(a<b, a == b, a> b);
-}
-
 static bool compares(const BP_CONDITION *condition, RTS_UI64 value)
 {
+    enum { LESS = NUMBER_LESS, EQUAL = NUMBER_EQUAL, GREATER = NUMBER_GREATER };
+    static const RTS_UI8 wanted[] = {
+        [BP_EQUAL] = EQUAL,     [BP_NOT_EQUAL] = LESS | GREATER,     [BP_LESS] = LESS, [BP_LESS_EQUAL] = LESS | EQUAL,
+        [BP_GREATER] = GREATER, [BP_GREATER_EQUAL] = GREATER | EQUAL};
     RTS_UI32 size = condition->place.size;
-    RTS_UI32 found;
+    RTS_I64 key, other;
 
-    if (condition->kind == BP_REAL)
-        found = relations_of_reals(real_of(value, size), real_of(condition->value, size));
-    else if (condition->kind == BP_SIGNED)
-        found = relations_of_signed(sign_extend(value, size), sign_extend(condition->value, size));
-    else
-        found = relations(value<condition->value, value == condition->value, value> condition->value);
-    return (found >> condition->relation & 1) != 0;
+    if (!AppNumberKey(value, size, condition->kind, &key) ||
+        !AppNumberKey(condition->value, size, condition->kind, &other))
+        return condition->relation == BP_NOT_EQUAL; /* NAN */
+    return (wanted[condition->relation] & NUMBER_ORDER(key, other)) != 0;
 }
 
 /* False if a pointer leads nowhere. */
@@ -491,19 +440,22 @@ static void check_image(void)
     bp.crc = AppGetImage()->crc;
 }
 
-static void forget_list(void)
+/* Ends what these owners of traps have. */
+static void forget(RTS_UI32 owners)
 {
-    bp.count = 0;
-    bp.watch_count = 0;
-    remove_owner(TRAP_BREAKPOINT | TRAP_TEMPORARY | TRAP_WATCH);
+    RTS_UI32 lock = SysLockEnter();
+
+    if ((owners & TRAP_BREAKPOINT) != 0)
+        bp.count = 0;
+    if ((owners & TRAP_WATCH) != 0)
+        bp.watch_count = 0;
+    disown_all(owners);
+    SysLockLeave(lock);
 }
 
 void AppBpClearAll(void)
 {
-    RTS_UI32 lock = SysLockEnter();
-
-    forget_list();
-    SysLockLeave(lock);
+    forget(TRAP_BREAKPOINT | TRAP_TEMPORARY | TRAP_WATCH);
 }
 
 RTS_RESULT AppBpAttach(bool keep)
@@ -609,7 +561,7 @@ RTS_RESULT AppBpClear(RTS_UI32 offset)
     if (entry != NULL) {
         bp.count--;
         memmove(entry, entry + 1, (RTS_SIZE)(&bp.list[bp.count] - entry) * sizeof *entry);
-        remove_trap(offset, TRAP_BREAKPOINT);
+        disown(find_trap(offset), TRAP_BREAKPOINT); /* each breakpoint has one */
     }
     SysLockLeave(lock);
     return entry != NULL ? ERR_OK : ERR_APP_BP_BREAKPOINT_NOT_SET;
@@ -627,10 +579,7 @@ bool AppBpGet(RTS_UI32 index, BP_BREAKPOINT *breakpoint)
 
 void AppBpClearTemporary(void)
 {
-    RTS_UI32 lock = SysLockEnter();
-
-    remove_owner(TRAP_TEMPORARY);
-    SysLockLeave(lock);
+    forget(TRAP_TEMPORARY);
 }
 
 /* A trap that is out while its task stands on it is no danger: the task is halted. */
@@ -656,11 +605,7 @@ RTS_RESULT AppBpAddTemporary(RTS_UI32 offset)
 
 void AppBpClearWatches(void)
 {
-    RTS_UI32 lock = SysLockEnter();
-
-    bp.watch_count = 0;
-    remove_owner(TRAP_WATCH);
-    SysLockLeave(lock);
+    forget(TRAP_WATCH);
 }
 
 /* With the lock. */

@@ -20,6 +20,11 @@
 #include "SysAtomic.h"
 #include "SysLock.h"
 
+typedef struct {
+    FORCED_VALUE forced;
+    bool is_searched; /* where it is, in each cycle */
+} ENTRY;
+
 /* A value of 1, 2 or 4 bytes that is where it always is. */
 typedef struct {
     RTS_UI8 *at;
@@ -38,7 +43,7 @@ static struct {
     RTS_UI32 count;
     RTS_UI32 serial;
     bool has_phases;
-    FORCED_VALUE list[FORCE_MAX];
+    ENTRY list[FORCE_MAX];
 } force;
 
 static void put_all(RTS_UI32 task, const IEC_CONTEXT *context);
@@ -57,21 +62,24 @@ static bool is_aligned(const RTS_UI8 *at, RTS_UI32 size)
 static void put(RTS_UI8 *at, const FORCED_VALUE *forced)
 {
     RTS_UI32 size = forced->place.size;
+    RTS_UI32 value = forced->value[0];
+    RTS_UI64 whole;
     RTS_UI32 lock;
 
     if (forced->place.mask != PLACE_ALL_BITS) {
         lock = RTS_ONE_CORE ? SysLockEnter() : 0;
-        SysAtomicSetBits(at, forced->place.mask, (RTS_UI8)forced->value);
+        SysAtomicSetBits(at, forced->place.mask, (RTS_UI8)value);
         if (RTS_ONE_CORE)
             SysLockLeave(lock);
     } else if (size == 2 && is_aligned(at, size)) {
-        *(volatile RTS_UI16 *)(void *)at = (RTS_UI16)forced->value;
+        *(volatile RTS_UI16 *)(void *)at = (RTS_UI16)value;
     } else if (size == 4 && is_aligned(at, size)) {
-        *(volatile RTS_UI32 *)(void *)at = (RTS_UI32)forced->value;
+        *(volatile RTS_UI32 *)(void *)at = value;
     } else if (size == 8 && is_aligned(at, size)) {
-        *(volatile RTS_UI64 *)(void *)at = forced->value;
+        memcpy(&whole, forced->value, sizeof whole);
+        *(volatile RTS_UI64 *)(void *)at = whole;
     } else {
-        memcpy(at, &forced->value, size);
+        memcpy(at, forced->value, size);
     }
 }
 
@@ -124,7 +132,7 @@ static RTS_NOINLINE void put_others(RTS_UI32 task)
         *(volatile RTS_UI8 *)to->at = (RTS_UI8)to->value;
     for (i = 0; i < force.count; i++) {
         if (force.list[i].is_searched)
-            search_and_put(task, &force.list[i]);
+            search_and_put(task, &force.list[i].forced);
     }
 }
 
@@ -156,13 +164,13 @@ static bool is_copied(const APP_PLACE *place)
 {
     RTS_UI32 task;
 
-    if (!is_image(place->area))
-        return false;
-    for (task = 0; task < IecTaskGetCount(); task++) {
+    if (!RTS_ONE_CORE || ONLINE_CHANGE)
+        return is_image(place->area);
+    for (task = 0; is_image(place->area) && task < IecTaskGetCount(); task++) {
         if (AppImageGetCopy(task, place->area, place->offset[0], place->size) != NULL)
             return true;
     }
-    return !RTS_ONE_CORE || ONLINE_CHANGE;
+    return false;
 }
 
 static bool may_overlap(const APP_PLACE *a, const APP_PLACE *b)
@@ -180,38 +188,32 @@ static bool needs_search(const APP_PLACE *place)
     if (place->pointers > 0 || place->mask != PLACE_ALL_BITS || place->size > LARGEST_PUT || is_copied(place))
         return true;
     for (i = 0; i < force.count; i++) {
-        if (may_overlap(&force.list[i].place, place))
+        if (may_overlap(&force.list[i].forced.place, place))
             return true;
     }
     return !is_aligned(AppGetAreaAddress(place->area, place->offset[0], place->size), place->size);
-}
-
-MON_RESULT ForceCheck(const APP_PLACE *place)
-{
-    MON_RESULT result = AppPlaceCheck(place);
-    AREA_ADDRESS address;
-    RTS_UI8 *at;
-
-    return result == MONITORING_ERR_OK ? find(place, &address, &at) : result;
-}
-
-static bool is_same(const APP_PLACE *a, const APP_PLACE *b)
-{
-    return memcmp(a, b, sizeof *a) == 0;
 }
 
 static RTS_UI32 index_of(const APP_PLACE *place)
 {
     RTS_UI32 i = 0;
 
-    while (i < force.count && !is_same(&force.list[i].place, place))
+    while (i < force.count && memcmp(&force.list[i].forced.place, place, sizeof *place) != 0)
         i++;
     return i;
 }
 
-bool ForceHas(const APP_PLACE *place)
+MON_RESULT ForceCheck(const APP_PLACE *place, RTS_UI32 *added)
 {
-    return index_of(place) < force.count;
+    MON_RESULT result = AppPlaceCheck(place);
+    AREA_ADDRESS address;
+    RTS_UI8 *at;
+
+    if (result == MONITORING_ERR_OK)
+        result = find(place, &address, &at);
+    if (result == MONITORING_ERR_OK && index_of(place) == force.count && force.count + ++*added > FORCE_MAX)
+        result = MONITORING_ERR_FORCE_FAILED;
+    return result;
 }
 
 static void remove_place(const APP_PLACE *place)
@@ -232,11 +234,11 @@ static void sort_puts(void)
     for (size = LARGEST_PUT; size != 0; size /= 2) {
         const PUT *first = to;
         for (i = 0; i < force.count; i++) {
-            const FORCED_VALUE *forced = &force.list[i];
-            if (forced->is_searched || forced->place.size != size)
+            const FORCED_VALUE *forced = &force.list[i].forced;
+            if (force.list[i].is_searched || forced->place.size != size)
                 continue;
             to->at = AppGetAreaAddress(forced->place.area, forced->place.offset[0], size);
-            to->value = (RTS_UI32)forced->value;
+            to->value = forced->value[0];
             to++;
         }
         if (size == LARGEST_PUT) {
@@ -271,20 +273,19 @@ static void end_change(RTS_UI32 lock)
     IecCycleFindPhases();
 }
 
-MON_RESULT ForceSet(const APP_PLACE *place, RTS_UI64 value)
+MON_RESULT ForceSet(const FORCED_VALUE *value)
 {
     RTS_UI32 lock = SysLockEnter();
     bool has_room;
 
-    remove_place(place);
+    remove_place(&value->place);
     has_room = force.count < FORCE_MAX;
     if (has_room) {
-        FORCED_VALUE *forced = &force.list[force.count];
-        forced->place = *place;
-        forced->value = value;
-        forced->is_searched = needs_search(place);
+        ENTRY *entry = &force.list[force.count];
+        entry->forced = *value;
+        entry->is_searched = needs_search(&value->place);
         force.count++;
-        search_and_put(NO_TASK, forced);
+        search_and_put(NO_TASK, value);
     }
     end_change(lock);
     return has_room ? MONITORING_ERR_OK : MONITORING_ERR_FORCE_FAILED;
@@ -308,7 +309,7 @@ void ForceEndAll(void)
 
 const FORCED_VALUE *ForceGet(RTS_UI32 index)
 {
-    return index < force.count ? &force.list[index] : NULL;
+    return index < force.count ? &force.list[index].forced : NULL;
 }
 
 RTS_UI32 ForceGetCount(void)

@@ -81,22 +81,15 @@ static RTS_UI32 round_up(RTS_UI32 size)
 
 /* ---- places ---- */
 
-static void read_place(const TRACE_PLACE *from, APP_PLACE *place)
-{
-    RTS_UI32 i;
-
-    place->area = from->area;
-    place->pointers = from->pointers;
-    place->size = from->size;
-    place->mask = from->mask;
-    for (i = 0; i <= PLACE_POINTERS; i++)
-        place->offset[i] = BytesGet32(from->offset + 4 * i);
-}
+RTS_STATIC_ASSERT(sizeof(STEP) % sizeof(RTS_UI32) == 0, places_after_the_plan_are_aligned);
 
 /* The place of record `index`; that of the trigger after the last one. */
-static const TRACE_PLACE *place_at(const TRACE_CONFIG *config, RTS_UI32 index)
+static const APP_PLACE *place_at(const PACKET *packet, RTS_UI32 index)
 {
-    return index < config->records ? (const TRACE_PLACE *)(config + 1) + index : &config->trigger;
+    const TRACE_CONFIG *config = packet->config;
+    const MON2_PLACE *records = (const MON2_PLACE *)(config + 1);
+
+    return (const APP_PLACE *)(const void *)(index < config->records ? &records[index] : &config->trigger);
 }
 
 /* Where a place is now, for the task of the packet. */
@@ -118,11 +111,9 @@ static const RTS_UI64 nothing = 0;
 /* What a pointer leads to in this cycle; else `nothing`. */
 static RTS_NOINLINE const RTS_UI8 *search(const PACKET *packet, RTS_UI32 index)
 {
-    APP_PLACE place;
     RTS_UI8 *at;
 
-    read_place(place_at(packet->config, index), &place);
-    return find(packet, &place, &at) == MONITORING_ERR_OK ? at : (const RTS_UI8 *)&nothing;
+    return find(packet, place_at(packet, index), &at) == MONITORING_ERR_OK ? at : (const RTS_UI8 *)&nothing;
 }
 
 static MON_RESULT plan_system(PACKET *packet, const APP_PLACE *place, STEP *step)
@@ -137,21 +128,20 @@ static MON_RESULT plan_system(PACKET *packet, const APP_PLACE *place, STEP *step
 
 static MON_RESULT plan(PACKET *packet, RTS_UI32 index, STEP *step)
 {
-    APP_PLACE place;
+    const APP_PLACE *place = place_at(packet, index);
     MON_RESULT result;
 
-    read_place(place_at(packet->config, index), &place);
-    if (place.area == TRACE_SYSTEM)
-        return plan_system(packet, &place, step);
-    result = AppPlaceCheck(&place);
-    step->size = place.size;
+    if (place->area == TRACE_SYSTEM)
+        return plan_system(packet, place, step);
+    result = AppPlaceCheck(place);
+    step->size = place->size;
     step->copy = COPY_SEARCHED;
-    if (result != MONITORING_ERR_OK || place.pointers > 0)
+    if (result != MONITORING_ERR_OK || place->pointers > 0)
         return result; /* pointers may lead nowhere now */
-    result = find(packet, &place, &step->at);
-    if (ONLINE_CHANGE && (place.area == APP_AREA_INPUT || place.area == APP_AREA_OUTPUT))
+    result = find(packet, place, &step->at);
+    if (ONLINE_CHANGE && (place->area == APP_AREA_INPUT || place->area == APP_AREA_OUTPUT))
         return result; /* the task may have a copy, or another one, after an online change */
-    step->copy = place.size == 1 || ((uintptr_t)step->at & (place.size - 1u)) != 0 ? COPY_BYTES : place.size;
+    step->copy = place->size == 1 || ((uintptr_t)step->at & (place->size - 1u)) != 0 ? COPY_BYTES : place->size;
     return result;
 }
 
@@ -162,23 +152,14 @@ static RTS_I32 extend(RTS_UI32 value, RTS_UI32 size)
     return size == 1 ? (RTS_I8)value : size == 2 ? (RTS_I16)value : (RTS_I32)value;
 }
 
-/* A number whose order among others is that of the value; false for NAN, which has none. */
-static bool key_of(RTS_UI64 value, RTS_UI32 size, RTS_UI32 flags, RTS_I64 *key)
+/* A key of a value that the trigger compares; false for NAN. */
+static bool key_of(const TRACE_CONFIG *config, RTS_UI64 value, RTS_UI32 size, RTS_I64 *key)
 {
-    const RTS_UI32 top = 0x80000000u;
-    RTS_UI32 high = (RTS_UI32)(value >> 32);
+    RTS_UI32 kind = config->flags & TRACE_REAL     ? NUMBER_REAL
+                    : config->flags & TRACE_SIGNED ? NUMBER_SIGNED
+                                                   : NUMBER_UNSIGNED;
 
-    *key = size == 8 ? (RTS_I64)value : extend((RTS_UI32)value, size);
-    if ((flags & (TRACE_SIGNED | TRACE_REAL)) == 0)
-        *key = (RTS_I64)(value ^ (RTS_UI64)top << 32);
-    if ((flags & TRACE_REAL) == 0)
-        return true;
-    if (*key < 0) /* the bits of a REAL are sign and magnitude */
-        *key = size == 8 ? -(RTS_I64)(value << 1 >> 1) : -(RTS_I64)((RTS_UI32)value & ~top);
-    if (size == 4)
-        return ((RTS_UI32)value & ~top) <= 0x7F800000u;
-    high &= ~top;
-    return high < 0x7FF00000u || (high == 0x7FF00000u && (RTS_UI32)value == 0);
+    return AppNumberKey(value, size, kind, key);
 }
 
 /* Whether the trigger is true in this cycle. */
@@ -195,11 +176,7 @@ static bool is_true(const PACKET *packet)
     memcpy(&value, at, step->size);
     if (step->size == 1)
         value &= config->trigger.mask;
-    if (!key_of(value, step->size, config->flags, &key))
-        return false;
-    return (config->comparison & (key < packet->constant    ? TRACE_LESS
-                                  : key == packet->constant ? TRACE_EQUAL
-                                                            : TRACE_GREATER)) != 0;
+    return key_of(config, value, step->size, &key) && (config->comparison & NUMBER_ORDER(key, packet->constant)) != 0;
 }
 
 static void look_for_trigger(PACKET *packet)
@@ -302,33 +279,32 @@ static void set_phase(void)
 
 /* ---- the buffer ---- */
 
-static RTS_UI8 *end_of(const PACKET *packet)
-{
-    return packet == NULL ? (RTS_UI8 *)pool : (RTS_UI8 *)packet + packet->bytes;
-}
+/* Room between two packets. */
+typedef struct {
+    PACKET **link; /* to the packet after it */
+    RTS_UI8 *begin;
+    RTS_UI32 size;
+} GAP;
 
-/* The largest gap, which is after *before (NULL: at the beginning). */
-static RTS_UI32 find_gap(PACKET **before)
+static GAP find_largest_gap(void)
 {
-    PACKET *packet = NULL;
-    RTS_UI32 largest = 0;
+    PACKET **link = &trace.first;
+    RTS_UI8 *begin = (RTS_UI8 *)pool;
+    GAP largest = {link, begin, 0};
 
     for (;;) {
-        const PACKET *next = packet == NULL ? trace.first : packet->next;
-        const RTS_UI8 *end = next == NULL ? (RTS_UI8 *)(pool + POOL_UNITS) : (const RTS_UI8 *)next;
-        if ((RTS_UI32)(end - end_of(packet)) > largest) {
-            largest = (RTS_UI32)(end - end_of(packet));
-            *before = packet;
-        }
-        if (next == NULL)
+        RTS_UI8 *end = *link == NULL ? (RTS_UI8 *)(pool + POOL_UNITS) : (RTS_UI8 *)*link;
+        if ((RTS_UI32)(end - begin) > largest.size)
+            largest = (GAP){link, begin, (RTS_UI32)(end - begin)};
+        if (*link == NULL)
             return largest;
-        packet = packet == NULL ? trace.first : packet->next;
+        begin = end + (*link)->bytes;
+        link = &(*link)->next;
     }
 }
 
-static void insert(PACKET *packet, PACKET *before)
+static void insert(PACKET *packet, PACKET **link)
 {
-    PACKET **link = before == NULL ? &trace.first : &before->next;
     RTS_UI32 lock;
 
     packet->next = *link;
@@ -360,7 +336,7 @@ static RTS_RESULT check_config(const TRACE_CONFIG *config, RTS_UI32 size)
 {
     RTS_UI32 samples, before;
 
-    if (size < sizeof *config || size != sizeof *config + config->records * sizeof(TRACE_PLACE))
+    if (size < sizeof *config || size != sizeof *config + config->records * sizeof(MON2_PLACE))
         return ERR_SIZE_MISMATCH;
     samples = BytesGet32(config->samples);
     before = BytesGet32(config->before);
@@ -403,12 +379,12 @@ static RTS_RESULT plan_trigger(PACKET *packet, RTS_UI32 *bad, MON_RESULT *error)
     const TRACE_CONFIG *config = packet->config;
     RTS_UI64 constant = 0;
 
-    packet->state = TRACE_TRIGGERED;
-    packet->left = BytesGet32(config->samples);
-    if ((config->flags & TRACE_TRIGGER) == 0)
+    if ((config->flags & TRACE_TRIGGER) == 0) {
+        packet->state = TRACE_TRIGGERED;
+        packet->left = BytesGet32(config->samples);
         return BytesGet32(config->before) == 0 ? ERR_OK : ERR_PARAMETER;
+    }
     packet->state = TRACE_WAITING;
-    packet->left = 0;
     packet->was_true = (config->flags & TRACE_LEVEL) == 0;
     *bad = config->records;
     *error = plan(packet, *bad, &packet->trigger);
@@ -417,7 +393,7 @@ static RTS_RESULT plan_trigger(PACKET *packet, RTS_UI32 *bad, MON_RESULT *error)
     if ((config->flags & TRACE_REAL) != 0 && packet->trigger.size < 4)
         return ERR_PARAMETER;
     memcpy(&constant, config->constant, packet->trigger.size);
-    return key_of(constant, packet->trigger.size, config->flags, &packet->constant) ? ERR_OK : ERR_PARAMETER;
+    return key_of(config, constant, packet->trigger.size, &packet->constant) ? ERR_OK : ERR_PARAMETER;
 }
 
 /* Gives it so many samples as it wants, or as there is room for. */
@@ -442,15 +418,14 @@ RTS_RESULT TraceCreate(const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *id, RTS_UI3
 {
     const TRACE_CONFIG *config = (const TRACE_CONFIG *)data;
     RTS_RESULT result = check_config(config, size);
-    PACKET *before = NULL;
-    RTS_UI32 room = find_gap(&before);
-    PACKET *packet = (PACKET *)(void *)end_of(before);
+    GAP gap = find_largest_gap();
+    PACKET *packet = (PACKET *)(void *)gap.begin;
     RTS_UI32 head;
 
     if (result != ERR_OK)
         return result;
     head = (RTS_UI32)(sizeof *packet + config->records * sizeof(STEP));
-    if (room < round_up(head + size))
+    if (gap.size < round_up(head + size))
         return ERR_NOMEMORY;
     memset(packet, 0, head);
     packet->config = memcpy((RTS_UI8 *)packet + head, config, size);
@@ -461,11 +436,11 @@ RTS_RESULT TraceCreate(const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *id, RTS_UI3
     if (result == ERR_OK)
         result = plan_trigger(packet, bad, error);
     if (result == ERR_OK)
-        result = lay_out(packet, round_up(head + size), room);
+        result = lay_out(packet, round_up(head + size), gap.size);
     if (result != ERR_OK)
         return result;
     *id = packet->id = ++trace.last_id;
-    insert(packet, before);
+    insert(packet, gap.link);
     set_phase();
     return ERR_OK;
 }
@@ -502,7 +477,7 @@ const RTS_UI8 *TraceGetNext(RTS_UI32 *id, RTS_UI32 *size)
     if (next == NULL)
         return NULL;
     *id = next->id;
-    *size = (RTS_UI32)sizeof(TRACE_CONFIG) + next->config->records * (RTS_UI32)sizeof(TRACE_PLACE);
+    *size = (RTS_UI32)sizeof(TRACE_CONFIG) + next->config->records * (RTS_UI32)sizeof(MON2_PLACE);
     return (const RTS_UI8 *)next->config;
 }
 
@@ -548,9 +523,12 @@ static const RTS_UI8 *sample_at(const PACKET *packet, const RING *ring, RTS_UI32
     return at < packet->ring ? at + (packet->end - packet->ring) : at;
 }
 
-static RTS_UI32 load(const RTS_UI8 *at, RTS_UI32 size)
+/* A value of a sample; 0 without a sample. */
+static RTS_NOINLINE RTS_UI32 load(const RTS_UI8 *sample, RTS_UI32 at, RTS_UI32 size)
 {
-    return size == 4 ? BytesGet32(at) : size == 2 ? BytesGet16(at) : *at;
+    if (sample == NULL)
+        return 0;
+    return size == 4 ? BytesGet32(sample + at) : size == 2 ? BytesGet16(sample + at) : sample[at];
 }
 
 /*
@@ -568,11 +546,10 @@ static RTS_UI8 *pack(const PACKET *packet, const RTS_UI8 *sample, const RTS_UI8 
     to += bits_of(packet);
     memset(bits, 0, bits_of(packet));
     for (i = 0; (step = &packet->steps[i])->copy != COPY_END; i++) {
-        RTS_UI32 by = load(sample + at, step->size);
-        if (last != NULL)
-            by -= load(last + at, step->size);
+        RTS_UI32 before = load(last, at, step->size);
+        RTS_UI32 by = load(sample, at, step->size) - before;
         if (last_but_one != NULL)
-            by -= load(last + at, step->size) - load(last_but_one + at, step->size);
+            by -= before - load(last_but_one, at, step->size);
         by = (RTS_UI32)extend(by, step->size);
         at += step->size;
         if (by == 0)
@@ -652,7 +629,7 @@ RTS_RESULT TraceRead(RTS_UI32 id, RTS_UI32 from, RTS_UI8 *data, RTS_UI32 *size, 
 #if FILE_STORE_FILES > 0
 static void begin_file(const FILE_ENTRY *file)
 {
-    RTS_UI8 config[sizeof(TRACE_CONFIG) + TRACE_KEPT_RECORDS * sizeof(TRACE_PLACE)];
+    RTS_UI8 config[sizeof(TRACE_CONFIG) + TRACE_KEPT_RECORDS * sizeof(MON2_PLACE)];
     MON_RESULT error;
     RTS_UI32 id, bad;
 

@@ -21,13 +21,7 @@
 /* What a reply has besides data. */
 enum { OVERHEAD = 16 };
 
-RTS_STATIC_ASSERT(sizeof((BP_STATE *)0)->area >= APP_AREA_COUNT * sizeof(RTS_UI64), area_addresses_fit);
-
-static void put64(RTS_UI8 *at, RTS_UI64 value)
-{
-    BytesPut32(at, (RTS_UI32)value);
-    BytesPut32(at + 4, (RTS_UI32)(value >> 32));
-}
+RTS_STATIC_ASSERT(sizeof(BP_STATUS) == sizeof(BP_STATE), the_state_is_sent_as_it_is);
 
 static RTS_UI64 get64(const RTS_UI8 *at)
 {
@@ -59,29 +53,12 @@ static RTS_RESULT detach(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 static RTS_RESULT state(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
-    BP_STATE wire = {0};
     BP_STATUS now;
-    RTS_UI32 i;
 
     RTS_UNUSED(request);
     AppBpAlive();
     AppBpGetStatus(&now);
-    BytesPut32(wire.supported, now.supported);
-    BytesPut32(wire.attached, now.attached);
-    BytesPut32(wire.halted, now.halted);
-    BytesPut32(wire.serial, now.serial);
-    BytesPut32(wire.code, now.code);
-    BytesPut32(wire.task, now.task);
-    BytesPut32(wire.code_offset, now.code_offset);
-    BytesPut32(wire.stack_size, now.stack_size);
-    put64(wire.stack, now.stack);
-    for (i = 0; i < APP_AREA_COUNT; i++)
-        put64(wire.area + 8 * i, now.area[i]);
-    BytesPut32(wire.breakpoints, now.breakpoints);
-    BytesPut32(wire.room, now.room);
-    BytesPut32(wire.traps, now.traps);
-    BytesPut32(wire.link, now.link);
-    BTagWrite(reply, TAG_BP_STATE, BTAG_ALIGN_0, &wire, sizeof wire);
+    BTagWrite(reply, TAG_BP_STATE, BTAG_ALIGN_0, &now, sizeof now);
     return ERR_OK;
 }
 
@@ -89,21 +66,13 @@ static RTS_RESULT state(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 static void read_record(const BP_RECORD *wire, BP_BREAKPOINT *breakpoint)
 {
-    APP_PLACE *place = &breakpoint->condition.place;
-    RTS_UI32 i;
-
     memset(breakpoint, 0, sizeof *breakpoint);
     breakpoint->offset = BytesGet32(wire->code_offset);
     breakpoint->skip = BytesGet32(wire->skip);
     breakpoint->condition.relation = wire->relation;
     breakpoint->condition.kind = wire->kind;
     breakpoint->condition.value = get64(wire->value);
-    place->area = wire->area;
-    place->pointers = wire->pointers;
-    place->size = wire->size;
-    place->mask = wire->mask;
-    for (i = 0; i <= PLACE_POINTERS; i++)
-        place->offset[i] = BytesGet32(wire->offset + 4 * i);
+    memcpy(&breakpoint->condition.place, &wire->place, sizeof wire->place);
 }
 
 static RTS_RESULT find_record(SRV_REQUEST *request, BP_BREAKPOINT *breakpoint)

@@ -64,21 +64,8 @@ static RTS_UI32 take(PROGRAM *program, RTS_UI32 size)
     return value;
 }
 
-/* Goes on from the pointer at *address; where a force is parsed, notes it. */
-static MON_RESULT take_pointer(AREA_ADDRESS *address, APP_PLACE *place)
-{
-    if (FORCE_MAX == 0 || place == NULL)
-        return AppAddressFollow(address);
-    if (place->pointers == PLACE_POINTERS)
-        return MONITORING_ERR_NESTING_DEPTH;
-    place->offset[place->pointers++] = address->offset;
-    address->offset = 0;
-    return MONITORING_ERR_OK;
-}
-
-/* Takes "Ld16/Ld32 offset, Rao area" and any number of "Der pointer, Ld16/Ld32 offset, Add". With `place` no pointer is
- * followed, and *address has the area, and the offset after the last one. */
-static MON_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address, APP_PLACE *place)
+/* Takes "Ld16/Ld32 offset, Rao area" and any number of "Der pointer, Ld16/Ld32 offset, Add", and follows the pointers. */
+static MON_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address)
 {
     static const RTS_UI8 der[] = {MON2_OP_DER, MON2_POINTER_SIZE};
     RTS_UI32 wanted = MON2_OP_RAO;
@@ -95,7 +82,7 @@ static MON_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address, APP_PLAC
         if (!goes_on_with(program, der, sizeof(der)))
             return MONITORING_ERR_OK;
         skip(program, sizeof(der));
-        MON_RESULT result = take_pointer(address, place);
+        MON_RESULT result = AppAddressFollow(address);
         if (result != MONITORING_ERR_OK)
             return result;
         wanted = MON2_OP_ADD;
@@ -155,11 +142,11 @@ static const RTS_UI8 *take_copy_head(PROGRAM *program)
 }
 
 /* The address alone; to write also some bits at it, or a program that copies to it. *mask: NULL when this is not to
- * write. *place: see take_address. */
-static MON_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask, APP_PLACE *place)
+ * write. */
+static MON_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask)
 {
     const RTS_UI8 *tail = mask != NULL ? take_copy_head(&program) : NULL;
-    MON_RESULT result = take_address(&program, address, place);
+    MON_RESULT result = take_address(&program, address);
 
     if (result != MONITORING_ERR_OK)
         return result;
@@ -293,7 +280,7 @@ static void read_variable(BTAG_WRITER *reply, const READ_VAR *var, RTS_UI32 rese
     RTS_UI32 room = BTagGetRoom(reply);
     RTS_UI32 id = var->id;
     RTS_UI32 size = var->size;
-    MON_RESULT result = parse(var->program, &address, NULL, NULL);
+    MON_RESULT result = parse(var->program, &address, NULL);
 
     if (result == MONITORING_ERR_OK)
         result = AppAddressResolve(&address, size, &memory);
@@ -373,9 +360,6 @@ static RTS_RESULT mon_read(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 typedef struct {
     const RTS_UI8 *value;
-#if FORCE_MAX > 0
-    RTS_UI32 action; /* MON2_FORCE, MON2_UNFORCE */
-#endif
     RTS_UI32 size;
     RTS_UI32 mask; /* ALL_BITS, or those to write of the first byte alone */
     PROGRAM program;
@@ -388,9 +372,6 @@ static bool next_write(const RTS_UI8 **data, RTS_UI32 *size, WRITE_VAR *var)
 
     if (*size < sizeof(*head))
         return false;
-#if FORCE_MAX > 0
-    var->action = BytesGet16(head->id);
-#endif
     var->size = BytesGet32(head->size);
     var->value = (const RTS_UI8 *)(head + 1);
     RTS_UI32 rest = *size - (RTS_UI32)sizeof(*head);
@@ -424,7 +405,7 @@ static MON_RESULT write_variable(WRITE_VAR *var, bool commit)
 {
     AREA_ADDRESS address;
     RTS_UI8 *memory = NULL;
-    MON_RESULT result = parse(var->program, &address, &var->mask, NULL);
+    MON_RESULT result = parse(var->program, &address, &var->mask);
 
     if (result == MONITORING_ERR_OK)
         result = AppAddressResolve(&address, var->size, &memory);
@@ -435,66 +416,8 @@ static MON_RESULT write_variable(WRITE_VAR *var, bool commit)
     return result;
 }
 
-/* ---- forced variables ---- */
-
-#if FORCE_MAX > 0
-static RTS_UI32 to_add; /* values that a request adds to the list, as far as it has been checked */
-
-static MON_RESULT check_force(const APP_PLACE *place)
-{
-    MON_RESULT result = ForceCheck(place);
-
-    if (OperationMay(OPERATION_FORCE) != ERR_OK)
-        result = MONITORING_ERR_OPERATION_DENIED;
-    if (result == MONITORING_ERR_OK && !ForceHas(place) && ForceGetCount() + ++to_add > ForceGetRoom())
-        result = MONITORING_ERR_FORCE_FAILED;
-    return result;
-}
-
-static MON_RESULT parse_force(WRITE_VAR *var, APP_PLACE *place)
-{
-    AREA_ADDRESS address;
-
-    memset(place, 0, sizeof(*place));
-    MON_RESULT result = parse(var->program, &address, &var->mask, place);
-    if (result != MONITORING_ERR_OK)
-        return result;
-    place->area = (RTS_UI8)address.area;
-    place->offset[place->pointers] = address.offset;
-    place->size = var->size <= sizeof(RTS_UI64) ? (RTS_UI8)var->size : 0;
-    place->mask = (RTS_UI8)var->mask;
-    return MONITORING_ERR_OK;
-}
-
-/* A place whose force ends may be one that cannot be reached any more. */
-static MON_RESULT force_variable(WRITE_VAR *var, bool commit)
-{
-    APP_PLACE place;
-    RTS_UI64 value = 0;
-    bool ends = var->action == MON2_UNFORCE;
-    MON_RESULT result = parse_force(var, &place);
-
-    if (!ends && var->action != MON2_FORCE)
-        result = MONITORING_ERR_UNSUPPORTED_OPERATOR;
-    if (result == MONITORING_ERR_OK && !ends && !commit)
-        result = check_force(&place);
-    if (result != MONITORING_ERR_OK || !commit)
-        return result;
-    if (ends) {
-        ForceEnd(&place);
-        return MONITORING_ERR_OK;
-    }
-    memcpy(&value, var->value, place.size);
-    return ForceSet(&place, value);
-}
-#else
-#define force_variable(var, commit) MONITORING_ERR_OK
-#endif
-
-/* ---- lists of changes ---- */
-
 /* One pass over the list; stops at the first bad entry. */
-static RTS_RESULT change_list(const BTAG *list, bool forces, bool commit, MON_RESULT *error, RTS_UI32 *index)
+static RTS_RESULT write_list(const BTAG *list, bool commit, RTS_RESULT *error, RTS_UI32 *index)
 {
     const RTS_UI8 *data = list->data;
     RTS_UI32 size = list->size;
@@ -504,7 +427,7 @@ static RTS_RESULT change_list(const BTAG *list, bool forces, bool commit, MON_RE
     for (*index = 0; !(size < 4 && is_zero(data, size)); ++*index) {
         if (!next_write(&data, &size, &var))
             return ERR_L7_INCOMPLETE;
-        *error = forces ? force_variable(&var, commit) : write_variable(&var, commit);
+        *error = write_variable(&var, commit);
         if (*error != MONITORING_ERR_OK)
             break;
     }
@@ -517,57 +440,89 @@ static void write_error(BTAG_WRITER *reply, RTS_UI32 error, RTS_UI32 index)
     BTagWrite32(reply, TAG_MON2_ERROR_INDEX, index);
 }
 
-/* Changes nothing if the check of one entry fails. */
-static RTS_RESULT change_all(SRV_REQUEST *request, BTAG_WRITER *reply, bool forces)
+/* Finds the list of a request for the application that runs; its size is a multiple of `unit`. *refused: the request is
+ * for another application. */
+static RTS_RESULT find_list(const SRV_REQUEST *request, RTS_UI32 id, RTS_UI32 unit, BTAG *list, RTS_RESULT *refused)
 {
-    BTAG list;
-    RTS_RESULT refused;
-    MON_RESULT error = MONITORING_ERR_OK;
-    RTS_UI32 index = 0;
-    RTS_RESULT result = check_application(request, &refused);
+    RTS_RESULT result = check_application(request, refused);
 
     if (result == ERR_OK)
-        result = BTagFind(&request->tags, TAG_MON2_WRITE_LIST, 1, request->tags.size, &list);
-    if (result == ERR_OK && refused != ERR_OK) {
+        result = BTagFind(&request->tags, id, unit, request->tags.size, list);
+    return result == ERR_OK && list->size % unit != 0 ? (RTS_RESULT)ERR_SIZE_MISMATCH : result;
+}
+
+/* Writes nothing if the check of one entry fails. */
+static RTS_RESULT mon_write(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    BTAG list;
+    RTS_RESULT refused = MONITORING_ERR_OPERATION_DENIED;
+    RTS_UI32 index = 0;
+    RTS_RESULT result = ERR_OK;
+
+    if (OperationMay(OPERATION_WRITE) == ERR_OK)
+        result = find_list(request, TAG_MON2_WRITE_LIST, 1, &list, &refused);
+    for (int commit = 0; result == ERR_OK && refused == ERR_OK && commit <= 1; commit++)
+        result = write_list(&list, commit != 0, &refused, &index);
+    if (result == ERR_OK && refused != ERR_OK)
         write_error(reply, refused, index);
-        return ERR_OK;
-    }
-    for (int commit = 0; result == ERR_OK && error == MONITORING_ERR_OK && commit <= 1; commit++)
-        result = change_list(&list, forces, commit != 0, &error, &index);
-    if (result == ERR_OK && error != MONITORING_ERR_OK)
-        write_error(reply, error, index);
     return result;
 }
 
-static RTS_RESULT mon_write(SRV_REQUEST *request, BTAG_WRITER *reply)
-{
-    if (OperationMay(OPERATION_WRITE) != ERR_OK) {
-        write_error(reply, MONITORING_ERR_OPERATION_DENIED, 0);
-        return ERR_OK;
-    }
-    return change_all(request, reply, false);
-}
+/* ---- forced variables ---- */
 
 #if FORCE_MAX > 0
-static RTS_RESULT mon_force(SRV_REQUEST *request, BTAG_WRITER *reply)
+RTS_STATIC_ASSERT(sizeof(FORCED_VALUE) == sizeof(MON2_FORCED), forced_values_are_listed_as_they_are);
+
+typedef enum { CHECK_FORCE, SET_FORCE, END_FORCE } FORCE_WORK;
+
+/* Stops at the first bad entry. A place whose force ends may be one that cannot be reached any more. */
+static MON_RESULT change_entries(const BTAG *list, FORCE_WORK work, RTS_UI32 *index)
 {
-    to_add = 0;
-    return change_all(request, reply, true);
+    MON_RESULT result = MONITORING_ERR_OK;
+    RTS_UI32 added = 0;
+    FORCED_VALUE forced;
+
+    for (*index = 0; *index < list->size / sizeof(forced); ++*index) {
+        memcpy(&forced, list->data + *index * sizeof(forced), sizeof(forced));
+        if (work == CHECK_FORCE)
+            result = ForceCheck(&forced.place, &added);
+        else if (work == SET_FORCE)
+            result = ForceSet(&forced);
+        else
+            ForceEnd(&forced.place);
+        if (result != MONITORING_ERR_OK)
+            break;
+    }
+    return result;
 }
 
-static void append_forced(BTAG_WRITER *reply, const FORCED_VALUE *forced)
+static RTS_RESULT change_forces(SRV_REQUEST *request, BTAG_WRITER *reply, FORCE_WORK first, FORCE_WORK last)
 {
-    MON2_FORCED entry;
+    BTAG list;
+    RTS_RESULT refused;
+    RTS_UI32 index = 0;
+    RTS_RESULT result = find_list(request, TAG_MON2_FORCED, sizeof(MON2_FORCED), &list, &refused);
 
-    entry.area = forced->place.area;
-    entry.pointers = forced->place.pointers;
-    entry.size = forced->place.size;
-    entry.mask = forced->place.mask;
-    for (RTS_UI32 i = 0; i <= PLACE_POINTERS; i++)
-        BytesPut32(entry.offset + 4 * i, forced->place.offset[i]);
-    BytesPut32(entry.value, (RTS_UI32)forced->value);
-    BytesPut32(entry.value + 4, (RTS_UI32)(forced->value >> 32));
-    BTagAppend(reply, &entry, sizeof(entry));
+    if (result != ERR_OK)
+        return result;
+    if (refused == ERR_OK && first == CHECK_FORCE && OperationMay(OPERATION_FORCE) != ERR_OK)
+        refused = MONITORING_ERR_OPERATION_DENIED;
+    for (; refused == ERR_OK && first <= last; first++)
+        refused = change_entries(&list, first, &index);
+    if (refused != ERR_OK)
+        write_error(reply, refused, index);
+    return ERR_OK;
+}
+
+/* Forces nothing if the check of one entry fails. */
+static RTS_RESULT mon_force(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    return change_forces(request, reply, CHECK_FORCE, SET_FORCE);
+}
+
+static RTS_RESULT mon_unforce(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    return change_forces(request, reply, END_FORCE, END_FORCE);
 }
 
 /* From an index on, as many as fit. */
@@ -575,15 +530,15 @@ static RTS_RESULT mon_force_list(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     const FORCED_VALUE *forced;
     RTS_UI32 index = 0;
-    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_MON2_FORCE_START, &index);
+    RTS_RESULT result = BTagFindOptional(&request->tags, TAG_MON2_FORCE_START, &index);
 
-    if (result != ERR_OK && result != ERR_L7_TAG_MISSING)
+    if (result != ERR_OK)
         return result;
     BTagWrite32(reply, TAG_MON2_FORCE_SERIAL, ForceGetSerial());
     BTagWrite32(reply, TAG_MON2_FORCE_MAX, ForceGetRoom());
     BTagOpen(reply, TAG_MON2_FORCED, BTAG_ALIGN_0);
-    while ((forced = ForceGet(index++)) != NULL && BTagGetRoom(reply) >= sizeof(MON2_FORCED))
-        append_forced(reply, forced);
+    while ((forced = ForceGet(index++)) != NULL && BTagGetRoom(reply) >= sizeof(*forced))
+        BTagAppend(reply, forced, sizeof(*forced));
     BTagClose(reply);
     return ERR_OK;
 }
@@ -594,6 +549,7 @@ static const SRV_SERVICE services[] = {
     {SRV_MON2_WRITE, RIGHT_WRITE, mon_write},
 #if FORCE_MAX > 0
     {SRV_MON2_FORCE, RIGHT_WRITE, mon_force},
+    {SRV_MON2_UNFORCE, RIGHT_WRITE, mon_unforce},
     {SRV_MON2_FORCE_LIST, RIGHT_VIEW, mon_force_list},
 #endif
 };

@@ -264,14 +264,13 @@ def _parts(write: Write, room: int) -> Iterator[Write]:
 
 
 def _write_batch(session: Session, image_crc: int, entries: bytes) -> None:
-    reply = _send_list(session, image_crc, lib.SRV_MON2_WRITE, entries)
+    reply = _send_list(session, image_crc, lib.SRV_MON2_WRITE, bintag.raw(lib.TAG_MON2_WRITE_LIST, entries))
     _check_monitoring(session, reply, "write")
 
 
-def _send_list(session: Session, image_crc: int, service: int, entries: bytes) -> bintag.Tags:
+def _send_list(session: Session, image_crc: int, service: int, entries: bintag.Tag) -> bintag.Tags:
     def request() -> bintag.Tags:
-        tags = [_application_tag(session, image_crc), bintag.raw(lib.TAG_MON2_WRITE_LIST, entries)]
-        return session.call(lib.SG_MONITORING2, service, tags)
+        return session.call(lib.SG_MONITORING2, service, [_application_tag(session, image_crc), entries])
 
     return session.recover(request, repeatable=False)
 
@@ -279,30 +278,42 @@ def _send_list(session: Session, image_crc: int, service: int, entries: bytes) -
 # ---- forced variables ------------------------------------------------------------------------------------------------
 
 
-def force_memory(session: Session, image_crc: int, places: Sequence[ForcedPlace], action: int) -> None:
-    """Forces the values (`action` MON2_FORCE) or ends that (MON2_UNFORCE) in the application with this CRC: all of
-    them, or none if they fit one request.
+def force_memory(session: Session, image_crc: int, places: Sequence[ForcedPlace]) -> None:
+    """Forces the values in the application with this CRC: all of them, or none if they fit one request.
 
     Not repeated when it is unknown whether it was done. Raises DeviceError, whose result is MONITORING_ERR_*.
     """
+    _change_forces(session, image_crc, lib.SRV_MON2_FORCE, places)
+
+
+def unforce_memory(session: Session, image_crc: int, places: Sequence[ForcedPlace]) -> None:
+    """Ends the force of these places."""
+    _change_forces(session, image_crc, lib.SRV_MON2_UNFORCE, places)
+
+
+def _change_forces(session: Session, image_crc: int, service: int, places: Sequence[ForcedPlace]) -> None:
     session.recover(session.application)
-    room = session.connection.buffer_size - _MESSAGE_OVERHEAD
-    message = b""
-    for place in places:
-        where = AreaRange(place.area, place.offset, place.size, place.hops)
-        entry = _entry(Write(where, place.value.ljust(place.size, b"\0"), place.mask), action)
-        if message and len(message) + len(entry) > room:
-            _force_batch(session, image_crc, message)
-            message = b""
-        message += entry
-    if message:
-        _force_batch(session, image_crc, message)
+    most = (session.connection.buffer_size - _MESSAGE_OVERHEAD) // _FORCED.size
+    entries = [_forced_entry(place) for place in places]
+    for first in range(0, len(entries), most):
+        forced = bintag.raw(lib.TAG_MON2_FORCED, b"".join(entries[first : first + most]))
+        with _explained():
+            reply = _send_list(session, image_crc, service, forced)
+        _check_monitoring(session, reply, "force")
 
 
-def _force_batch(session: Session, image_crc: int, entries: bytes) -> None:
-    with _explained():
-        reply = _send_list(session, image_crc, lib.SRV_MON2_FORCE, entries)
-    _check_monitoring(session, reply, "force")
+def _forced_entry(place: ForcedPlace) -> bytes:
+    if len(place.hops) > lib.PLACE_POINTERS:
+        raise _monitoring_error("force", lib.MONITORING_ERR_NESTING_DEPTH)
+    offsets = (place.offset, *place.hops, *(0,) * (lib.PLACE_POINTERS - len(place.hops)))
+    return _FORCED.pack(
+        area=place.area,
+        pointers=len(place.hops),
+        size=place.size,
+        mask=place.mask,
+        offset=_OFFSETS.pack(*offsets),
+        value=int.from_bytes(place.value, "little"),
+    )
 
 
 def read_forced(session: Session) -> ForceList:
@@ -344,7 +355,8 @@ def _explained() -> Iterator[None]:
         if error.result != lib.ERR_L7_UNKNOWNCMD:
             raise
         raise DeviceError(
-            "This firmware cannot force variables. Build it with FORCE_MAX and HAS_CmpForce (docs/force.md).",
+            "This firmware cannot force variables, or is older than this plctool. Build it with FORCE_MAX and "
+            "HAS_CmpForce (docs/force.md).",
             "no-force",
             error.result,
         ) from None

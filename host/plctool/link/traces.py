@@ -23,7 +23,7 @@ from plctool.link.session import Session
 from plctool.link.wire import Layout
 
 _CONFIG = Layout("TRACE_CONFIG")
-_PLACE = Layout("TRACE_PLACE")
+_PLACE = Layout("MON2_PLACE")
 _STATE = Layout("TRACE_STATE")
 _OFFSETS = struct.Struct("<4I")
 _NAME_SIZE = 15
