@@ -99,7 +99,6 @@ typedef struct {
     CANOPEN_COUNTERS counters;
 } CANOPEN_NODE;
 
-
 /* A node whose first fields are set begins with its reset. */
 void CanopenNodeBegin(CANOPEN_NODE *node, RTS_UI32 timeout_ms, RTS_UI32 now_ms);
 

@@ -146,7 +146,7 @@ void TryProtectRuntime(uintptr_t stack);
 void TryTakeRights(TRY *try);
 void TryGiveBackRights(const TRY *try);
 
-/* Gives the program the stack at this address instead of the one before. Seen after the exception return that follows. */
+/* Gives the program the stack at this address instead of the previous one. Seen after the exception return that follows. */
 void TryAllowStack(uintptr_t slot);
 
 /* Gives up FPU registers of the function that is left. */

@@ -1,4 +1,4 @@
-"""Which statements differ in two texts of a file that are alike otherwise, and what statements ask others for.
+"""Which statements differ in two versions of a file that are alike otherwise, and what statements ask others for.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -39,7 +39,7 @@ def changed_body(
 
 
 def _first_difference(one: str, other: str) -> int:
-    """The offset up to which two texts are the same."""
+    """The offset up to which two versions are the same."""
     return next((at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
 
 
