@@ -102,6 +102,8 @@ def debian(folder: Path) -> Iterator[Debian]:
     mounted = []
     try:
         for kind, place in MOUNTS:
+            if (root / place).is_symlink():  # in a container debootstrap leads it to that of this machine
+                (root / place).unlink()
             (root / place).mkdir(exist_ok=True, parents=True)
             if subprocess.run(["mount", "-t", kind, kind, str(root / place)], check=False).returncode == 0:
                 mounted.append(root / place)
