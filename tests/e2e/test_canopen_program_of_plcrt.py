@@ -63,6 +63,10 @@ def test_manager_replaces_the_program(hub: CanHub, tmp_path: Path, capsys: pytes
         def identification() -> int:
             return int.from_bytes(sdo.upload(0x1F56, 1), "little")
 
+        def replies_have_come() -> None:
+            """Those to plctool, which this manager gets, too, are before the next heartbeat."""
+            manager.node.nmt.wait_for_heartbeat(TIMEOUT_S)
+
         assert identification() == crc_of(first)
         assert manager.abort_of(0x1F50, 1) == 0x06010001
         write(second.read_bytes())
@@ -82,14 +86,17 @@ def test_manager_replaces_the_program(hub: CanHub, tmp_path: Path, capsys: pytes
         done = run_here(capsys, "canopen", "download", str(NODE), str(first), *bus)
         assert done.status == 0, done.err
         assert f"CRC {crc_of(first):08X}, started" in done.out
+        replies_have_come()
         eventually(lambda: sdo.upload(0x2101, 0) == b"first")
         stopped = run_here(capsys, "canopen", "download", str(NODE), str(second), "--stop", *bus)
+        replies_have_come()
         assert (stopped.status, sdo.upload(0x2101, 0)) == (0, b"second")
 
         plc.set_password("correct horse")
         refused = run_here(capsys, "canopen", "download", str(NODE), str(first), *bus)
         assert refused.status == 1
         assert "refuses the program: it has a password" in refused.err
+        replies_have_come()
         assert manager.abort_of(0x1F51, 1, b"\0") == LOCAL_CONTROL
         assert sdo.upload(0x2101, 0) == b"second"
         manager.network.disconnect()
