@@ -44,6 +44,7 @@ TABLE = {(event, kind): cell == "kept" for event, kind, cell in table()}
 DENIED = ("DenyStart", "DenyStop", "DenyStartBootproject", "PrepareDownload")
 FORBIDDEN = ("Download", "Stop", "Reset")
 POLICIES = ("always", "never", "clean")
+LAST_HOURS = 8  # of an example whose program runs
 HOURS = 72  # of virtual time that pass at least, in all examples together
 
 PROGRAM = """
@@ -112,6 +113,8 @@ class Days(RuleBasedStateMachine):
 
     def teardown(self) -> None:
         if hasattr(self, "plc"):
+            if self.is_running():
+                self.time_passes(LAST_HOURS * HOUR * CYCLE)
             assert set(self.plc.files()) <= {"Settings.cfg"}
             assert self.plc._core.lib.SimFlashViolations() == 0
             self.plc.close()

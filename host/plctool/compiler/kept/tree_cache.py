@@ -97,12 +97,17 @@ def written_tree(tree: KnownTree, source: Source) -> bytes | None:
 
     to = BytesIO()
     pickler = pickle.Pickler(to, _FORMAT)
-    pickler.dispatch_table = {Source: reduced}
+    pickler.dispatch_table = {Source: reduced, **dict.fromkeys(_enumerations(), _by_value)}
     try:
         pickler.dump(tree)
     except (pickle.PicklingError, RecursionError, TypeError, AttributeError):
         return None
     return to.getvalue()
+
+
+def _by_value(member: Enum) -> tuple[type[Enum], tuple[Any]]:
+    """How a member is written. Some versions of Python 3.11 name `getattr` instead, which is not read."""
+    return type(member), (member.value,)
 
 
 def _this_source() -> Source:
@@ -142,6 +147,11 @@ class _Reader(pickle.Unpickler):
         if found is None:
             raise pickle.UnpicklingError(f"{module}.{name}")
         return found
+
+
+@cache
+def _enumerations() -> list[type[Enum]]:
+    return [c for c in _classes().values() if issubclass(c, Enum)]
 
 
 @cache
