@@ -10,6 +10,7 @@
 # make test-linux-arm  the C tests and tests/e2e with these, in QEMU's user mode (ARGS="-k force"); some are in `make test`
 # make test-arm-system  plcrt on Debian's kernel for arm64 in a virtual machine, and a power cut
 # make deb    dist/*.deb for this architecture (ARCHS="amd64 arm64"); make deb-test tries them in a small Debian
+# make deb-test-system  the life of these packages on a Debian with systemd, in a virtual machine (ARCHS="arm64 armhf")
 # make test-windows  the simulator for Windows: its C tests, and all programs of tests/st, by Wine
 # make wheels-linux  dist/*.whl for 64-bit and 32-bit Arm and for musl; those for Arm are tried in QEMU's user mode
 # make wheel-macos  dist/*macosx*.whl for Macs with Arm, which was never run
@@ -43,7 +44,7 @@ BUILDS := build build-sanitized $(BOARD_BUILDS)
 # The cross compilers are Debian's; without them these builds are left out of `make test`, which says so.
 LINUX_ARM := $(if $(shell command -v aarch64-linux-gnu-gcc),build-aarch64-linux) $(if $(shell command -v arm-linux-gnueabihf-gcc),build-armv7-linux)
 
-.PHONY: demo test test-whole test-windows wheel-windows wheel-macos wheels-linux run-wheels-elsewhere quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test attack soak changes edits fuzz mutants properties habits tree-sitter vsix test-editors all clean
+.PHONY: demo test test-whole test-windows wheel-windows wheel-macos wheels-linux run-wheels-elsewhere quick test-vcan test-kernel linux-arm test-linux-arm test-arm-system lint format bench size wheel release run-release deb deb-test deb-test-system attack soak changes edits fuzz mutants properties habits tree-sitter vsix test-editors all clean
 .PHONY: run-test run-all run-bench run-size run-fuzz run-linux-arm run-test-linux-arm run-test-arm-system
 VSCODE := editors/vscode
 NODE_PACKAGES := $(if $(shell command -v npm),$(VSCODE)/node_modules/.package-lock.json)
@@ -175,6 +176,15 @@ deb: build/build.ninja
 # Installed, upgraded and purged in a Debian that debootstrap makes; skipped with the reason where that cannot be.
 deb-test: deb
 	$(BIN)/python tests/deb/run.py build-deb/debian dist/*_$(shell dpkg --print-architecture).deb || [ $$? -eq 77 ]
+
+# The same and more on a Debian with systemd, in a virtual machine of each architecture; it takes long where the processor
+# is emulated, and is skipped with the reason where it cannot run.
+deb-test-system: deb
+	ninja --quiet -C build under_attack
+	set -e; for arch in $(or $(ARCHS),$(shell dpkg --print-architecture)); do \
+		PYTHONPATH=$(abspath tests):$(abspath host):$(abspath build/host) \
+			$(BIN)/python tests/deb/life.py build-deb/debian $$arch dist/*_$$arch.deb || [ $$? -eq 77 ]; \
+	done
 
 ATTACKED := build$(if $(findstring --sanitized,$(ARGS)),-sanitized)
 
