@@ -19,7 +19,7 @@ KERNELS = {"amd64": "linux-image-amd64", "arm64": "linux-image-arm64", "armhf": 
 PARTS = ("drivers/virtio", "drivers/block", "drivers/net", "drivers/char", "net/core", "fs", "lib", "crypto")
 # In the order in which they are loaded. A kernel that has one built in does not have its file.
 MODULES = (
-    "drivers/virtio/virtio", "drivers/virtio/virtio_ring", "drivers/virtio/virtio_mmio",
+    "drivers/virtio/virtio_ring", "drivers/virtio/virtio", "drivers/virtio/virtio_mmio",
     "drivers/virtio/virtio_pci_legacy_dev", "drivers/virtio/virtio_pci_modern_dev", "drivers/virtio/virtio_pci",
     "net/core/failover", "drivers/net/net_failover", "drivers/net/virtio_net", "drivers/block/virtio_blk",
     "drivers/char/virtio_console", "fs/mbcache", "lib/crc16", "crypto/crc32c_generic", "fs/jbd2/jbd2",
