@@ -57,13 +57,13 @@ MON_RESULT AppPlaceCheck(const APP_PLACE *place);
 /* Finds a place by way of its pointers: *address has its area and the offset there. The errors of the functions above. */
 MON_RESULT AppPlaceFind(const APP_PLACE *place, AREA_ADDRESS *address, RTS_UI8 **at);
 
-/* What a number of 1, 2, 4 or 8 bytes is; a REAL has 4 or 8. */
+/* Kinds of numbers of 1, 2, 4 or 8 bytes; a REAL has 4 or 8. */
 enum { NUMBER_UNSIGNED, NUMBER_SIGNED, NUMBER_REAL };
 
 /* Finds a key for a number: keys have the order of the numbers. False for NAN, which has none. */
 bool AppNumberKey(RTS_UI64 value, RTS_UI32 size, RTS_UI32 kind, RTS_I64 *key);
 
-/* How a key is to another one. */
+/* The order of two keys, as bits: a condition names those that it holds for. */
 enum { NUMBER_LESS = 1, NUMBER_EQUAL = 2, NUMBER_GREATER = 4 };
 #define NUMBER_ORDER(key, other) ((key) < (other) ? NUMBER_LESS : (key) == (other) ? NUMBER_EQUAL : NUMBER_GREATER)
 

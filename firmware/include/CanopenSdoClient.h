@@ -28,7 +28,7 @@ enum {
     SDO_READ_BLOCK = 32,  /* segments that a node sends without an acknowledgement: few, as they wait for main */
 };
 
-/* Sends a frame of `owner`. False: there is no room now. */
+/* Sends a frame of `owner`. Returns false if there is no room now. */
 typedef bool (*PF_CANOPEN_SEND)(void *owner, const CAN_FRAME *frame);
 
 typedef struct {

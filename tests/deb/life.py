@@ -22,19 +22,10 @@ from pathlib import Path
 from typing import Any
 
 from machine import ARCHITECTURES, CannotBeDoneError, Machine
+from tried import CAPABILITIES, PROGRAM, SKIPPED, say
 
-SKIPPED = 77
 PATIENCE = 240.0  # for what an emulated machine beside others does late [s]
 UNIT = "/lib/systemd/system/plcrt@.service"
-PROGRAM = """\
-PROGRAM Main
-VAR n : DINT; END_VAR
-VAR RETAIN total : DINT; END_VAR
-    n := n + 1;
-    total := total + 1;
-END_PROGRAM
-"""
-CAPABILITIES = {"CAP_IPC_LOCK": 14, "CAP_SYS_NICE": 23}  # linux/capability.h
 FILES = (
     "/usr/share/man/man1/plcrt.1.gz", "/usr/lib/sysusers.d/plcrt.conf", "/usr/share/doc/plcrt/examples/main.conf",
 )  # fmt: skip
@@ -43,10 +34,6 @@ TOOL_FILES = (
     "/usr/share/zsh/vendor-completions/_plctool", "/usr/share/fish/vendor_completions.d/plctool.fish",
 )  # fmt: skip
 FULL = "No space left on device"
-
-
-def say(text: str) -> None:
-    print(f"-- {text}", flush=True)
 
 
 def eventually(question: Callable[[], Any]) -> Any:

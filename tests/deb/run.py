@@ -22,19 +22,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-SKIPPED = 77
+from tried import CAPABILITIES, PROGRAM, SKIPPED, say
+
 PATIENCE = 120.0  # for what a busy machine does late [s]
 UNIT = "lib/systemd/system/plcrt@.service"
 LINK = ("--tcp", "127.0.0.1:11755")
-PROGRAM = """\
-PROGRAM Main
-VAR n : DINT; END_VAR
-VAR RETAIN total : DINT; END_VAR
-    n := n + 1;
-    total := total + 1;
-END_PROGRAM
-"""
-CAPABILITIES = {"CAP_IPC_LOCK": 14, "CAP_SYS_NICE": 23}  # linux/capability.h
 SMALL_DISK = 8 << 20  # [bytes]: the flash file has 5 MiB
 MOUNTS = (("proc", "proc"), ("sysfs", "sys"), ("devpts", "dev/pts"))
 
@@ -42,10 +34,6 @@ MOUNTS = (("proc", "proc"), ("sysfs", "sys"), ("devpts", "dev/pts"))
 def skip(reason: str) -> None:
     print(f"make deb-test is left out: {reason}")
     sys.exit(SKIPPED)
-
-
-def say(text: str) -> None:
-    print(f"-- {text}", flush=True)
 
 
 class Debian:

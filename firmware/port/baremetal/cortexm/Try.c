@@ -80,7 +80,7 @@ __attribute__((used)) static RTS_UI32 enter_try(FRAME *caller, RTS_UI32 exc_retu
     return (RTS_UI32)EXC_RETURN_THREAD_PSP;
 }
 
-/* Whether the stack can be read from there on: it may be in the guard, below it, or not known. */
+/* True if the stack can be read from this address on. An address in the guard or below it is not in the stack. */
 static bool is_readable(const TRY *try, uintptr_t stack)
 {
     return stack - TryStackEnd(try) < RTS_IEC_STACK_SIZE - IEC_STACK_GUARD;
@@ -133,8 +133,8 @@ bool ThumbMayRead(uintptr_t address, RTS_UI32 size)
 
 #if RTS_IEC_UNPRIVILEGED
 
-/* Where a function that has a gate returns to: it gives the privileges up, and goes on where the gate was called. The
- * result is in r0, r1. */
+/* A function that was called by a gate returns here. This gives up the privileges and returns to the caller of the gate.
+ * The result is in r0, r1. */
 __attribute__((naked)) static void gate_return(void)
 {
     __asm__ volatile("movw r2, #:lower16:%c0\n\tmovt r2, #:upper16:%c0\n\tldr r2, [r2]\n\t"

@@ -22,11 +22,11 @@
  *   stack slot of the depth that runs               read, write
  * and nothing else: peripherals, the processor's own registers. So a wild store ends in an exception that names
  * it, and has changed nothing but the program's own data. Entering and leaving a Try move one region, that of the
- * stack, and set CONTROL.nPRIV, which says how thread mode goes on; handlers are privileged whatever it says.
+ * stack, and set CONTROL.nPRIV, which is the privilege of thread mode; handlers are always privileged.
  *
  * C functions that a program calls run in the Try, too, with its rights: arithmetic and mathematics as they are. What
  * writes variables of its own, or needs hardware, has a gate (APP_GATE, 8 bytes): an SVC in the section of gates, and a
- * jump to the function. The SVC of no other place gives privileges, so there is no way to them but to call such a
+ * jump to the function. An SVC anywhere else gives no privileges, so a program gets them only by calling such a
  * function. It runs on the program's stack, and returns through gate_return, which gives the privileges up. That the
  * program called it is the only thing kept of it (TRY.gate): tasks interrupt it, faults and breaks leave it as ever.
  *
@@ -44,7 +44,7 @@ enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_PSP = 4, EXC_RETURN_B
 enum { XPSR_THUMB = 1 << 24, XPSR_ALIGNED = 1 << 9 };
 enum { CONTROL_NPRIV = 1, CONTROL_SPSEL = 2 };
 
-/* Of the fault status. */
+/* Bits of CFSR, the fault status register. */
 enum {
     CFSR_IACCVIOL = 1 << 0,
     CFSR_STACKING = 0x30 | 0x3000, /* MSTKERR, MLSPERR, STKERR, LSPERR */
@@ -56,7 +56,7 @@ enum {
     CFSR_DIVBYZERO = 1 << 25,
 };
 
-/* What an exception entry pushes; the FPU's registers may follow. */
+/* The registers that an exception entry pushes; those of the FPU may follow. */
 typedef struct {
     RTS_UI32 r0, r1, r2, r3, r12, lr, pc, xpsr;
 } FRAME;
@@ -121,7 +121,7 @@ static inline uintptr_t TryStackSlot(const TRY *try)
     return (uintptr_t)(try->first + 1) - RTS_IEC_STACK_SIZE;
 }
 
-/* Where the stack of a depth ends. */
+/* The lowest address of the stack of this Try. */
 static inline uintptr_t TryStackEnd(const TRY *try)
 {
     return TryStackSlot(try) + IEC_STACK_GUARD;
@@ -192,7 +192,7 @@ void TryNoteRegisters(const FRAME *frame, RTS_UI32 exc_return, const RTS_UI32 *s
 #define TryNoteRegisters(frame, exc_return, saved) ((void)0)
 #endif
 
-/* Where a fault that the debugger gets is to return to; 0: it leaves the Try. */
+/* Offers a fault to the debugger. Returns the EXC_RETURN by which the program goes on; 0: the fault leaves the Try. */
 RTS_UI32 TryDebugFault(FRAME *frame, RTS_UI32 exc_return, RTS_UI32 *saved, RTS_UI32 code);
 
 /* Hands an exception that is raised to a debugger; returns if there is none. */

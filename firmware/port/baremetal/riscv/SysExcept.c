@@ -234,7 +234,7 @@ bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     return exception->code == RTSEXCPT_NOEXCEPTION;
 }
 
-/* Whether the stack can be read from there on: it may be below its end, or not known. */
+/* True if the stack can be read from this address on. An address below its end is not in the stack. */
 static bool is_readable(const TRY *try, uintptr_t stack)
 {
     return stack - try->slot < RTS_IEC_STACK_SIZE;
@@ -255,8 +255,8 @@ __attribute__((noreturn)) static void leave(RTS_UI32 code, RTS_UI32 address, uin
 
 /* ---- gates ---- */
 
-/* Where a function that has a gate returns to: it gives the rights up, and goes on where the gate was called. The result
- * is in a0, a1. */
+/* A function that was called by a gate returns here. This gives up the rights and returns to the caller of the gate.
+ * The result is in a0, a1. */
 __attribute__((naked)) static void gate_return(void)
 {
     __asm__ volatile("ecall");
